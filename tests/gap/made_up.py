@@ -78,6 +78,8 @@ def missing() -> Gap:
         improved=card(),
         verdict=MISSING,
         effects=(current,),
+        coefficients=(),
+        effect_alone={},
         alternatives=(),
         rivals=(Rival(("current",), 0.0, 0.97), Rival(("heading_offset",), 14.0, 0.02), Rival((), 5000.0, 0.0)),
         where=(

@@ -197,7 +197,17 @@ def test_a_rounded_motion_is_moved_to_the_exact_one_between_the_blocks() -> None
     count = np.array([BLOCKS, BLOCKS])
     zeros = np.zeros((2, n - 1, 0))
     motion = MeasuredBatch(
-        ("a", "b"), MEASURED_STATES, STEP, FINE, np.zeros(2), count, rounded, zeros, np.zeros((2, BLOCKS, 6)), sizes
+        ("a", "b"),
+        MEASURED_STATES,
+        STEP,
+        FINE,
+        np.zeros(2),
+        count,
+        rounded,
+        zeros,
+        np.zeros((2, BLOCKS, 6)),
+        sizes,
+        np.zeros(2),
     )
     away = (true - rounded)[:, FINE // 2 :: FINE]
     halfway = 0.5 * (rounded[:, 1:] + rounded[:, :-1])

@@ -69,7 +69,7 @@ def simulated(rudder, given, current=(0.0, 0.0)) -> MeasuredBatch:
     measured = np.zeros((2, BLOCKS, 6))
     lengths = np.full(2, BLOCKS)
     return MeasuredBatch(
-        ("a", "b"), SEEN, STEP, FINE, np.zeros(2), lengths, np.array(solved), inputs, measured, np.ones(6)
+        ("a", "b"), SEEN, STEP, FINE, np.zeros(2), lengths, np.array(solved), inputs, measured, np.ones(6), np.zeros(2)
     )
 
 

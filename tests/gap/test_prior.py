@@ -31,20 +31,30 @@ def posed(*, by_angle: bool = True, gear: str = "time_constant_s = 0.5" + GEAR, 
     return likelihood_from_card(card, Measured((trial,), "angle" if by_angle else "order", ()))
 
 
-def row(likelihood: Likelihood, name: str) -> np.ndarray:
-    """What a coefficient is wrong by together with others, in its own standard error."""
-    place = likelihood.coefficients.names.index(name)
+def individual(likelihood: Likelihood) -> dict[str, int]:
+    """Name to the place of the first cause that changes it alone."""
     mixing = likelihood.coefficients.mixing
-    deviation = mixing[place, place]
-    shared: np.ndarray = mixing[place, len(mixing) :] / deviation
+    alone = np.flatnonzero(np.count_nonzero(mixing, axis=0) == 1)
+    found: dict[str, int] = {}
+    for cause in alone:
+        name = likelihood.coefficients.names[int(np.flatnonzero(mixing[:, cause])[0])]
+        found.setdefault(name, int(cause))
+    return found
+
+
+def row(likelihood: Likelihood, name: str) -> np.ndarray:
+    """Errors of a coefficient that it may share with others, in its own standard error."""
+    place = likelihood.coefficients.names.index(name)
+    mixing, own = likelihood.coefficients.mixing, individual(likelihood)
+    shared: np.ndarray = np.delete(mixing[place], list(own.values())) / mixing[place, own[name]]
     return shared
 
 
 def test_each_coefficient_is_wrong_by_its_own_standard_error() -> None:
-    coefficients = posed(stated=True).coefficients
-    count = len(coefficients.names)
-    errors = dict(zip(coefficients.names, np.diag(coefficients.mixing), strict=True))
-    np.testing.assert_array_equal(coefficients.mixing[:, :count], np.diag(np.diag(coefficients.mixing)))
+    likelihood = posed(stated=True)
+    mixing, own = likelihood.coefficients.mixing, individual(likelihood)
+    assert set(own) == set(likelihood.coefficients.names)
+    errors = {name: mixing[likelihood.coefficients.names.index(name), place] for name, place in own.items()}
     for name in ESTIMATED:
         assert errors[f"derivatives.{name}"] == pytest.approx(STATED.get(name, 0.02) * abs(TRUTH[name])), name
     assert errors["derivatives.Nrdot"] == pytest.approx(0.02 * abs(TRUTH["Nrdot"]))
@@ -99,7 +109,7 @@ def test_the_gear_is_as_uncertain_as_a_coefficient_unless_it_was_assumed(gear: s
 def test_of_a_measured_angle_what_the_gear_is_wrong_by_does_not_show() -> None:
     for by_angle in (True, False):
         likelihood = posed(by_angle=by_angle)
-        places = [place for place, name in enumerate(likelihood.coefficients.names) if name.startswith("steering.")]
+        places = [place for name, place in individual(likelihood).items() if name.startswith("steering.")]
         assert bool(np.any(likelihood.coefficient_columns[..., places])) != by_angle
 
 
@@ -109,8 +119,34 @@ def test_the_rudder_s_clock_is_known_to_half_a_sample(by_angle: bool) -> None:
     errors = dict(zip(likelihood.coefficients.names, likelihood.coefficients.errors, strict=True))
     assert errors[CLOCK] == pytest.approx(0.5 * STEP)
     # and its column is one of those that are integrated out
-    place = likelihood.coefficients.names.index(CLOCK)
+    place = individual(likelihood)[CLOCK]
     assert np.abs(likelihood.coefficient_columns[..., place]).max() > 0
+
+
+def test_how_well_the_hull_is_known_says_nothing_of_gear_and_clock() -> None:
+    likelihood = posed(by_angle=False)
+    coefficients = likelihood.coefficients
+    ratio = np.diag(coefficients.spread(2.0) @ coefficients.spread(2.0).T) / coefficients.errors**2
+    for name, grown in zip(coefficients.names, ratio, strict=True):
+        assert grown == pytest.approx(4.0 if name.startswith("derivatives.") else 1.0), name
+
+
+def test_each_change_of_the_order_has_an_instant_of_its_own_within_a_sampling_interval() -> None:
+    likelihood = posed(by_angle=False)
+    causes = likelihood.coefficients.mixing.shape[1]
+    moves, clock = likelihood.coefficient_columns[..., causes:], individual(likelihood)[CLOCK]
+    assert moves.shape[-1] == 2  # of the zigzag in 60 s: to 20 deg at 10 s, to the other side 50 s later
+    late = likelihood.coefficient_columns[..., clock] / (0.5 * STEP)
+    np.testing.assert_allclose(moves.sum(axis=-1), late * STEP / np.sqrt(12), atol=1e-12)
+    begins = [
+        likelihood.motion.times[0][np.flatnonzero(np.abs(moves[0, :, :, k]).max(axis=1) > 1e-12)[0]] for k in (0, 1)
+    ]
+    assert begins == pytest.approx([10.0, 60.0], abs=2 * likelihood.motion.block_s)
+    assert not likelihood_of_angle().coefficient_columns[..., causes:].any()
+
+
+def likelihood_of_angle() -> Likelihood:
+    return posed(by_angle=True)
 
 
 def test_noise_is_believed_to_be_that_of_the_trials() -> None:

@@ -154,4 +154,5 @@ def toy_trials(theta=(), coefficients=(), *, seed=1, blocks=(24, 17), fine=5, st
         inputs=np.tile(np.sin(times[:-1, None] / 5), (2, 1, 1)),
         measured=measured,
         noise=WHITE,
+        unsure_s=np.zeros(2),
     ), np.array(truths)

@@ -22,7 +22,7 @@ LOGS = np.append(NOISE.logs, np.log(WIDTH))
 def judge(motion=None, *, names=("0", "1"), errors=(0.5, 0.3), spread=0.5, mixing=None) -> Likelihood:
     beliefs = Belief(LOGS + 0.1, np.full(len(LOGS), spread))
     mixing = np.diag(errors[: len(names)]) if mixing is None else mixing
-    return Likelihood(motion or toy_motion(), Toy(), NuisanceParameters(names, mixing), beliefs)
+    return Likelihood(motion or toy_motion(), Toy(), NuisanceParameters(names, mixing, len(mixing.T)), beliefs)
 
 
 def forms_of(of: Likelihood, toy: Toy, theta) -> np.ndarray:

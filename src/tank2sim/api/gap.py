@@ -65,7 +65,8 @@ class GapResult(Result):
 
     @property
     def verdict(self) -> str:
-        """``missing effect``, ``no missing effect``, ``ambiguous`` or ``outside the library``."""
+        """``missing effect``, ``no missing effect``, ``the coefficients explain it``, ``ambiguous`` or ``outside the
+        library``."""
         return self.gap.verdict
 
     @property
@@ -83,6 +84,17 @@ class GapResult(Result):
         ]
         numbers = ["value", "standard_error", "probability"]
         return pd.DataFrame(rows, columns=["effect", "parameter", *numbers]).astype(dict.fromkeys(numbers, float))
+
+    @property
+    def coefficients(self) -> pd.DataFrame:
+        """Coefficients that were fitted together with the effects, by name; empty where the given ones were kept.
+
+        Value and standard error now, and as the given card has them: prime or SI, rudder positive to starboard.
+        """
+        import pandas as pd
+
+        columns = ["name", "value", "standard_error", "before", "standard_error_before"]
+        return pd.DataFrame(self._results["coefficients"], columns=columns).set_index("name")
 
     @property
     def misfit(self) -> pd.DataFrame:

@@ -369,12 +369,24 @@ class MissingKeys(_Part):
     over_time: dict[str, list[str] | list[Number]]
 
 
+class RefittedKeys(_Part):
+    """A coefficient that was fitted together with the effects, and as the given card has it: prime or SI, rudder to
+    starboard."""
+
+    name: str
+    value: Number
+    standard_error: Number
+    before: Number
+    standard_error_before: Number
+
+
 class GapKeys(_Keys):
     """The missing effect of a model."""
 
     ship: str
     verdict: str
     effects: list[dict[str, Any]]
+    coefficients: list[RefittedKeys]
     alternatives: list[str]
     where: list[dict[str, Any]]
     acting: list[dict[str, Any]]

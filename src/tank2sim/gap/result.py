@@ -14,8 +14,9 @@ from tank2sim.identification.trials.assessment.evaluation import FigureCompariso
 MISSING = "missing effect"
 NO_EFFECT_MISSING = "no missing effect"
 AMBIGUOUS = "ambiguous"
+COEFFICIENTS = "the coefficients explain it"
 OUTSIDE_LIBRARY = "outside the library"
-GAP_VERDICTS = (MISSING, NO_EFFECT_MISSING, AMBIGUOUS, OUTSIDE_LIBRARY)
+GAP_VERDICTS = (MISSING, NO_EFFECT_MISSING, COEFFICIENTS, AMBIGUOUS, OUTSIDE_LIBRARY)
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,32 @@ class Named:
     parameters: Mapping[str, float]
     standard_errors: Mapping[str, float]
     confidence: float
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """A coefficient of the card that was fitted together with the effects.
+
+    Parameters
+    ----------
+    name : str
+        Derivative (``Yv``), or ``effect.parameter``.
+    value, standard_error : float
+        Prime, or SI for a parameter of an effect; rudder positive to starboard.
+    before, standard_error_before : float
+        Of the given card.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    before: float
+    standard_error_before: float
+
+    @property
+    def moved(self) -> float:
+        """Change in standard errors of the given card."""
+        return abs(self.value - self.before) / self.standard_error_before
 
 
 @dataclass(frozen=True)
@@ -244,10 +271,16 @@ class Gap:
     card : ManoeuvringCard
         As given.
     improved : ManoeuvringCard
-        With the effect; the given card where no effect of the ship was named (nothing, or a sensor's fault).
+        With the effect, and with the coefficients fitted together with it where the trials are then followed better;
+        the given card where no effect of the ship was named (nothing, or a sensor's fault) and none was refitted.
     verdict : str
         One of :data:`GAP_VERDICTS`.
     effects : tuple of Named
+    coefficients : tuple of Refitted
+        Those of the improved card that were fitted together with the effects; empty where the given ones were kept.
+    effect_alone : mapping
+        ``fit`` and ``holdout`` to the misfit with the effects alone, noise units; empty where the given coefficients
+        were kept.
     alternatives : tuple of tuples of str
         Explanations that these data cannot distinguish from the named one.
     rivals : tuple of Rival
@@ -275,6 +308,8 @@ class Gap:
     improved: ManoeuvringCard
     verdict: str
     effects: tuple[Named, ...]
+    coefficients: tuple[Refitted, ...]
+    effect_alone: Mapping[str, float]
     alternatives: tuple[tuple[str, ...], ...]
     rivals: tuple[Rival, ...]
     where: tuple[MisfitPlace, ...]

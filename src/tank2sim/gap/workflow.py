@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -24,10 +24,12 @@ from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
+from tank2sim.gap.outcome.refit import refit_coefficients
 from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
 from tank2sim.gap.proof.replay import replay_trials, with_black_box
 from tank2sim.gap.result import (
     AMBIGUOUS,
+    COEFFICIENTS,
     MISSING,
     NO_EFFECT_MISSING,
     OUTSIDE_LIBRARY,
@@ -35,6 +37,7 @@ from tank2sim.gap.result import (
     Named,
     NextTest,
     Passed,
+    Refitted,
     Rival,
 )
 from tank2sim.gap.search.detection_limit import could_hide
@@ -46,6 +49,16 @@ from tank2sim.records.trials import Trial
 
 RIVALS = 12
 """Explanations that are reported."""
+
+BETTER = 0.05
+"""Share by which the misfit of the fitted trials must fall for coefficients to be refitted together with an effect
+(project choice): less, and the given ones are kept."""
+
+BETTER_FROM = 1.1
+"""Misfit in noise units of the fitted trials from which a refit of the coefficients is tried (project choice)."""
+
+EXPLAINED = 0.2
+"""Coefficients explain a gap that they reduce to less than this share, or to noise (project choice)."""
 
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
@@ -144,12 +157,24 @@ def _assemble_gap(
         estimated = estimates(found.likelihood.by_formula(decision.best))
     noise = _noise(found, decision.best, fitted)
     sigmas = {name: sigma for name, (sigma, _) in noise.items()}
-    improved, results = _replay_all(card, trials, estimated, sigmas)
+    proof = _prove(card, trials, estimated, sigmas, found, decision.best)
     withheld = ""
-    if estimated and not closes_gap(results):
+    if estimated and not closes_gap(proof.results):
         withheld = " and ".join(name for name, *_ in estimated)
         decision, estimated = replace(decision, verdict=OUTSIDE_LIBRARY), []
-        improved, results = _replay_all(card, trials, estimated, sigmas)
+        proof = _prove(card, trials, estimated, sigmas, found, found.none)
+    if decision.verdict == NO_EFFECT_MISSING:
+        before, after = (_misfit_of(proof.results, version) for version in ("before", "after"))
+        if (
+            proof.coefficients
+            and before > MUCH
+            and closes_gap(proof.results)
+            and after <= max(MUCH, EXPLAINED * before)
+        ):
+            decision = replace(decision, verdict=COEFFICIENTS)
+        elif after > MUCH:
+            decision = replace(decision, verdict=OUTSIDE_LIBRARY)
+    improved, results = proof.improved, proof.results
     sensors = _sensor_faults(estimated)
     progress("where and how much")
     force = force_lacking(found.likelihood, found.none)
@@ -160,6 +185,8 @@ def _assemble_gap(
         improved=improved,
         verdict=decision.verdict,
         effects=tuple(Named(*effect, decision.confidence(effect[0])) for effect in estimated),
+        coefficients=proof.coefficients,
+        effect_alone=proof.effect_alone,
         alternatives=tuple(fit.hypothesis.effects for fit in decision.alike) if estimated else (),
         rivals=_rivals(found, decision),
         where=places(results),
@@ -176,20 +203,69 @@ def _assemble_gap(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Proof:
+    """An improved card, all trials replayed by both cards, and what was fitted together with the effects."""
+
+    improved: ManoeuvringCard
+    results: list[Passed]
+    coefficients: tuple[Refitted, ...] = ()
+    effect_alone: Mapping[str, float] = field(default_factory=dict)
+
+
+def _prove(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    estimated: list[Found],
+    sigmas: Mapping[str, float],
+    found: Search,
+    best: ExplanationFit,
+) -> _Proof:
+    """The card with the effects, and with coefficients fitted together with them if fitted trials are then followed
+    better by :data:`BETTER`; replays by both cards, and by a black box where an effect is named."""
+    alone = add_effects_to_card(card, estimated)
+    sensors = _sensor_faults(estimated)
+    results = _replay_all(card, alone, trials, sensors, sigmas)
+    proof = _Proof(alone, results)
+    if _misfit_of(results, "after", held_out=False) > BETTER_FROM:
+        refitted, base = refit_coefficients(card, found.likelihood.coefficients_with(best))
+        joint = add_effects_to_card(base, estimated)
+        joint_results = _replay_all(card, joint, trials, sensors, sigmas)
+        misfits = [_misfit_of(group, "after", held_out=False) for group in (results, joint_results)]
+        if misfits[1] < (1 - BETTER) * misfits[0]:
+            keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
+            of_effect = {key: _misfit_of(results, "after", held_out=held) for key, held in keys.items()}
+            proof = _Proof(joint, joint_results, refitted, of_effect if estimated else {})
+    if not estimated:
+        return proof
+    box = black_box(card, trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
+    boxed: list[Passed] = []
+    for group, held_out in zip(trials, (False, True), strict=True):
+        of_group = [result for result in proof.results if result.held_out == held_out]
+        boxed += with_black_box(of_group, box.card, group, sigmas) if of_group else []
+    return replace(proof, results=boxed)
+
+
 def _replay_all(
-    card: ManoeuvringCard, trials: tuple[Measured, Measured], estimated: list[Found], sigmas: Mapping[str, float]
-) -> tuple[ManoeuvringCard, list[Passed]]:
-    """The card with the estimated effects, and all trials replayed by both cards and a black box."""
-    improved = add_effects_to_card(card, estimated)
-    count = sum(len(errors) for *_, errors in estimated)
-    box = black_box(card, trials[0], sigmas, max(count, 1)) if estimated else None
+    card: ManoeuvringCard,
+    improved: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    sensors: Sequence[Found],
+    sigmas: Mapping[str, float],
+) -> list[Passed]:
+    """All trials replayed by both cards."""
     results: list[Passed] = []
     for group, held_out in zip(trials, (False, True), strict=True):
         if group.trials:
-            corrected = _corrected(group, _sensor_faults(estimated))
-            replays = replay_trials(card, improved, group, sigmas, held_out, corrected)
-            results += with_black_box(replays, box.card, group, sigmas) if box else replays
-    return improved, results
+            corrected = _corrected(group, sensors)
+            results += replay_trials(card, improved, group, sigmas, held_out, corrected)
+    return results
+
+
+def _misfit_of(results: Sequence[Passed], version: str, *, held_out: bool | None = None) -> float:
+    """Root mean square of the misfits of trials, noise units; of all, or of those held out or fitted."""
+    chosen = [result.misfit(version) for result in results if held_out is None or result.held_out == held_out]
+    return float(np.sqrt(np.mean(np.square(chosen))))
 
 
 def _sensor_faults(estimated: Sequence[Found]) -> list[Found]:
@@ -252,7 +328,7 @@ def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> E
     kept = [place for place, name in enumerate(coefficients.names) if name != CLOCK]
     variables = [estimate.variable for estimate in fit.hypothesis.estimated]
     names = (*variables, *(coefficients.names[place] for place in kept))
-    shared = fit.width * coefficients.mixing[kept]
+    shared = coefficients.spread(fit.width)[kept]
     spread = np.zeros((len(names), len(names)))
     spread[len(fit.theta) :, len(fit.theta) :] = shared @ shared.T
     spread[: len(fit.theta), : len(fit.theta)] = fit.covariance

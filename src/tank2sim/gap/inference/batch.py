@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,10 @@ choice)."""
 FINE_PER_SHIP_TIME = 200
 """Fine steps in L/u0 at most, if the record has so many samples: a step of the rudder order must not be averaged with
 the value before it, or a gear at its limit would respond too early."""
+
+SMALLEST_MOVE = np.deg2rad(0.5)
+"""Change of the rudder's order from one fine step to the next that counts as a move, rad: below the smallest order of a
+helmsman, above the rounding of a record (project choice)."""
 
 _LEAST_NOISE = 1e-5
 """Noise of a sample over the variable's nominal size, for records without any: no filter can take these as exact
@@ -69,6 +74,9 @@ class MeasuredBatch:
         Mean over each block, nan where nothing was measured.
     noise : array (ny,)
         Standard deviation of the mean over a block, of the part that is too fast for a ship.
+    unsure_s : array (R,)
+        Time from one reading of the rudder's order to the next, s: within it the order changed, at an unknown instant.
+        0 where the rudder's angle was measured.
     """
 
     names: tuple[str, ...]
@@ -81,6 +89,7 @@ class MeasuredBatch:
     inputs: Array
     measured: Array
     noise: Array
+    unsure_s: Array
 
     @property
     def block_s(self) -> float:
@@ -114,6 +123,22 @@ class MeasuredBatch:
     def block_inputs(self) -> Array:
         """Means of the inputs from the middle of a block to that of the next (R, T - 1, nu)."""
         return self.over_blocks(self.inputs)
+
+    def order_moves(self, command: int) -> NDArray[np.float64]:
+        """Mask of the blocks from one change of the rudder's order to the next, a column for each (R, T - 1, moves).
+
+        Changes within a block of each other are one move; `command` is the place of ``rudder.command`` in the inputs.
+        """
+        masks = []
+        for run, order in enumerate(self.inputs[:, :, command]):
+            changes = np.flatnonzero(np.abs(np.diff(order)) > SMALLEST_MOVE) + 1
+            begins = [change for before, change in pairwise([-np.inf, *changes]) if change - before > self.fine]
+            blocks = [int((begin - self.fine // 2) // self.fine) for begin in begins]
+            for first, after in pairwise([*(max(block, 0) for block in blocks), self.blocks]):
+                mask = np.zeros((len(self.inputs), self.blocks - 1))
+                mask[run, first:after] = 1.0
+                masks.append(mask)
+        return np.stack(masks, axis=-1) if masks else np.zeros((len(self.inputs), self.blocks - 1, 0))
 
     def over_blocks(self, values: Array) -> Array:
         """Means of values of fine steps (R, n - 1, k) from the middle of a block to that of the next (R, T - 1, k)."""
@@ -217,6 +242,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         states=np.array(states),
         inputs=np.array(inputs),
         measured=np.array(measured),
+        unsure_s=np.array([0.0 if "delta_rad" in trial.signals else sampling_step(trial) for trial in trials]),
         noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
     )
 

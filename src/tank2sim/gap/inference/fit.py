@@ -22,16 +22,42 @@ class NuisanceParameters:
     mixing : array (n, nc)
         Change of each by one standard deviation of each of nc independent causes: its individual error, and errors
         that it shares with other parameters.
+    scaled : int
+        The first causes, whose standard errors the trials may widen or narrow by a common factor: those of the
+        coefficients. What is known of gear and clock does not depend on how well the hull is known.
     """
 
     names: tuple[str, ...]
     mixing: Array
+    scaled: int
+
+    def spread(self, width: float) -> Array:
+        """The mixing (n, nc) with the scaled causes `width` times as large."""
+        return self.mixing * np.where(np.arange(self.mixing.shape[1]) < self.scaled, width, 1.0)
 
     @property
     def errors(self) -> Array:
         """Standard error of each (n,)."""
         errors: Array = np.sqrt(np.sum(self.mixing**2, axis=1))
         return errors
+
+
+@dataclass(frozen=True, eq=False)
+class CoefficientEstimates:
+    """Coefficients of the card as trials determine them together with an explanation.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of n parameters, as in :class:`NuisanceParameters`.
+    change : array (n,)
+        Most probable value less that of the card.
+    covariance : array (n, n)
+    """
+
+    names: tuple[str, ...]
+    change: Array
+    covariance: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +99,7 @@ class FilterColumns:
     parameter_count : int
         k.
     coefficient_count : int
-        nc, of the coefficients; the columns after them are of the effects' form.
+        Of the causes whose errors are scaled; the columns after them are of other causes and of the effects' form.
     """
 
     driving: Array

@@ -174,7 +174,8 @@ class Hypothesis:
         for name, delay in self._delays(theta).items():
             if not self._states_behind(name):
                 place = names.index(name)
-                inputs[:, :, place] = _late(inputs[:, :, place], delay / motion.step_s)
+                steps = np.full(runs, delay / motion.step_s)
+                inputs[:, :, place] = _late(inputs[:, :, place], steps)
         return inputs
 
     def _delays(self, theta: Array) -> dict[str, float]:
@@ -213,9 +214,13 @@ class Hypothesis:
             start = self._steady_states(x[run, 0], inputs[run, 0], p)
             tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
         unmeasured = np.array(tracks)
-        for name, delay in self._delays(theta).items():
-            for place in self._states_behind(name):
-                unmeasured[:, :, place] = _late(unmeasured[:, :, place], delay / motion.step_s)
+        delays = {"rudder.command": 0.0} | self._delays(theta)
+        for name, delay in delays.items():
+            # An order was given, on average, half a sampling interval before the first reading that shows it.
+            delay_of_run = delay - (0.5 * motion.unsure_s if name == "rudder.command" else 0.0 * motion.unsure_s)
+            if delay_of_run.any():
+                for place in self._states_behind(name):
+                    unmeasured[:, :, place] = _late(unmeasured[:, :, place], delay_of_run / motion.step_s)
         return unmeasured
 
     def rates(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None = None) -> Array:
@@ -273,7 +278,7 @@ class Hypothesis:
             behind = self._states_behind("rudder.command")
             for rows, places in zip(late, (behind, () if behind else (self._command,)), strict=True):
                 for place in places:
-                    rows[..., place] = _late(rows[..., place], 1.0)
+                    rows[..., place] = _late(rows[..., place], np.ones(len(rows)))
             middles = motion.over_blocks(0.5 * (late[0][:, 1:] + late[0][:, :-1]))
             rates = _rowwise(self._rates, along[0], middles, motion.over_blocks(late[1]), p)
             columns[..., names.index(CLOCK)] = (rates - base) / motion.step_s
@@ -401,7 +406,7 @@ def _matrices(values: Array, columns: int) -> Array:
     return values.reshape(*values.shape[:2], columns, -1).swapaxes(-1, -2)
 
 
-def _late(rows: Array, steps: float) -> Array:
-    """Values (R, n) delayed by `steps` (a real number); the first value is held before."""
+def _late(rows: Array, steps: Array) -> Array:
+    """Values (R, n) delayed by `steps` (R,), real numbers; the first value is held before, the last one after."""
     places = np.arange(rows.shape[1])
-    return np.array([np.interp(places - steps, places, row) for row in rows])
+    return np.array([np.interp(places - late, places, row) for row, late in zip(rows, steps, strict=True)])

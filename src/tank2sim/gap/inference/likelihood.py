@@ -21,9 +21,15 @@ from scipy.optimize import minimize
 
 from tank2sim.arrays import Array
 from tank2sim.gap.inference.batch import MeasuredBatch
-from tank2sim.gap.inference.fit import Belief, ExplanationFit, FilterColumns, NuisanceParameters
+from tank2sim.gap.inference.fit import (
+    Belief,
+    CoefficientEstimates,
+    ExplanationFit,
+    FilterColumns,
+    NuisanceParameters,
+)
 from tank2sim.gap.inference.form_error import Forms
-from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES, Linear, Observer, linear_filter, observer, slopes
 
 COUNTED = 20.0
@@ -32,6 +38,10 @@ coloured."""
 
 WIDE_PRIOR = 10.0
 """Error of the smoothed motion at the beginning of a run, in its noise: wide, so that no initial state is assumed."""
+
+SHORTEST_UNSURE = 0.05
+"""Sampling interval of the rudder's order, in blocks, beyond which the instant of each change is estimated (project
+choice): below, it moves the ship by less than any sensor shows."""
 
 LARGEST_FORM, IMPOSSIBLE = 3.5, 1000.0
 """Standard deviations by which a form may differ, and the cost of each beyond (project choice): a force that its
@@ -81,6 +91,10 @@ class Likelihood:
         self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
+        unsure = motion.unsure_s > SHORTEST_UNSURE * motion.block_s
+        moves = motion.order_moves(none.model.input_names.index("rudder.command")) * unsure[:, None, None]
+        moves = moves[..., moves.any(axis=(0, 1))] if CLOCK in coefficients.names else moves[..., :0]
+        self._moves = moves * motion.unsure_s[:, None, None] / np.sqrt(12.0)  # of a uniform distribution
         self.wide = WIDE_PRIOR * motion.errors if belief.wide is None else belief.wide
         self.base = self.linear(none, nothing)
         self.coefficient_columns = self.of_coefficients(none, nothing)
@@ -96,10 +110,16 @@ class Likelihood:
         return linear_filter(by_state, reading, self.known, self.motion.block_s, self.wide)
 
     def of_coefficients(self, hypothesis: Hypothesis, theta: Array) -> Array:
-        """Driving of each cause of coefficient errors, per standard deviation (R, T - 1, 6, nc)."""
-        if not self.coefficients.names:
+        """Driving of each cause of errors of coefficients, gear and clock, and of the unknown instant of each change of
+        the rudder's order, per standard deviation (R, T - 1, 6, nc + moves)."""
+        names = self.coefficients.names
+        if not names:
             return np.zeros((*self._lack.shape, 0))
-        columns = hypothesis.coefficient_slopes(self.motion, theta, self.coefficients.names) @ self.coefficients.mixing
+        slopes_by_name = hypothesis.coefficient_slopes(self.motion, theta, names)
+        columns = slopes_by_name @ self.coefficients.mixing
+        if self._moves.shape[-1]:
+            late = slopes_by_name[..., [names.index(CLOCK)]] * self._moves[:, :, None, :]
+            columns = np.concatenate([columns, late], axis=-1)
         scaled: Array = self.motion.block_s * columns * self._inside[..., None]
         return scaled
 
@@ -148,7 +168,7 @@ class Likelihood:
         pairs = np.concatenate([np.stack(driven, axis=-1), of_coefficients, forms], axis=-1)
         readings = np.zeros((*shown.shape, pairs.shape[-1]))
         readings[..., : 1 + len(theta)] = np.stack(seen, axis=-1)
-        return FilterColumns(pairs, readings, len(theta), of_coefficients.shape[-1])
+        return FilterColumns(pairs, readings, len(theta), self.coefficients.scaled)
 
     def whiten(self, fit: ExplanationFit) -> tuple[Array, Array]:
         """Columns of an explanation in units of the innovations (R, T, ny, C), and its innovations (R, T, ny)."""
@@ -185,10 +205,29 @@ class Likelihood:
 
         A simulation uses the formula without form errors. The standard errors remain those with form errors.
         """
+        return replace(fit, theta=self._strict(fit)[1].theta)
+
+    def _strict(self, fit: ExplanationFit) -> tuple[Likelihood, ExplanationFit]:
+        """The likelihood without form errors, and an explanation at its best there."""
         strict = copy(self)
         strict._forms = None
-        found = strict.at_best(fit.hypothesis, fit.theta, [fit.logs], BY_FORMULA)
-        return replace(fit, theta=found.theta)
+        return strict, strict.at_best(fit.hypothesis, fit.theta, [fit.logs], BY_FORMULA)
+
+    def coefficients_with(self, fit: ExplanationFit) -> CoefficientEstimates:
+        """The card's coefficients that fit the measurements best together with an explanation, without form errors."""
+        strict, found = self._strict(fit)
+        seen, columns = strict._seen(found)
+        flat = seen.whiten(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])
+        k, causes = columns.parameter_count, len(self.coefficients.mixing.T)
+        weight = np.concatenate([found.hypothesis.prior[1], np.ones(flat.shape[1] - 1 - k)])
+        normal = flat[:, 1:].T @ flat[:, 1:] + np.diag(weight)
+        size = np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), 1.0))
+        covariance = np.linalg.inv(normal / np.outer(size, size) + 1e-12 * np.eye(len(size))) / np.outer(size, size)
+        spread = self.coefficients.spread(found.width)
+        kept = slice(k, k + causes)
+        return CoefficientEstimates(
+            self.coefficients.names, spread @ found.change[:causes], spread @ covariance[kept, kept] @ spread.T
+        )
 
     def innovations(self, fit: ExplanationFit) -> Array:
         """Innovations of an explanation, each over its standard deviation (R, T, ny), 0 where nothing was measured."""
@@ -325,7 +364,7 @@ class Likelihood:
         return FilterColumns(driving, columns.shown[..., : driving.shape[-1]], k, directions.shape[1])
 
     def _score(self, fit: ExplanationFit, seen: Observer, solved: _Solved) -> float:
-        forms = np.abs(solved.change[len(self.coefficients.mixing.T) :])
+        forms = np.abs(solved.change[self.coefficient_columns.shape[-1] :])
         twisted = IMPOSSIBLE * float(np.sum(np.maximum(forms - LARGEST_FORM, 0.0)))
         return (
             twisted

@@ -66,13 +66,15 @@ def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihoo
     motion = batch_trials(none.model, measured.trials, ship_time)
     free = free_parameters(card, inertia=True)
     known = {name: error for name, (_, error) in free.items() if name in none.model.parameter_names}
+    count = len(known)
     known |= _gear_errors(card, none.model)
     known[CLOCK] = CLOCK_SHARE * max(sampling_step(trial) for trial in measured.trials)
-    mixing = np.column_stack([np.diag(list(known.values())), *_shared(tuple(known), known, free)])
+    each, shared = np.diag(list(known.values())), _shared(tuple(known), known, free)
+    mixing = np.column_stack([each[:, :count], *shared, each[:, count:]])
     length, speed = card.ship.length_m, card.model.speed_mps
     wide = BEGINNING * np.array([speed, speed, speed / length, 1.0, 3 * length, 3 * length])
     known_before = replace(belief(motion, ship_time), wide=np.maximum(wide, WIDE_PRIOR * motion.errors))
-    return Likelihood(motion, none, NuisanceParameters(tuple(known), mixing), known_before)
+    return Likelihood(motion, none, NuisanceParameters(tuple(known), mixing, count + len(shared)), known_before)
 
 
 def _group(name: str) -> str:

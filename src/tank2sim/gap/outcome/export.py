@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from tank2sim.files import plain_json
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
 from tank2sim.gap.outcome.lacking import missing_as_json
 from tank2sim.gap.proof.cross_check import proof_cautions
-from tank2sim.gap.result import Gap, Named, NextTest, Passed
+from tank2sim.gap.result import Gap, Named, NextTest, Passed, Refitted
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
@@ -51,6 +52,7 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, A
             "ship": gap.card.ship.name,
             "verdict": gap.verdict,
             "effects": [_effect(effect) for effect in gap.effects],
+            "coefficients": [_coefficient(coefficient) for coefficient in gap.coefficients],
             "alternatives": [joined(alternative) for alternative in gap.alternatives],
             "where": _where(gap, names),
             "acting": _acting(gap, names),
@@ -208,6 +210,10 @@ def _effect(effect: Named) -> dict[str, object]:
     }
 
 
+def _coefficient(coefficient: Refitted) -> dict[str, object]:
+    return {name: _finite(value) if isinstance(value, float) else value for name, value in asdict(coefficient).items()}
+
+
 def _in_file(
     values: Mapping[str, float], convert: Callable[[str, float], tuple[str, float]] = in_file_units
 ) -> dict[str, float | None]:
@@ -219,7 +225,7 @@ def _misfit(gap: Gap) -> dict[str, object]:
     for variable, (sigma, origin) in gap.noise.items():
         name = signal_display_name(variable)
         noise[name.file] = {"sigma": _finite(name.factor * sigma), "from": origin}
-    sets = {"fit": False, "holdout": True}
+    sets, alone = {"fit": False, "holdout": True}, gap.effect_alone
     return {
         "noise": noise,
         "noise_floor": NOISE_FLOOR,
@@ -227,6 +233,7 @@ def _misfit(gap: Gap) -> dict[str, object]:
             version: {word: _finite(gap.misfit(version, held_out=held)) for word, held in sets.items()}
             for version in ("before", "after", "black_box")
         },
+        **({"effect_alone": {key: _finite(value) for key, value in alone.items()}} if alone else {}),
     }
 
 

@@ -108,12 +108,17 @@ class Replayer:
         self.model = driven_model(card, driven_by)
         self._steps = Chain(runge_kutta_step(self.model))
         self._shown = shown_by(self.model, seen)
+        ordered = driven_by == "order" and "rudder.command" in self.model.input_names
+        self._order = self.model.input_names.index("rudder.command") if ordered else None
         self._nominal = np.array([state.nominal for state in self.model.states])
 
     def states(self, start: Array, inputs: Array, step_s: float, p: Array) -> Array:
         """States (n, nx) at the instants of `inputs` (n, nu), each row held for `step_s`; nan once out of bounds."""
         parts = parts_of(self.model, step_s)
         fine = np.repeat(inputs[:-1], parts, axis=0)
+        if self._order is not None:  # given, on average, half an interval before the first reading that shows it
+            early = np.repeat(inputs[:, self._order], parts)[parts // 2 :]
+            fine[:, self._order] = early[: len(fine)]
         with np.errstate(all="ignore"):
             states = self._steps.run(start, fine, p, np.array([step_s / parts]))[::parts]
             lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)

@@ -10,7 +10,7 @@ import altair as alt
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE, replaces
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
 from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.report.gap.charts import (
@@ -38,6 +38,7 @@ from tank2sim.report.gap.text import (
     trial_name,
     verdict_context,
     verdict_in_words,
+    with_error,
 )
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
@@ -106,6 +107,8 @@ def gap_page(found: Json) -> Page:
     ]
     if figures := _figures(found):
         sections.append(PageSection(heading="Figures of manoeuvres", text=_FIGURES, tables=figures))
+    if coefficients := _coefficients(found):
+        sections.append(PageSection(heading="Coefficients", text=_COEFFICIENTS, tables=[coefficients]))
     if "agreement" in charts:
         sections.append(PageSection(heading="Do the trials agree", text=_AGREEMENT, charts=drawn("agreement")))
     if hidden := _could_hide(found):
@@ -122,6 +125,29 @@ def gap_page(found: Json) -> Page:
     return Page(title=found["ship"], subtitle=subtitle, figures=_key_figures(found), sections=shown)
 
 
+def _coefficients(found: Json) -> PageTable | None:
+    """Coefficients that were fitted together with the effects, those that moved most first."""
+
+    def moved(entry: Json) -> float:
+        return abs(or_nan(entry["value"]) - or_nan(entry["before"])) / or_nan(entry["standard_error_before"])
+
+    rows: list[list[Cell]] = [
+        [
+            entry["name"],
+            with_error(or_nan(entry["before"]), or_nan(entry["standard_error_before"])),
+            with_error(or_nan(entry["value"]), or_nan(entry["standard_error"])),
+            f"{moved(entry):.2f}",
+        ]
+        for entry in sorted(found["coefficients"], key=moved, reverse=True)
+    ]
+    heads = ("", "given card", "improved card", "moved by, standard errors")
+    return _table("Coefficients before and after, prime or SI, rudder to starboard", heads, rows) if rows else None
+
+
+_COEFFICIENTS = (
+    "Coefficients of the card fitted together with the effects, within the card's standard errors (times a common "
+    "factor that the trials determine)."
+)
 _ON = {"held out": "held out", "fitting": "used for fitting"}
 _BEFORE_AND_AFTER = (
     "Each trial is simulated freely from its beginning to its end with the recorded inputs alone. Misfit is the root "
@@ -181,7 +207,7 @@ _CAPTIONS = {
 def _key_figures(found: Json) -> list[KeyFigure]:
     effects = found["effects"]
     named = ", ".join(effect_in_words(effect["name"]) for effect in effects)
-    sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING) and not found["cautions"]
+    sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS) and not found["cautions"]
     caution = Verdict.NONE if sure else Verdict.CAUTION
     figures = [KeyFigure(label="Verdict", value=found["verdict"], verdict=caution, note=named)]
     if effects:
@@ -401,7 +427,7 @@ def _could_hide(found: Json) -> PageTable | None:
 def _next_test(found: Json) -> str:
     test = found["next_test"]
     if test is None:
-        sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING)
+        sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS)
         return "" if sure else "No manoeuvre was found that would decide more."
     # The command has a line of its own: among other words it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test['manoeuvre']}"

@@ -9,7 +9,7 @@ from pathlib import PurePath
 import numpy as np
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
 from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_column, format_number
@@ -19,6 +19,10 @@ from tank2sim.units import in_words, to_si
 GOOD = 1.5
 """Misfit in noise units up to which a model is said to follow the measurements (project choice): its own error is
 then about as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+
+
+MOVED = 3
+"""Coefficients that are named in the verdict: those that moved most (project choice)."""
 
 
 def effect_in_words(name: str) -> str:
@@ -112,12 +116,15 @@ def _found(found: Json) -> str:
         text = " ".join(effect.description for effect in known)
         if len(known) == len(effects) and all(effect.acts_on == "sensor" for effect in known):
             return f"A sensor is at fault, not the model: {names}. {text}".strip()
-        return f"The model lacks {'an effect' if len(effects) == 1 else 'effects'}: {names}. {text}".strip()
+        sentences = [f"The model lacks {'an effect' if len(effects) == 1 else 'effects'}: {names}.", text]
+        return " ".join([*filter(None, sentences), *_refitted(found)])
     if verdict == AMBIGUOUS:
         named = [[effect["name"] for effect in effects]] if effects else []
         candidates = [*named, *map(effects_of, found["alternatives"])]
         names = ", or ".join(dict.fromkeys(map(_joined, candidates)))
         return f"Something is missing, but these data do not distinguish several effects: {names}."
+    if verdict == COEFFICIENTS:
+        return " ".join(["The coefficients of the card explain the gap: no effect is missing.", *_refitted(found)])
     if verdict == NO_EFFECT_MISSING:
         good = after is None or after <= GOOD
         remainder = "" if good else ", which is more than noise, but no effect explains the rest better than none"
@@ -126,6 +133,28 @@ def _found(found: Json) -> str:
         "Something is missing that no effect of the library explains: what is left has a pattern of its own, "
         "and no name is given although some effect always fits a little."
     )
+
+
+def _refitted(found: Json) -> list[str]:
+    """That coefficients were fitted, too, those that moved most, and what the effect does without them."""
+    coefficients = found.get("coefficients") or []
+    if not coefficients:
+        return []
+    sizes = {
+        entry["name"]: abs(or_nan(entry["value"]) - or_nan(entry["before"])) / or_nan(entry["standard_error_before"])
+        for entry in coefficients
+    }
+    most = sorted(sizes, key=sizes.__getitem__, reverse=True)[:MOVED]
+    moved = ", ".join(f"{name} by {sizes[name]:.1f}" for name in most)
+    words = (
+        f"{len(coefficients)} coefficients of the card were fitted with it: most moved {moved} of their standard errors"
+    )
+    alone = found["misfit"].get("effect_alone")
+    if alone:
+        key = "holdout" if alone.get("holdout") is not None else "fit"
+        group = "held-out" if key == "holdout" else "fitting"
+        words += f"; with the effect alone the misfit of the {group} trials would be {noises(as_number(alone[key]))}"
+    return [f"{words}."]
 
 
 def _with_values(effect: Json) -> str:

@@ -198,8 +198,10 @@ def _parts(card: ManoeuvringCard, model: Model, run: SampledRun) -> tuple[Sample
     return in_range(run, model, card.model.valid_speed_mps, LEAST_PART * card.ship.length_m / card.model.speed_mps)
 
 
-def card_with_estimate(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
-    """The card with the estimates in place of its values, and their standard errors."""
+def card_with_estimate(
+    card: ManoeuvringCard, estimate: Estimate, comment: str = "identified from trials"
+) -> ManoeuvringCard:
+    """The card with the estimates in place of its values, and their standard errors; `comment` is next to each."""
     found = dict(zip(estimate.free, zip(estimate.values, estimate.standard_errors, strict=True), strict=True))
     derivatives = {
         name.partition(".")[2]: (rounded(value, error), float(f"{error:.3g}"))
@@ -218,7 +220,7 @@ def card_with_estimate(card: ManoeuvringCard, estimate: Estimate) -> Manoeuvring
     if REVOLUTIONS in found:
         scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
         changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
-    return revised(card, derivatives, changes, comment="identified from trials")
+    return revised(card, derivatives, changes, comment=comment)
 
 
 def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:

@@ -1,0 +1,37 @@
+"""A card with the coefficients that were fitted together with a missing effect."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.gap.inference.fit import CoefficientEstimates
+from tank2sim.gap.result import Refitted
+from tank2sim.identification.trials.problem.estimation_problem import Estimate
+from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters
+
+
+def refit_coefficients(
+    card: ManoeuvringCard, estimates: CoefficientEstimates
+) -> tuple[tuple[Refitted, ...], ManoeuvringCard]:
+    """The coefficients with their values before and after, and the card with them.
+
+    Data of the steering gear and the clock of the record are part of the fit and are not written: the card states what
+    the gear is, and the clock is the record's.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    estimates : CoefficientEstimates
+        Of parameters of the card's model.
+    """
+    known = free_parameters(card, inertia=True)
+    rows = [row for row, name in enumerate(estimates.names) if name in known]
+    names = tuple(estimates.names[row] for row in rows)
+    before = np.array([known[name] for name in names])
+    covariance = estimates.covariance[np.ix_(rows, rows)]
+    values = before[:, 0] + estimates.change[rows]
+    estimate = Estimate("gap", names, values, covariance, np.asarray(np.linalg.pinv(covariance), dtype=np.float64))
+    short = [name.removeprefix("derivatives.") for name in names]
+    columns = zip(short, values.tolist(), estimate.standard_errors.tolist(), *before.T.tolist(), strict=True)
+    return tuple(Refitted(*row) for row in columns), card_with_estimate(card, estimate, "refitted by gap")
