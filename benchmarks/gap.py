@@ -38,7 +38,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from gap_truth import EFFECTS, FIT, HOLDOUT, OUTSIDERS, Made, Setting, make, write
+from gap_truth import EFFECTS, FIT, HOLDOUT, OUTSIDERS, Made, Setting, make, sampled, write, wrong_card
 from scipy.stats import binomtest
 
 from tank2sim.cards import ManoeuvringCard, read_card
@@ -175,18 +175,23 @@ def _disturbed(process: str, coefficients: str) -> str:
     return ", ".join(words) or "noise"
 
 
-def key(setting: Setting, prove: bool) -> str:
+def key(setting: Setting, args: argparse.Namespace) -> str:
     """Name of a set's file."""
     words = ("+".join(setting.effects) or "none", setting.seed, setting.strength, setting.noise)
-    return "_".join(map(str, (*words, setting.process, setting.coefficients, *(["proved"] if prove else []))))
+    more = [*(["proved"] if args.prove else []), *([f"{args.hertz}Hz"] if args.hertz < 10 else [])]
+    more += [f"wrong{args.wrong_card}"] if args.wrong_card else []
+    return "_".join(map(str, (*words, setting.process, setting.coefficients, *more)))
 
 
-def judged(group: str, setting: Setting, prove: bool) -> Said:
+def judged(group: str, setting: Setting, prove: bool, hertz: int, wrong: float) -> Said:
     """Make a set, write it, read it, and look for what is missing."""
     (made,) = make([replace(setting, manoeuvres=FIT + HOLDOUT if prove else FIT)])
+    made = sampled(made, hertz)
     with TemporaryDirectory() as name:
         folder = Path(name)
         write(made, folder)
+        if wrong:
+            (folder / "ship.toml").write_text(wrong_card(made, wrong / 100), encoding="utf-8")
         card = read_card(folder / "ship.toml")
         assert isinstance(card, ManoeuvringCard)
         files = {part: [folder / f"{name}.csv" for name in names] for part, names in (("fit", FIT), ("held", HOLDOUT))}
@@ -211,7 +216,7 @@ def _decided(group: str, made: Made, card: ManoeuvringCard, files: dict[str, lis
         hides={name: _in_file(sizes) for name, sizes in hides.items()},
         seconds=seconds,
         scores=[(list(fit.hypothesis.effects), float(fit.score)) for fit in found.fits],
-        strange=[(one.what, one.trial, one.excess) for one in decision.strange],
+        strange=[(one.kind, one.trial, one.excess) for one in decision.strange],
     )
 
 
@@ -244,15 +249,15 @@ def run(chosen: Sequence[tuple[str, Setting]], args: argparse.Namespace) -> list
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(args.workers, context) as pool:
         for group, setting in chosen:
-            kept = args.keep / f"{key(setting, args.prove)}.json" if args.keep else None
+            kept = args.keep / f"{key(setting, args)}.json" if args.keep else None
             if kept and kept.exists():
                 done.append(Said(**{**json.loads(kept.read_text(encoding="utf-8")), "group": group}))
             else:
-                waiting[pool.submit(judged, group, setting, args.prove)] = setting, kept
+                waiting[pool.submit(judged, group, setting, args.prove, args.hertz, args.wrong_card)] = setting, kept
         try:
             for number, future in enumerate(as_completed(waiting), 1):
                 setting, kept = waiting[future]
-                told = f"{time.perf_counter() - begin:6.0f} s  {number}/{len(waiting)}  {key(setting, args.prove)}: "
+                told = f"{time.perf_counter() - begin:6.0f} s  {number}/{len(waiting)}  {key(setting, args)}: "
                 try:
                     said = future.result()
                 except InputError as error:
@@ -341,6 +346,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--part", nargs="+", choices=PARTS, default=PARTS, help="default: all")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep what was said, a file a set; resume from it")
+    parser.add_argument("--hertz", type=int, choices=(10, 5, 2, 1), default=10, help="rows of a record a second (10)")
+    percent = "each derivative of the card off by a normal error of P %% of it, which the card states"
+    parser.add_argument("--wrong-card", type=float, default=0.0, metavar="P", help=percent)
     parser.add_argument("--prove", action="store_true", help="the whole workflow, proved on held-out trials")
     return parser.parse_args()
 

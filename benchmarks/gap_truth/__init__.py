@@ -5,7 +5,7 @@ Shares no code with the program it judges: own integrator, own ship, each effect
 
 from gap_truth.draws import EFFECTS, OUTSIDERS, SENSORS
 from gap_truth.lane import Setting
-from gap_truth.make import SHIP_TOML, Made, make, truth, write
+from gap_truth.make import SHIP_TOML, Made, make, sampled, truth, write, wrong_card
 from gap_truth.manoeuvres import FIT, HOLDOUT
 
 __all__ = [
@@ -18,6 +18,8 @@ __all__ = [
     "Made",
     "Setting",
     "make",
+    "sampled",
     "truth",
     "write",
+    "wrong_card",
 ]

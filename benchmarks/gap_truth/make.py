@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +51,33 @@ def make(settings: Sequence[Setting]) -> list[Made]:
         for setting in chosen:
             made.append(Made(setting, parameters_of(setting), {name: next(trials) for name in setting.trials}))
     return made
+
+
+def sampled(made: Made, hertz: int) -> Made:
+    """The same set as recorded at 1, 2, 5 or 10 Hz: every n-th row, from a random one of the first n."""
+    every = round(10 / hertz)
+    generator = made.setting.generator(f"sampling at {hertz} Hz")
+    trials = {}
+    for name, trial in made.trials.items():
+        first = int(generator.integers(every))
+        trials[name] = {column: values[first::every] for column, values in trial.items()}
+    return replace(made, trials=trials)
+
+
+def wrong_card(made: Made, share: float) -> str:
+    """The card with each hydrodynamic derivative off by a normal error of `share` of its value, and stating so."""
+    generator = made.setting.generator(f"card wrong by {share}")
+    lines, errors, inside = [], [], False
+    for line in SHIP_TOML.splitlines():
+        inside = line == "[derivatives]" if line.startswith("[") else inside
+        name, equals, value = line.partition(" = ")
+        if inside and equals and not name.endswith("dot") and float(value.split("#")[0]):
+            stated = float(value.split("#")[0])
+            errors.append(f"{name} = {share * abs(stated):.6g}")
+            lines.append(f"{name} = {stated * (1 + share * generator.standard_normal()):.8g}")
+        else:
+            lines.append(line)
+    return "\n".join([*lines, "", "[uncertainty]", *errors, ""])
 
 
 def truth(made: Made) -> dict[str, object]:

@@ -19,13 +19,15 @@ STATED = {"Nr": 0.1, "Yd": 0.5}
 """Shares of their values by which a card says that two of its derivatives may be wrong."""
 
 
-def posed(*, by_angle: bool = True, gear: str = "time_constant_s = 0.5" + GEAR, stated: bool = False) -> Likelihood:
+def posed(
+    *, by_angle: bool = True, gear: str = "time_constant_s = 0.5" + GEAR, stated: bool = False, duration: float = 60
+) -> Likelihood:
     text = made_up_ship.CARD.replace("time_constant_s = 0.5", gear)
     if stated:
         text += "\n[uncertainty]\n" + "\n".join(f"{name} = {abs(TRUTH[name]) * s}" for name, s in STATED.items())
     card = parse_card(text, "made_up.toml")
     assert isinstance(card, ManoeuvringCard)
-    trial = made_up_ship.trial(made_up_ship.zigzag(20), duration=60, step=STEP)
+    trial = made_up_ship.trial(made_up_ship.zigzag(20), duration=duration, step=STEP)
     if not by_angle:
         trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
     return likelihood_from_card(card, Measured((trial,), "angle" if by_angle else "order", ()))
@@ -132,10 +134,10 @@ def test_how_well_the_hull_is_known_says_nothing_of_gear_and_clock() -> None:
 
 
 def test_each_change_of_the_order_has_an_instant_of_its_own_within_a_sampling_interval() -> None:
-    likelihood = posed(by_angle=False)
+    likelihood = posed(by_angle=False, duration=90)
     causes = likelihood.coefficients.mixing.shape[1]
     moves, clock = likelihood.coefficient_columns[..., causes:], individual(likelihood)[CLOCK]
-    assert moves.shape[-1] == 2  # of the zigzag in 60 s: to 20 deg at 10 s, to the other side 50 s later
+    assert moves.shape[-1] == 2  # of the zigzag in 90 s: to 20 deg at 10 s, to the other side 50 s later
     late = likelihood.coefficient_columns[..., clock] / (0.5 * STEP)
     np.testing.assert_allclose(moves.sum(axis=-1), late * STEP / np.sqrt(12), atol=1e-12)
     begins = [

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from gap_truth import Made, Setting, make, write
+from gap_truth import Made, Setting, make, sampled, write, wrong_card
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import in_file_units
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import measured
 
@@ -42,8 +42,12 @@ class Case:
         return {name: (values[name], errors[name], true) for name, true in self.made.parameters[effect].items()}
 
 
-def sought(folder: Path, made: Made, held: tuple[str, ...] = (), options: GapOptions | None = None) -> Case:
+def sought(
+    folder: Path, made: Made, held: tuple[str, ...] = (), options: GapOptions | None = None, *, wrong: float = 0.0
+) -> Case:
     write(made, folder)
+    if wrong:
+        (folder / "ship.toml").write_text(wrong_card(made, wrong), encoding="utf-8")
     card = read_card(folder / "ship.toml")
     assert isinstance(card, ManoeuvringCard)
     groups = [[name for name in made.trials if (name in held) == out] for out in (False, True)]
@@ -172,3 +176,50 @@ def test_straight_runs_alone_never_make_a_wrong_name_sure(effect: str, tmp_path:
     """What shows in turns alone cannot be reported from straight runs."""
     case = hidden(tmp_path, effect, trials=("straight", "accel"))
     assert case.gap.verdict in (NO_EFFECT_MISSING, AMBIGUOUS) or (case.sole and case.named == {effect})
+
+
+SOME = GapOptions(workers=1, effects=("cross_flow_drag", "wind", "rudder_lag", "rudder_time_offset"))
+
+
+@pytest.mark.slow
+def test_with_a_card_that_is_wrong_its_coefficients_are_fitted_together_with_the_effect(tmp_path: Path) -> None:
+    (made,) = make([Setting(("cross_flow_drag",), SEED, manoeuvres=(*FOUR, *HELD))])
+    case = sought(tmp_path, made, HELD, SOME, wrong=0.1)
+    assert case.gap.verdict == MISSING and case.named == {"cross_flow_drag"}
+    after, share = misfit_and_share(case, held_out=True)
+    assert after < 2.5 and share < 0.05
+    assert case.gap.effect_alone["holdout"] > 10 * after
+    moved = {entry.name: entry for entry in case.gap.coefficients}
+    for name, entry in moved.items():
+        assert entry.value == pytest.approx(case.gap.improved.derivatives[name], abs=entry.standard_error)
+        assert entry.before == case.gap.card.derivatives[name]
+    ((value, error, true),) = case.found("cross_flow_drag").values()
+    assert abs(value - true) < 4 * error
+
+
+@pytest.mark.slow
+def test_where_only_coefficients_are_wrong_they_are_the_explanation(tmp_path: Path) -> None:
+    (made,) = make([Setting((), SEED, manoeuvres=(*FOUR, *HELD))])
+    case = sought(tmp_path, made, HELD, SOME, wrong=0.1)
+    assert case.gap.verdict == COEFFICIENTS and case.named == set()
+    after, share = misfit_and_share(case, held_out=True)
+    assert after < 2.0 and share < 0.1
+    assert max(entry.moved for entry in case.gap.coefficients) > 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hertz", [2, 1])
+def test_an_order_that_is_sampled_once_a_second_is_not_taken_for_a_late_gear(tmp_path: Path, hertz: int) -> None:
+    (made,) = make([Setting((), SEED, manoeuvres=FOUR)])
+    gear = GapOptions(workers=1, effects=("rudder_lag", "rudder_time_offset", "rudder_rate_limit", "rudder_dead_band"))
+    case = sought(tmp_path, sampled(made, hertz), options=gear)
+    assert case.gap.verdict == NO_EFFECT_MISSING
+
+
+@pytest.mark.slow
+def test_a_late_gear_is_found_in_orders_that_are_sampled_twice_a_second(tmp_path: Path) -> None:
+    (made,) = make([Setting(("rudder_time_offset",), SEED, manoeuvres=FOUR)])
+    case = sought(tmp_path, sampled(made, 2), options=SOME)
+    assert case.named == {"rudder_time_offset"}
+    ((value, error, true),) = case.found("rudder_time_offset").values()
+    assert abs(value - true) < max(4 * error, 0.15)

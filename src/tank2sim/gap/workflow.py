@@ -19,7 +19,6 @@ from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
 from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lacking
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
-from tank2sim.gap.inference.hypothesis import CLOCK
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
@@ -325,7 +324,8 @@ def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> E
     ]
     whole = replace(card, effects=(*card.effects, *entries))
     coefficients = found.likelihood.coefficients
-    kept = [place for place, name in enumerate(coefficients.names) if name != CLOCK]
+    # An effect may take the place of a parameter: of the gear's time constant, for a lag.
+    kept = [place for place, name in enumerate(coefficients.names) if name in fit.hypothesis.model]
     variables = [estimate.variable for estimate in fit.hypothesis.estimated]
     names = (*variables, *(coefficients.names[place] for place in kept))
     shared = coefficients.spread(fit.width)[kept]
