@@ -1,0 +1,71 @@
+"""Times of streams: clocks set back, repeated samples, gaps."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.logs.streams import LogFinding, LogStream
+
+GAP_STEPS = 5.0
+"""Steps between two samples from which on it is a gap. Project choice: a few lost samples in a row are bridged by
+interpolation without harm; the trial format's own tools (``signals``) bridge as many."""
+
+
+def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
+    """Times (n,) of a clock in the order of recording, continued over places where it was set back.
+
+    A clock that falls by more than half a step is taken to continue from where it was; a later leap forward by the same
+    amount ends the shift. Each is a fault in the findings.
+    """
+    steps = np.diff(time_s)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    falls = np.flatnonzero(steps < -0.5 * usual)
+    if not len(falls):
+        return time_s, []
+    times, findings, shift = time_s.copy(), [], 0.0
+    changes = np.flatnonzero((steps < -0.5 * usual) | (steps > GAP_STEPS * usual))
+    for place in changes:
+        step = float(steps[place])
+        if step < 0:
+            change = usual - step
+            text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
+            findings.append(LogFinding("fault", text, name, {"fall_s": -step}))
+        elif shift > 0 and abs(step - usual - shift) < 2 * usual:
+            change = -shift
+        else:
+            continue
+        shift += change
+        times[place + 1 :] += change
+    return times, findings
+
+
+def tidied(stream: LogStream) -> tuple[LogStream, int]:
+    """The stream with rising times and finite values, and how many repeated samples were left out."""
+    good = np.isfinite(stream.time_s) & np.isfinite(stream.values)
+    time, values = stream.time_s[good], stream.values[good]
+    order = np.argsort(time, kind="stable")
+    time, values = time[order], values[order]
+    new = np.concatenate([[True], np.diff(time) > 0]) if len(time) else np.zeros(0, dtype=bool)
+    repeated = int(len(time) - new.sum())
+    tidy = LogStream(stream.name, time[new], values[new], stream.unit, stream.quantity, stream.stated_by)
+    return tidy, repeated
+
+
+def usual_step(time_s: Array) -> float:
+    """Median step between samples, s; nan of fewer than two."""
+    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else float("nan")
+
+
+def gaps_of(time_s: Array, longest_s: float) -> list[tuple[float, float]]:
+    """Begin and end of each time without samples for longer than `longest_s`, s."""
+    wide = np.flatnonzero(np.diff(time_s) > longest_s)
+    return [(float(time_s[place]), float(time_s[place + 1])) for place in wide]
+
+
+def utc_text(time_s: float) -> str:
+    """ISO 8601 text of a UTC time, to the millisecond: ``2023-08-06T23:50:06.000Z``."""
+    moment = dt.datetime.fromtimestamp(round(time_s, 3), dt.timezone.utc)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
