@@ -20,5 +20,7 @@ UNCONFIRMED = "UNCONFIRMED"
 def marked(messages: Iterable[str]) -> list[str]:
     """The messages that contain a mark, each once, in their order."""
     return list(
-        dict.fromkeys(text for text in messages if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, FORCED, UNCONFIRMED)))
+        dict.fromkeys(
+            text for text in messages if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, FORCED, UNCONFIRMED))
+        )
     )

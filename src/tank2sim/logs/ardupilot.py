@@ -67,7 +67,9 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     """
     library = optional_library("pymavlink.DFReader", path)
     try:
-        reader = library.DFReader_text(str(path)) if path.suffix.lower() == ".log" else library.DFReader_binary(str(path))
+        reader = (
+            library.DFReader_text(str(path)) if path.suffix.lower() == ".log" else library.DFReader_binary(str(path))
+        )
         tables, units, params = _dataflash_tables(reader)
     except Exception as error:  # the library lets errors of struct through
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
@@ -95,11 +97,11 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
                 at = GPS_EPOCH_S + _WEEK_S * table["GWk"] + table["GMS"] / 1000 - LEAP_SECONDS
                 stamps = at if not findings else time
                 values = np.where(table.get("Status", np.full(len(at), _COMMONEST)) >= 2, values, np.nan)
-            stated_by = "format"
-            if kind == "RPM" and (("RPM", 1) in tables):
-                quantity, stated_by = ("rpm_port" if instance == 0 else "rpm_starboard"), ""  # a guess
             stated = unit_of_text(units.get((kind, field), "")) or unit
-            streams.append(LogStream(f"{label}.{field}", stamps, values, stated, quantity, stated_by))
+            meaning = (quantity, "format")
+            if kind == "RPM" and ("RPM", 1) in tables:  # a guess, which the turn confirms or not
+                meaning = ("rpm_port" if instance == 0 else "rpm_starboard", "")
+            streams.append(LogStream(f"{label}.{field}", stamps, values, stated, *meaning))
         if kind == "RCOU":
             streams += list(_servo_orders(time, table, params))
     if not streams:
@@ -141,9 +143,12 @@ def _servo_orders(time: Array, table: Mapping[str, Array], params: Mapping[str, 
         if quantity is None or pulses is None:
             continue
         least, trim, most = (
-            params.get(f"SERVO{number}_{name}", usual) for name, usual in (("MIN", 1100.0), ("TRIM", 1500.0), ("MAX", 1900.0))
+            params.get(f"SERVO{number}_{name}", usual)
+            for name, usual in (("MIN", 1100.0), ("TRIM", 1500.0), ("MAX", 1900.0))
         )
-        share = np.where(pulses >= trim, (pulses - trim) / max(most - trim, 1.0), (pulses - trim) / max(trim - least, 1.0))
+        share = np.where(
+            pulses >= trim, (pulses - trim) / max(most - trim, 1.0), (pulses - trim) / max(trim - least, 1.0)
+        )
         sign = -1.0 if params.get(f"SERVO{number}_REVERSED", 0) else 1.0
         share = np.where(pulses > 0, sign * share, math.nan)
         streams.append(LogStream(f"RCOU.C{number}", time, share, "1", quantity, "format"))
@@ -202,9 +207,13 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
                 streams.append(LogStream(f"{kind}.{field}", table["_time"], values, unit, quantity, "format"))
     if "SERVO_OUTPUT_RAW" in tables:
         servos = tables["SERVO_OUTPUT_RAW"]
-        pulses = {f"C{number}": servos[f"servo{number}_raw"] for number in range(1, 17) if f"servo{number}_raw" in servos}
+        pulses = {
+            f"C{number}": servos[f"servo{number}_raw"] for number in range(1, 17) if f"servo{number}_raw" in servos
+        }
         streams += _servo_orders(servos["_time"], pulses, params)
     if not streams:
-        raise InputError(path, "", "no message of it is understood", "give a telemetry log with positions and attitudes")
+        raise InputError(
+            path, "", "no message of it is understood", "give a telemetry log with positions and attitudes"
+        )
     counts = {"messages": sum(len(table["_time"]) for table in tables.values())}
     return VesselLog(path, "MAVLink telemetry", tuple(streams), counts)

@@ -47,8 +47,8 @@ FULL_RUDDER_DEG = 35.0
 """Rudder angle at full order where a log has shares alone: 35 deg on either side (SOLAS II-1, regulation 29.3.1)."""
 
 LARGEST_OFFSET_RAD = math.radians(30.0)
-"""Mean difference of heading and course beyond which a heading is doubtful. Project choice: leeway and current of a third
-of the speed turn a course by 20 deg; compasses mounted askew are off by 90 or 180."""
+"""Mean difference of heading and course beyond which a heading is doubtful. Project choice: leeway and current of a
+third of the speed turn a course by 20 deg; compasses mounted askew are off by 90 or 180."""
 
 FASTEST_MPS = 60.0
 """Speed that no track of a vessel has, m/s: the record on water is 142, of vessels in service below 50."""
@@ -179,7 +179,12 @@ class _Search:
         for north, east in (("latitude", "longitude"), ("x", "y")):
             for first in self.named(north):
                 second = next(
-                    (s for s in self.named(east) if len(s.time_s) == len(first.time_s) and s.time_s[0] == first.time_s[0]), None
+                    (
+                        s
+                        for s in self.named(east)
+                        if len(s.time_s) == len(first.time_s) and s.time_s[0] == first.time_s[0]
+                    ),
+                    None,
                 )
                 if second is not None:
                     pairs.append((first, second))
@@ -187,8 +192,8 @@ class _Search:
         for first, second in pairs:
             track = self._track(first, second)
             if track is None:
-                for stream in (first, second):
-                    self.add(stream, _CONTRADICTED, "its values are no position, or leap", unit=stream.unit or "deg")
+                self.add(first, _CONTRADICTED, "its values are no position, or leap", unit=first.unit or "deg")
+                self.add(second, _CONTRADICTED, "its values are no position, or leap", unit=second.unit or "deg")
                 self.fault(first, "holds no position, or leaps")
                 continue
             tracks.append((first, second, track))
@@ -198,9 +203,11 @@ class _Search:
         first, second, track = tracks[0]
         self.motion = track
         swapped = self._swapped(track)
-        for north, east, _ in tracks:
-            for stream in (north, east):
-                confidence = _CONTRADICTED if swapped else _BASE[stream.stated_by] if stream.stated_by == "format" else 0.9
+        for north_stream, east_stream, _ in tracks:
+            for stream in (north_stream, east_stream):
+                confidence = (
+                    _CONTRADICTED if swapped else _BASE[stream.stated_by] if stream.stated_by == "format" else 0.9
+                )
                 why = "its axes are exchanged" if swapped else "a track of a plausible speed"
                 unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
                 self.add(stream, confidence, why, unit=unit)
@@ -402,7 +409,11 @@ class _Search:
                     self.rate = time, self.found[-1].si(values)
                     continue
             speeds = ("sog", "u_water", "u_ground", "v_north")
-            if not any(self._best(name) for name in speeds) and stream.unit in ("", *QUANTITIES["sog"].units) and values.min() >= 0:
+            if (
+                not any(self._best(name) for name in speeds)
+                and stream.unit in ("", *QUANTITIES["sog"].units)
+                and values.min() >= 0
+            ):
                 evidence = speed_evidence(time, values, self.motion, "sog")
                 if evidence.agreement is not None and evidence.agreement > 0.9 and evidence.unit:
                     text = f"by content alone: {evidence.text}"

@@ -67,5 +67,5 @@ def gaps_of(time_s: Array, longest_s: float) -> list[tuple[float, float]]:
 
 def utc_text(time_s: float) -> str:
     """ISO 8601 text of a UTC time, to the millisecond: ``2023-08-06T23:50:06.000Z``."""
-    moment = dt.datetime.fromtimestamp(round(time_s, 3), dt.timezone.utc)
+    moment = dt.datetime.fromtimestamp(round(time_s, 3), dt.UTC)
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")

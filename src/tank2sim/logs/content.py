@@ -24,15 +24,15 @@ NEAR_RAD = math.radians(35.0)
 below it (Crane, Eda and Landsburg 1989, PNA vol. III, IX.5: 10 to 20 deg)."""
 
 AGREES = 0.8
-"""Correlation, or share of samples, from which content agrees. Project choice: astern motion and pivoting of small craft
-leave it above, an exchanged channel is below 0.5."""
+"""Correlation, or share of samples, from which content agrees. Project choice: astern motion and pivoting of small
+craft leave it above, an exchanged channel is below 0.5."""
 
 DIFFERS = 0.5
 """Correlation or share below which content contradicts a name. Project choice: halfway to nothing."""
 
 UNIT_SLACK = 0.2
-"""Relative difference of a scale from that of a unit that is taken for it. Project choice: units are factors of 1.85 and
-more apart, scales of sensors are off by some per cent."""
+"""Relative difference of a scale from that of a unit that is taken for it. Project choice: units are factors of 1.85
+and more apart, scales of sensors are off by some per cent."""
 
 FEW_SAMPLES = 30
 """Samples that a test needs. Project choice: correlations of fewer are chance."""
@@ -115,7 +115,8 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     if best == (1, 0) or not turned:
         text = f"follows the course of the positions in {100 * as_it_is:.0f} % of the time"
         return ContentEvidence(as_it_is, 1 if turned else 0, offset_rad=offset, text=text)
-    words = f"is {'mirrored and ' if sign < 0 else ''}off by {math.degrees(offset):.0f} deg against the course of the positions"
+    mirrored = "mirrored and " if sign < 0 else ""
+    words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
     return ContentEvidence(as_it_is, sign, offset_rad=offset, text=words)
 
 

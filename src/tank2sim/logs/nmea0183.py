@@ -34,8 +34,8 @@ _OVERLAP = 0.1
 choice: at a change of talker a few sentences overlap; two receivers overlap throughout."""
 
 _NEIGHBOURS = 10
-"""Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual 1
-to 10 Hz, in which clocks do not drift and few sentences are lost."""
+"""Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual
+1 to 10 Hz, in which clocks do not drift and few sentences are lost."""
 
 
 @dataclass
@@ -81,8 +81,8 @@ def read_nmea0183(path: Path) -> VesselLog:
     """Read the sentences RMC, GGA, VTG, HDT, HDG, HDM, ROT, RSA, RPM, VBW, VHW, MWV of a log of NMEA 0183.
 
     Sentences with a wrong checksum are left out and counted, as are those of other ships (AIS). Sentences that name no
-    valid fix, rate, rudder or speed (status V) hold no value. A talker that takes over from another (GP, then GN) is the
-    same instrument; talkers that send at the same time are two, and have streams of their own.
+    valid fix, rate, rudder or speed (status V) hold no value. A talker that takes over from another (GP, then GN) is
+    the same instrument; talkers that send at the same time are two, and have streams of their own.
 
     Raises
     ------
@@ -221,12 +221,14 @@ class _Reader:
     def log(self) -> VesselLog:
         findings: list[LogFinding] = []
         lines, times = self._clock(findings)
-        streams = []
+        streams: list[LogStream] = []
         for (kind, _), group in self._instruments(findings):
             for name, series in group.items():
                 unit, quantity = self.stated[name, ""]
                 number = np.frombuffer(series.lines, dtype=np.int64)
-                time = steady_times(np.interp(number, lines, times) if kind not in _CLOCKS else _exact(number, lines, times))
+                time = steady_times(
+                    np.interp(number, lines, times) if kind not in _CLOCKS else _exact(number, lines, times)
+                )
                 values = np.frombuffer(series.values, dtype=float)
                 streams.append(LogStream(self._unique(name, streams), time, values, unit, quantity, "format"))
         if not streams:
@@ -244,7 +246,7 @@ class _Reader:
         same = sum(stream.name.split(" #")[0] == name for stream in streams)
         return name if not same else f"{name} #{same + 1}"
 
-    def _clock(self, findings: list[LogFinding]) -> tuple[Array, Array]:
+    def _clock(self, findings: list[LogFinding]) -> tuple[np.ndarray, Array]:
         if len(self.clock_lines) < 2:
             problem = f"has {len(self.clock_lines)} sentences with date and time (RMC or ZDA)"
             raise InputError(self.path, "", problem, "log RMC, or give a log with more than one of them")
@@ -257,7 +259,10 @@ class _Reader:
         times, found = continued_clock(times, "RMC")
         findings += found
         if len(self.stamps) > 0.9 * (self.counts["lines"] - self.counts["corrupted"]):
-            stamp_lines, stamps = np.frombuffer(self.stamp_lines, dtype=np.int64), np.frombuffer(self.stamps, dtype=float)
+            stamp_lines, stamps = (
+                np.frombuffer(self.stamp_lines, dtype=np.int64),
+                np.frombuffer(self.stamps, dtype=float),
+            )
             stamps, found = continued_clock(stamps, "the recorder's time stamps")
             findings += found
             shift = float(np.median(times - np.interp(lines, stamp_lines, stamps)))
@@ -343,5 +348,5 @@ def _time_of_prefix(prefix: bytes) -> float | None:
         return value / 1000 if value > 1e11 else value
     if match := _ISO.search(prefix):
         moment = dt.datetime.fromisoformat(match[1].decode().replace(" ", "T"))
-        return moment.replace(tzinfo=dt.timezone.utc).timestamp()
+        return moment.replace(tzinfo=dt.UTC).timestamp()
     return None

@@ -7,6 +7,7 @@ import logging
 import re
 from array import array
 from collections import Counter, defaultdict
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -64,65 +65,92 @@ def read_nmea2000(path: Path) -> VesselLog:
     InputError
         The file cannot be read, no message is understood, or there is no time.
     """
-    library = optional_library("nmea2000", path)
-    logging.getLogger("nmea2000").setLevel(logging.ERROR)
-    decoder = library.NMEA2000Decoder()
-    counts: Counter[str] = Counter()
-    columns: dict[tuple[int, int, str, str], tuple[array[float], array[float], array[int]]] = defaultdict(
-        lambda: (array("d"), array("d"), array("q"))
-    )
-    ticks, tick_stamps, tick_lines = array("d"), array("d"), array("q")
-    timed = True
+    reader = _Reader(path)
     with path.open(encoding="latin-1") as file:
         for number, line in enumerate(file):
-            if not line.strip():
-                continue
-            counts["lines"] += 1
-            timed = timed and bool(_TIMED.match(line))
-            try:
-                message = decoder.decode(line.strip())
-            except Exception:  # whatever the library raises, the line is not a message
-                counts["corrupted"] += 1
-                continue
-            if message is None:
-                continue
-            stamp = message.timestamp.replace(tzinfo=dt.timezone.utc).timestamp()
-            values = {field.id: field.value for field in message.fields}
-            if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
-                moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.timezone.utc)
-                ticks.append(moment.timestamp())
-                tick_stamps.append(stamp)
-                tick_lines.append(number)
-            for name, (unit, quantity) in _FIELDS.get(message.PGN, {}).items():
-                value = values.get(name)
-                if isinstance(value, int | float):
-                    where = _quantity(message.PGN, quantity, values)
-                    stamps, numbers, lines = columns[message.PGN, message.source, f"{name}|{unit}", where]
-                    stamps.append(stamp)
-                    numbers.append(float(value))
-                    lines.append(number)
-    findings: list[LogFinding] = []
-    if not columns:
-        raise InputError(path, "", "no message of it is understood", "give a log of candump or of Actisense")
-    if not timed and len(ticks) < 2:
-        raise InputError(path, "", "has neither time stamps nor system times", "log with time stamps: candump -L")
-    clock, found = continued_clock(np.array(ticks), "system time") if len(ticks) > 1 else (np.array(ticks), [])
-    findings += found
-    shift = float(np.median(clock - np.array(tick_stamps))) if timed and len(clock) else 0.0
-    sources = {(pgn, name, where): set() for pgn, _, name, where in columns}
-    for pgn, source, name, where in columns:
-        sources[pgn, name, where].add(source)
-    streams = []
-    for (pgn, source, field, where), (stamps, numbers, lines) in columns.items():
-        name, _, unit = field.partition("|")
-        several = len(sources[pgn, field, where]) > 1
-        label = f"{pgn}.{name}" + (f" {where}" if where not in dict(_FIELDS[pgn].values()).values() else "")
-        time = np.array(stamps) + shift if timed else steady_times(np.interp(lines, tick_lines, clock))
-        label += f" from {source}" if several else ""
-        streams.append(LogStream(label, time, np.array(numbers), unit, where, "format"))
-    if spoilt := counts["corrupted"]:
-        findings.append(LogFinding("note", f"{spoilt} of {counts['lines']} lines are corrupted and left out"))
-    return VesselLog(path, "NMEA 2000", tuple(streams), dict(counts), tuple(findings))
+            if line.strip():
+                reader.take(number, line.strip())
+    return reader.log()
+
+
+@dataclass
+class _Column:
+    """Values of a field of one source, with time stamps and numbers of lines."""
+
+    stamps: array[float] = field(default_factory=lambda: array("d"))
+    values: array[float] = field(default_factory=lambda: array("d"))
+    lines: array[int] = field(default_factory=lambda: array("q"))
+
+
+class _Reader:
+    """Reads line by line; the shift of the recorder's clock is known after the last."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        logging.getLogger("nmea2000").setLevel(logging.ERROR)
+        self.decoder = optional_library("nmea2000", path).NMEA2000Decoder()
+        self.counts: Counter[str] = Counter()
+        self.columns: dict[tuple[int, int, str, str], _Column] = defaultdict(_Column)
+        self.units: dict[tuple[int, str], str] = {}
+        self.ticks = _Column()
+        self.timed = True
+
+    def take(self, number: int, line: str) -> None:
+        """Take a line."""
+        self.counts["lines"] += 1
+        self.timed = self.timed and bool(_TIMED.match(line))
+        try:
+            message = self.decoder.decode(line)
+        except Exception:  # whatever the library raises, the line is not a message
+            self.counts["corrupted"] += 1
+            return
+        if message is None:
+            return
+        stamp = message.timestamp.replace(tzinfo=dt.UTC).timestamp()
+        values = {entry.id: entry.value for entry in message.fields}
+        if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
+            moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)
+            _append(self.ticks, stamp, moment.timestamp(), number)
+        for name, (unit, quantity) in _FIELDS.get(message.PGN, {}).items():
+            if isinstance(value := values.get(name), int | float):
+                self.units[message.PGN, name] = unit
+                where = _quantity(message.PGN, quantity, values)
+                _append(self.columns[message.PGN, message.source, name, where], stamp, float(value), number)
+
+    def log(self) -> VesselLog:
+        """The log after the last line."""
+        ticks = self.ticks
+        if not self.columns:
+            raise InputError(self.path, "", "no message of it is understood", "give a log of candump or of Actisense")
+        if not self.timed and len(ticks.values) < 2:
+            remedy = "log with time stamps: candump -L"
+            raise InputError(self.path, "", "has neither time stamps nor system times", remedy)
+        clock, findings = np.array(ticks.values), list[LogFinding]()
+        if len(clock) > 1:
+            clock, findings = continued_clock(clock, "system time")
+        shift = float(np.median(clock - np.array(ticks.stamps))) if self.timed and len(clock) else 0.0
+        streams = []
+        for (pgn, source, name, quantity), column in self.columns.items():
+            time = np.array(column.stamps) + shift
+            if not self.timed:
+                time = steady_times(np.interp(column.lines, ticks.lines, clock))
+            alike = [key for key in self.columns if (key[0], *key[2:]) == (pgn, name, quantity)]
+            label = f"{pgn}.{name}" + (f" ({quantity})" if quantity != _FIELDS[pgn][name][1] else "")
+            label += f" from {source}" if len(alike) > 1 else ""
+            unit = self.units[pgn, name]
+            streams.append(
+                LogStream(label, time, np.array(column.values), unit, quantity, "format" if quantity else "")
+            )
+        if spoilt := self.counts["corrupted"]:
+            text = f"{spoilt} of {self.counts['lines']} lines are corrupted and left out"
+            findings.append(LogFinding("note", text))
+        return VesselLog(self.path, "NMEA 2000", tuple(streams), dict(self.counts), tuple(findings))
+
+
+def _append(column: _Column, stamp: float, value: float, number: int) -> None:
+    column.stamps.append(stamp)
+    column.values.append(value)
+    column.lines.append(number)
 
 
 def _quantity(pgn: int, quantity: str, values: dict[str, object]) -> str:
@@ -135,6 +163,10 @@ def _quantity(pgn: int, quantity: str, values: dict[str, object]) -> str:
     if pgn == 130306 and "Apparent" not in reference:
         true = "ground" in reference.lower() or "North" in reference
         return quantity.replace("wind_rel", "wind" if true else "wind_theoretical")
-    if pgn == 127488 and "Starboard" in str(values.get("instance", "")) and "Port" not in str(values.get("instance", "")):
+    if (
+        pgn == 127488
+        and "Starboard" in str(values.get("instance", ""))
+        and "Port" not in str(values.get("instance", ""))
+    ):
         return "rpm_starboard"
     return quantity

@@ -98,10 +98,10 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
                 values = data[field].astype(float)
                 if "fix_type" in data:
                     values = np.where(data["fix_type"] >= 2, values, np.nan)
-                stated_by = "format"
-                if name == "rpm" and ("rpm", 1) in topics:
-                    quantity, stated_by = ("rpm_port", "rpm_starboard")[min(instance, 1)], ""  # a guess
-                yield LogStream(f"{label}.{field}", time, values, unit, quantity, stated_by)
+                meaning = (quantity, "format")
+                if name == "rpm" and ("rpm", 1) in topics:  # a guess, which the turn confirms or not
+                    meaning = (("rpm_port", "rpm_starboard")[min(instance, 1)], "")
+                yield LogStream(f"{label}.{field}", time, values, unit, *meaning)
         if name == "vehicle_attitude":
             roll, _, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
             yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")

@@ -69,7 +69,9 @@ QUANTITIES: dict[str, LogQuantity] = {
         LogQuantity("v_east", "velocity to east", _SPEED),
         LogQuantity("heel", "heel, + to starboard", _ANGLE, "phi_rad"),
         LogQuantity("wind_rel_speed", "apparent wind speed", _SPEED, "wind_rel_speed_mps"),
-        LogQuantity("wind_rel_direction", "apparent wind from, + starboard of the bow", _ANGLE, "wind_rel_direction_rad"),
+        LogQuantity(
+            "wind_rel_direction", "apparent wind from, + starboard of the bow", _ANGLE, "wind_rel_direction_rad"
+        ),
         LogQuantity("wind_theoretical_speed", "wind speed off the bow", _SPEED),
         LogQuantity("wind_theoretical_direction", "wind from, off the bow", _ANGLE),
         LogQuantity("wind_speed", "true wind speed", _SPEED, "wind_speed_mps"),
@@ -148,7 +150,11 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     # quantity, words that must be there, words that must not
     ("latitude", r"\b(lat|latitude|breite)\b", r"\b(lateral|accel\w*|latency)\b"),
     ("longitude", r"\b(lon|lng|long|longitude|lange|laenge|länge)\b", r"\b(longitudinal|speed|accel\w*)\b"),
-    ("wind_direction", rf"(?=.*{_WIND})(?=.*\b(true|wahr\w*|twd)\b)(?=.*\b(dir|direction|richtung\w*|angle|twd)\b)", ""),
+    (
+        "wind_direction",
+        rf"(?=.*{_WIND})(?=.*\b(true|wahr\w*|twd)\b)(?=.*\b(dir|direction|richtung\w*|angle|twd)\b)",
+        "",
+    ),
     ("wind_speed", rf"(?=.*{_WIND})(?=.*\b(true|wahr\w*|tws)\b)(?!.*\b(dir|direction|angle)\b)", ""),
     (
         "wind_rel_direction",
@@ -165,7 +171,11 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     ("rpm_order", rf"(?=.*{_SHAFT}|.*\btelegraph\b|.*\bthrottle\b)(?=.*({_ORDER}|\btelegraph\b))", _RUDDER),
     ("rpm", _SHAFT, r"\b(temp\w*|torque|fuel|power|load|pressure)\b"),
     ("yaw_rate", _RATE_WORDS, r"\b(desired|set|error|ref)\b"),
-    ("magnetic_heading", r"(?=.*\b(heading|hdg|compass|kompass)\b)(?=.*\b(mag|magnetic|compass|kompass|hdm)\b)|\bhdm\b", ""),
+    (
+        "magnetic_heading",
+        r"(?=.*\b(heading|hdg|compass|kompass)\b)(?=.*\b(mag|magnetic|compass|kompass|hdm)\b)|\bhdm\b",
+        "",
+    ),
     (
         "heading",
         r"\b(heading|hdg|hdt|psi|yaw|steuerkurs|gyro|cap|true heading|kreiselkurs|rumbo)\b",
@@ -188,7 +198,9 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     ("a_y", r"\b(acc|accel|acceleration)\b.*\by\b|\b(accy|ay)\b", ""),
     ("heel", r"\b(heel|roll|phi|krangung|krängung|rollwinkel)\b", r"\b(rate|desired|speed)\b"),
 )
-_COMPILED = tuple((name, re.compile(wanted), re.compile(barred) if barred else None) for name, wanted, barred in _PATTERNS)
+_COMPILED = tuple(
+    (name, re.compile(wanted), re.compile(barred) if barred else None) for name, wanted, barred in _PATTERNS
+)
 
 
 def plain_words(name: str) -> str:

@@ -13,8 +13,8 @@ from tank2sim.logs.clock import usual_step
 from tank2sim.logs.streams import wrapped_angle
 
 POSITION_WINDOW_S = 4.0
-"""Time over which positions are differenced, s. Project choice: noise of 0.5 m of a receiver is then 0.1 m/s, and a small
-craft turns by less than a quadrant."""
+"""Time over which positions are differenced, s. Project choice: noise of 0.5 m of a receiver is then 0.1 m/s, and a
+small craft turns by less than a quadrant."""
 
 HEADING_WINDOW_S = 2.0
 """Time over which headings are differenced, s. Project choice: noise of 0.3 deg of a compass is then 0.2 deg/s."""
@@ -72,9 +72,7 @@ def earth_radii(latitude_deg: float) -> tuple[float, float]:
     return prime_vertical * (1 - eccentricity) / squared, prime_vertical
 
 
-def local_metres(
-    latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[float, float]
-) -> tuple[Array, Array]:
+def local_metres(latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[float, float]) -> tuple[Array, Array]:
     """North and east (n,), m, of an origin: the inverse of the series of :mod:`tank2sim.dynamics.geographic`.
 
     The series is solved for x and y by three fixed-point steps; the remainder is below 1 mm within 20 km.

@@ -114,7 +114,9 @@ class _Topic:
     def streams(self, findings: list[LogFinding]) -> Iterator[LogStream]:
         time = self._time(findings)
         valid = np.frombuffer(self.valid, dtype=np.int8) > 0
-        columns = {path: np.where(valid, np.frombuffer(values, dtype=float), np.nan) for path, values in self.columns.items()}
+        columns = {
+            path: np.where(valid, np.frombuffer(values, dtype=float), np.nan) for path, values in self.columns.items()
+        }
         kind = self.kind.rpartition("/")[2]
         converted = self._standard(kind, columns)
         for path, values, unit, quantity in converted:
@@ -133,7 +135,10 @@ class _Topic:
         """Streams of a standard message in the frames of trials; empty for any other message."""
         pick = columns.get
         if kind == "NavSatFix":
-            return [("latitude", columns["latitude"], "deg", "latitude"), ("longitude", columns["longitude"], "deg", "longitude")]
+            return [
+                ("latitude", columns["latitude"], "deg", "latitude"),
+                ("longitude", columns["longitude"], "deg", "longitude"),
+            ]
         if kind == "Imu":
             return [
                 *_attitude(columns, "orientation"),
@@ -187,7 +192,11 @@ def _attitude(columns: dict[str, Array], prefix: str) -> list[tuple[str, Array, 
 def _numbers_of(message: Any, prefix: str = "") -> Iterator[str]:
     """Paths of the numbers of a message: ``twist.linear.x``, ``control[0]``."""
     for name in getattr(message, "__dataclass_fields__", {}):
-        if name.startswith("__") or any(name == word or name.endswith("_covariance") for word in _OMITTED) or name.isupper():
+        if (
+            name.startswith("__")
+            or any(name == word or name.endswith("_covariance") for word in _OMITTED)
+            or name.isupper()
+        ):
             continue
         value = getattr(message, name)
         path = f"{prefix}{name}"

@@ -53,9 +53,9 @@ def read_table_log(path: Path) -> VesselLog:
     """Read a log that is a table of text, one row a sample.
 
     Separator, decimal sign, encoding (UTF-8 or Windows-1252) and a row of units under the names are found from the
-    first lines; the time is a column of ISO 8601, of date and time of day, or of seconds (ms, us, ns) since 1970, in UTC
-    unless the name of the column has a zone (``MEZ``, ``UTC+2``). Seconds that count from the beginning are taken too;
-    the log then has no date. Rows that cannot be read are counted and left out.
+    first lines; the time is a column of ISO 8601, of date and time of day, or of seconds (ms, us, ns) since 1970, in
+    UTC unless the name of the column has a zone (``MEZ``, ``UTC+2``). Seconds that count from the beginning are taken
+    too; the log then has no date. Rows that cannot be read are counted and left out.
 
     Raises
     ------
@@ -132,7 +132,9 @@ def _layout(path: Path) -> _Layout:
         raise InputError(path, f"line {numbered[0][0] + 1}", "has numbers where names were expected", remedy)
     names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
     second = _cells(lines[1], separator)
-    has_units = len(lines) > 2 and not any(re.search(r"\d{2}|^-?\d", cell.strip()) and cell not in _UNIT_NUMBERS for cell in second)
+    has_units = len(lines) > 2 and not any(
+        re.search(r"\d{2}|^-?\d", cell.strip()) and cell not in _UNIT_NUMBERS for cell in second
+    )
     units = [unit_of_text(cell) for cell in second] if has_units else []
     units = [*units, *[""] * len(names)][: len(names)]
     body = lines[2 if has_units else 1 :]
@@ -175,7 +177,11 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
         first = next((str(value) for value in column.dropna()[:1]), "")
         offset = _zone_s(name, findings)
         if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
-            return _seconds(pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce"), offset), True, {name, *dates}
+            return (
+                _seconds(pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce"), offset),
+                True,
+                {name, *dates},
+            )
         if re.match(r"\d{1,4}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d", first):
             return _seconds(_dates(path, name, column), offset), True, {name}
         if dates and re.match(r"\d{1,2}:\d\d", first):
@@ -195,7 +201,11 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
 
 def _relative_scale(name: str, values: Array) -> float:
     words = _plain(name)
-    for pattern, factor in ((r"\b(ms|msec|milli\w*)\b", 1e-3), (r"\b(us|usec|micro\w*)\b", 1e-6), (r"\b(ns|nano\w*)\b", 1e-9)):
+    for pattern, factor in (
+        (r"\b(ms|msec|milli\w*)\b", 1e-3),
+        (r"\b(us|usec|micro\w*)\b", 1e-6),
+        (r"\b(ns|nano\w*)\b", 1e-9),
+    ):
         if re.search(pattern, words):
             return factor
     return 1.0
@@ -226,7 +236,9 @@ def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
         order = [2, 0, 1]
     else:
         example = text.iloc[0]
-        raise InputError(path, f"column {name}", f"{example!r} may be day/month or month/day", "write dates as ISO 8601")
+        raise InputError(
+            path, f"column {name}", f"{example!r} may be day/month or month/day", "write dates as ISO 8601"
+        )
     year = parts[order[0]].where(parts[order[0]].str.len() == 4, "20" + parts[order[0]])
     joined = year + "-" + parts[order[1]].str.zfill(2) + "-" + parts[order[2]].str.zfill(2)
     clock = parts[3].fillna("")
@@ -238,7 +250,7 @@ def _seconds(moments: pd.Series[Any], offset_s: float) -> Array:
     import pandas as pd
 
     values = (moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
-    return values.to_numpy(dtype=float) - offset_s
+    return np.asarray(values.to_numpy(dtype=float) - offset_s)
 
 
 def _zone_s(name: str, findings: list[LogFinding]) -> float:
@@ -263,7 +275,9 @@ def _numbers(column: pd.Series[Any], comma: bool) -> Array | None:
         values = column.to_numpy(dtype=float)
     else:
         text = column.astype(str).str.strip()
-        values = pd.to_numeric(text.str.replace(",", ".", regex=False) if comma else text, errors="coerce").to_numpy(float)
+        values = pd.to_numeric(text.str.replace(",", ".", regex=False) if comma else text, errors="coerce").to_numpy(
+            float
+        )
         if np.isfinite(values).sum() < 0.5 * len(values):
             values = np.array([_angle(cell) for cell in text])
     return values if np.isfinite(values).any() else None

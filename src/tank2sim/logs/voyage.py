@@ -102,7 +102,9 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     for channel in found.channels:
         if channel.use and channel.quantity != "ignore":
             if channel.stream not in named:
-                raise InputError(logs[0].path, f"channel {channel.quantity}", f"no stream is called {channel.stream}", _remedy(named))
+                raise InputError(
+                    logs[0].path, f"channel {channel.quantity}", f"no stream is called {channel.stream}", _remedy(named)
+                )
             stream = named[channel.stream]
             series[channel.quantity] = Series(stream.time_s - channel.delay_s, channel.si(stream.values))
     if not series:
@@ -195,12 +197,18 @@ def _gap_findings(series: Mapping[str, Series]) -> list[LogFinding]:
 def channel_rows(voyage: Voyage) -> list[list[object]]:
     """Rows of a table of the channels: quantity, stream, unit, sign, confidence, use, why."""
     return [
-        [channel.quantity, channel.stream, _unit_text(channel), channel.sign, channel.confidence, channel.use, channel.why]
+        [
+            channel.quantity,
+            channel.stream,
+            _unit_text(channel),
+            channel.sign,
+            channel.confidence,
+            channel.use,
+            channel.why,
+        ]
         for channel in voyage.channels.channels
     ]
 
 
 def _unit_text(channel: LogChannel) -> str:
     return channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}"
-
-
