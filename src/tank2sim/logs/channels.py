@@ -199,7 +199,7 @@ class _Search:
             tracks.append((first, second, track))
         if not tracks:
             return
-        self._two_receivers([entry for entry in tracks if entry[0].quantity == "latitude"])
+        tracks.sort(key=lambda entry: (entry[0].quantity != "latitude", -self._coverage(entry[0].name)))
         first, second, track = tracks[0]
         self.motion = track
         swapped = self._swapped(track)
@@ -211,6 +211,7 @@ class _Search:
                 why = "its axes are exchanged" if swapped else "a track of a plausible speed"
                 unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
                 self.add(stream, confidence, why, unit=unit)
+        self._two_receivers([entry for entry in tracks if entry[0].quantity == "latitude"])
         if swapped:
             self.fault(first, f"headings and courses fit its track only with {second.name} exchanged for it")
             self.motion = replace(track, v_north_mps=track.v_east_mps, v_east_mps=track.v_north_mps)
@@ -327,6 +328,7 @@ class _Search:
                 confidence, why = _CONTRADICTED, f"{why}: its sign is the other one"
             else:
                 sign, confidence, why = -1, min(confidence, 0.9), f"{why}: positive to port"
+                self.findings.append(LogFinding("note", f"{stream.name} is positive to port", stream.name))
         if confidence < DIFFERS:
             self.fault(stream, why)
         self.add(stream, confidence, why, unit=unit, sign=sign, quantity="yaw_rate")
@@ -378,48 +380,50 @@ class _Search:
 
     def unnamed(self) -> None:
         """Find rates of turn, headings, courses and speeds among streams without a quantity, by content alone."""
-        for stream in self.streams:
-            if stream.quantity or len(stream.values) < FEW_SAMPLES or np.ptp(stream.values) == 0:
+        nameless = [
+            stream
+            for stream in self.streams
+            if not stream.quantity and len(stream.values) >= FEW_SAMPLES and np.ptp(stream.values) > 0
+        ]
+        if self._best("heading") is None:
+            self._unnamed_directions([stream for stream in nameless if self._circular(stream)])
+        for stream in nameless:
+            if any(channel.stream == stream.name for channel in self.found):
                 continue
             time, values = self.thin(stream)
-            if self._best("heading") is None and self._circular(stream):
-                evidence = direction_evidence(*self._angle(stream), self.motion)
-                if evidence.agreement is not None and evidence.agreement > 0.95 and evidence.sign > 0:
-                    near = abs(evidence.offset_rad) < LARGEST_OFFSET_RAD
-                    self.add(
-                        stream,
-                        0.75 if near else _CONTRADICTED,
-                        f"by content alone: {evidence.text}",
-                        quantity="heading",
-                        unit=angle_unit(stream.values, stream.unit),
-                    )
-                    self._take_heading()
-                    continue
             if self._best("yaw_rate") is None and stream.unit in ("", *QUANTITIES["yaw_rate"].units):
                 evidence = rate_evidence(time, values, self.motion)
                 if evidence.agreement is not None and evidence.agreement > 0.97 and evidence.unit:
-                    self.add(
-                        stream,
-                        0.85,
-                        f"by content alone: {evidence.text}",
-                        quantity="yaw_rate",
-                        unit=stream.unit or evidence.unit,
-                        sign=evidence.sign,
-                    )
+                    unit, text = stream.unit or evidence.unit, f"by content alone: {evidence.text}"
+                    self.add(stream, 0.85, text, quantity="yaw_rate", unit=unit, sign=evidence.sign)
                     self.rate = time, self.found[-1].si(values)
                     continue
             speeds = ("sog", "u_water", "u_ground", "v_north")
-            if (
-                not any(self._best(name) for name in speeds)
-                and stream.unit in ("", *QUANTITIES["sog"].units)
-                and values.min() >= 0
-            ):
-                evidence = speed_evidence(time, values, self.motion, "sog")
-                if evidence.agreement is not None and evidence.agreement > 0.9 and evidence.unit:
-                    text = f"by content alone: {evidence.text}"
-                    self.add(stream, 0.75, text, quantity="sog", unit=stream.unit or evidence.unit)
+            if any(self._best(name) for name in speeds) or stream.unit not in ("", *QUANTITIES["sog"].units):
+                continue
+            evidence = speed_evidence(time, values, self.motion, "sog")
+            if evidence.agreement is not None and evidence.agreement > 0.9 and evidence.unit and values.min() >= 0:
+                text = f"by content alone: {evidence.text}"
+                self.add(stream, 0.75, text, quantity="sog", unit=stream.unit or evidence.unit)
         if not len(self.rate[0]) and len(self.motion.heading_time_s):
             self.rate = differenced(self.motion.heading_time_s, self.motion.heading_rad, 2.0)
+
+    def _unnamed_directions(self, streams: list[LogStream]) -> None:
+        """A course and a heading by content: both follow the track, and the course more closely."""
+        candidates = []
+        for stream in streams:
+            evidence = direction_evidence(*self._angle(stream), self.motion)
+            near = abs(evidence.offset_rad) < LARGEST_OFFSET_RAD
+            if evidence.agreement is not None and evidence.agreement > 0.95 and evidence.sign > 0 and near:
+                candidates.append((evidence.spread_rad, stream, evidence))
+        candidates.sort(key=lambda entry: entry[0])
+        distinct = len(candidates) == 2 and candidates[1][0] > 1.5 * candidates[0][0]
+        for place, (_, stream, evidence) in enumerate(candidates):
+            quantity = "cog" if distinct and place == 0 else "heading"
+            text = f"by content alone: {evidence.text}" + ("" if distinct else "; it may be the course over ground")
+            unit = angle_unit(stream.values, stream.unit)
+            self.add(stream, 0.85 if distinct else 0.7, text, quantity=quantity, unit=unit)
+        self._take_heading()
 
     @staticmethod
     def _circular(stream: LogStream) -> bool:
@@ -453,6 +457,7 @@ class _Search:
                 confidence, why = _CONTRADICTED, f"{why}: it is positive to port, against its format"
             else:
                 sign, confidence, why = -1, 0.9, f"{why}: positive to port"
+                self.findings.append(LogFinding("note", f"{stream.name} is positive to port", stream.name))
         if confidence < DIFFERS:
             self.fault(stream, why)
         self.add(stream, confidence, why, unit=unit, sign=sign)
@@ -472,12 +477,19 @@ class _Search:
             if evidence.agreement is not None and evidence.agreement > AGREES and lag >= 1.0 and unit:
                 candidates.append((evidence.agreement, stream, evidence, unit))
         candidates.sort(key=lambda entry: -entry[0])
-        for place, (_, stream, evidence, unit) in enumerate(candidates):
+        one_rudder = len(candidates) < 3 and all(self._alike(candidates[0][1], entry[1]) for entry in candidates[1:])
+        for _, stream, evidence, unit in candidates:
             steps = float((np.diff(stream.values) == 0).mean())
             quantity = "rudder_order" if steps > 0.5 else "rudder_angle"
-            single = len(candidates) == 1 or (place == 0 and candidates[0][0] > candidates[1][0] + 0.05)
+            single = one_rudder or (stream is candidates[0][1] and candidates[0][0] > candidates[1][0] + 0.05)
             text = f"by content alone: {evidence.text}" + ("" if single else f"; {len(candidates)} streams would do")
             self.add(stream, 0.75 if single else 0.5, text, quantity=quantity, unit=unit, sign=evidence.sign)
+
+    @staticmethod
+    def _alike(first: LogStream, second: LogStream) -> bool:
+        """Whether two streams are the order and the angle of one rudder."""
+        other = np.interp(first.time_s, second.time_s, second.values)
+        return abs(float(np.corrcoef(first.values, other)[0, 1])) > 0.95
 
     def _rudder_shares(self) -> None:
         """Orders in shares of the full rudder, scaled by the angle where it is known, else by the usual full rudder."""

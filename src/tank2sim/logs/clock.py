@@ -14,19 +14,31 @@ GAP_STEPS = 5.0
 interpolation without harm; the trial format's own tools (``signals``) bridge as many."""
 
 
+_DOUBLED = 0.2
+"""Share of samples at the time of another from which two instruments are suspected. Project choice."""
+
+_DOUBLED_STEPS = 3.0
+"""Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone
+differs by one to two."""
+
+FALL_STEPS = 1.5
+"""Steps by which a clock falls where it was set back. Project choice: two samples that changed places fall by one."""
+
+
 def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     """Times (n,) of a clock in the order of recording, continued over places where it was set back.
 
-    A clock that falls by more than half a step is taken to continue from where it was; a later leap forward by the same
-    amount ends the shift. Each is a fault in the findings.
+    A clock that falls by more than :data:`FALL_STEPS` steps is taken to continue from where it was; a later leap
+    forward by the same amount ends the shift. Each fall is a fault in the findings. Smaller ones are samples out of
+    order.
     """
     steps = np.diff(time_s)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    falls = np.flatnonzero(steps < -0.5 * usual)
+    falls = np.flatnonzero(steps < -FALL_STEPS * usual)
     if not len(falls):
         return time_s, []
     times, findings, shift = time_s.copy(), [], 0.0
-    changes = np.flatnonzero((steps < -0.5 * usual) | (steps > GAP_STEPS * usual))
+    changes = np.flatnonzero((steps < -FALL_STEPS * usual) | (steps > GAP_STEPS * usual))
     for place in changes:
         step = float(steps[place])
         if step < 0:
@@ -42,16 +54,29 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     return times, findings
 
 
-def tidied(stream: LogStream) -> tuple[LogStream, int]:
-    """The stream with rising times and finite values, and how many repeated samples were left out."""
+def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
+    """The stream with rising times and finite values, how many repeated samples were left out, and faults of its clock.
+
+    Of samples with one time the first stays; where many of them differ, two instruments share the name, and that is a
+    fault.
+    """
     good = np.isfinite(stream.time_s) & np.isfinite(stream.values)
-    time, values = stream.time_s[good], stream.values[good]
+    time, findings = continued_clock(stream.time_s[good], stream.name)
+    values = stream.values[good]
     order = np.argsort(time, kind="stable")
     time, values = time[order], values[order]
     new = np.concatenate([[True], np.diff(time) > 0]) if len(time) else np.zeros(0, dtype=bool)
     repeated = int(len(time) - new.sum())
+    if repeated > _DOUBLED * len(time):
+        apart = np.abs(np.diff(values))[~new[1:]]
+        steps = np.abs(np.diff(values[new]))
+        if np.median(apart) > _DOUBLED_STEPS * max(float(np.median(steps)), 1e-12):
+            text = (
+                f"{stream.name}: two values at one time, {np.median(apart):.3g} apart (median): two instruments in one"
+            )
+            findings.append(LogFinding("fault", text, stream.name))
     tidy = LogStream(stream.name, time[new], values[new], stream.unit, stream.quantity, stream.stated_by)
-    return tidy, repeated
+    return tidy, repeated, findings
 
 
 def usual_step(time_s: Array) -> float:

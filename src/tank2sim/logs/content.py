@@ -60,6 +60,8 @@ class ContentEvidence:
         Unit by the size of the values; empty where the log cannot show it.
     offset_rad : float
         Mean difference of an angle from what it should be, rad.
+    spread_rad : float
+        Median difference of an angle from what it should be, without its mean, rad.
     delay_s : float
         By how much the stream is late, s.
     text : str
@@ -70,6 +72,7 @@ class ContentEvidence:
     sign: int = 0
     unit: str = ""
     offset_rad: float = 0.0
+    spread_rad: float = 0.0
     delay_s: float = 0.0
     text: str = ""
 
@@ -114,7 +117,8 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     offset = float(wrapped_angle(np.array([middle]))[0])
     if best == (1, 0) or not turned:
         text = f"follows the course of the positions in {100 * as_it_is:.0f} % of the time"
-        return ContentEvidence(as_it_is, 1 if turned else 0, offset_rad=offset, text=text)
+        spread = float(np.median(np.abs(difference - np.median(difference))))
+        return ContentEvidence(as_it_is, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
     mirrored = "mirrored and " if sign < 0 else ""
     words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
     return ContentEvidence(as_it_is, sign, offset_rad=offset, text=words)

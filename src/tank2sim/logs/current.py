@@ -13,7 +13,7 @@ from tank2sim.logs.reference import POSITION_WINDOW_S, differenced, interpolated
 from tank2sim.logs.voyage import Voyage
 
 AVERAGED_S = 60.0
-"""Time over which the current is averaged for its spread, s. Project choice: errors of receivers wander over minutes."""
+"""Time over which the current is averaged for its spread, s. Project choice: receivers wander over minutes."""
 
 _LEAST_TURN = 0.15
 """Least eigenvalue, of at most 0.5, of the mean square of heading vectors for which the speed ahead alone determines a

@@ -33,6 +33,10 @@ _OVERLAP = 0.1
 """Share of sentences of a talker that may lie within the time of another before the two are two instruments. Project
 choice: at a change of talker a few sentences overlap; two receivers overlap throughout."""
 
+_STAMPS_AGREE_S = 5.0
+"""Largest drift of a recorder's time stamps against the receiver's clock, s, with which they are used. Project choice:
+delays of serial lines stay below a second or two."""
+
 _NEIGHBOURS = 10
 """Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual
 1 to 10 Hz, in which clocks do not drift and few sentences are lost."""
@@ -226,9 +230,7 @@ class _Reader:
             for name, series in group.items():
                 unit, quantity = self.stated[name, ""]
                 number = np.frombuffer(series.lines, dtype=np.int64)
-                time = steady_times(
-                    np.interp(number, lines, times) if kind not in _CLOCKS else _exact(number, lines, times)
-                )
+                time = self._ticks(number) if kind in _CLOCKS else steady_times(np.interp(number, lines, times))
                 values = np.frombuffer(series.values, dtype=float)
                 streams.append(LogStream(self._unique(name, streams), time, values, unit, quantity, "format"))
         if not streams:
@@ -240,6 +242,13 @@ class _Reader:
             text = f"{spoilt} of {self.counts['lines']} lines are corrupted (wrong checksum or cut) and left out"
             findings.append(LogFinding("note", text, evidence={"share": spoilt / self.counts["lines"]}))
         return VesselLog(self.path, "NMEA 0183", tuple(streams), counts, tuple(findings))
+
+    def _ticks(self, number: np.ndarray) -> Array:
+        """Times of sentences that carry them, with falls of the clock taken out."""
+        lines, times = np.frombuffer(self.clock_lines, dtype=np.int64), np.frombuffer(self.clock_times, dtype=float)
+        times, _ = continued_clock(times, "RMC")
+        known = np.isin(number, lines)
+        return np.where(known, times[np.clip(np.searchsorted(lines, number), 0, len(lines) - 1)], np.nan)
 
     @staticmethod
     def _unique(name: str, streams: list[LogStream]) -> str:
@@ -265,8 +274,11 @@ class _Reader:
             )
             stamps, found = continued_clock(stamps, "the recorder's time stamps")
             findings += found
-            shift = float(np.median(times - np.interp(lines, stamp_lines, stamps)))
-            return stamp_lines, stamps + shift
+            shift = times - np.interp(lines, stamp_lines, stamps)
+            if np.ptp(shift) < _STAMPS_AGREE_S:
+                return stamp_lines, stamps + float(np.median(shift))
+            text = f"the recorder's time stamps drift by {np.ptp(shift):.3g} s against the clock of RMC, which is taken"
+            findings.append(LogFinding("note", text))
         rises = np.concatenate([[True], np.diff(times) > 0])
         return lines[rises], times[rises]
 
@@ -278,15 +290,25 @@ class _Reader:
             if len(talkers) == 1:
                 yield (kind, talkers[0]), self.series[kind, talkers[0]]
                 continue
-            lines = [np.sort(np.concatenate([s.lines for s in self.series[kind, t].values()])) for t in talkers]
-            labels = np.concatenate([np.full(len(part), talker) for part, talker in zip(lines, talkers, strict=True)])
-            if _overlapping(np.concatenate(lines), labels):
-                text = f"{kind} comes from {len(talkers)} instruments at the same time: {', '.join(sorted(talkers))}"
+            groups: list[list[str]] = []
+            for talker in talkers:
+                home = next((group for group in groups if not self._together(kind, [*group, talker])), None)
+                if home is None:
+                    groups.append([talker])
+                else:
+                    home.append(talker)
+            if len(groups) > 1:
+                names = ", ".join("/".join(group) for group in groups)
+                text = f"{kind} comes from {len(groups)} instruments at the same time: {names}"
                 findings.append(LogFinding("note", text, kind))
-                for talker in talkers:
-                    yield (kind, talker), self.series[kind, talker]
-            else:
-                yield (kind, ""), _merged([self.series[kind, talker] for talker in talkers])
+            for group in groups:
+                yield (kind, group[0]), _merged([self.series[kind, talker] for talker in group])
+
+    def _together(self, kind: str, talkers: list[str]) -> bool:
+        """Whether the sentences of these talkers lie between each other."""
+        lines = [np.unique(np.concatenate([part.lines for part in self.series[kind, t].values()])) for t in talkers]
+        labels = np.concatenate([np.full(len(part), talker) for part, talker in zip(lines, talkers, strict=True)])
+        return _overlapping(np.concatenate(lines), labels)
 
 
 def _merged(groups: list[dict[str, _Series]]) -> dict[str, _Series]:
@@ -313,11 +335,6 @@ def _invalid(kind: str, cells: list[str]) -> bool:
 def _degrees(text: str, digits: int) -> float:
     """Degrees of ``dddmm.mmm``."""
     return int(text[:digits]) + float(text[digits:]) / 60
-
-
-def _exact(number: np.ndarray, lines: Array, times: Array) -> Array:
-    """Times of sentences that carry them."""
-    return np.asarray(np.interp(number, lines, times))
 
 
 def steady_times(time: Array) -> Array:

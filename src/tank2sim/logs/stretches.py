@@ -235,6 +235,11 @@ def _cuts(signals: _Signals) -> list[tuple[int, int]]:
         slope = np.sign(values[reach:] - values[:-reach]) * moved
         for place in np.flatnonzero(slope[1:] * slope[:-1] < 0):
             jumping[place + reach // 2 + 1] = True
+    inactive = np.abs(signals.steering) < signals.threshold
+    turns = np.flatnonzero(np.diff(inactive.astype(int))) + 1
+    for begin, end in zip([0, *turns], [*turns, len(inactive)], strict=True):
+        if inactive[begin] and (end - begin) * step >= signals.rest_s and begin:
+            jumping[begin] = True  # a rudder that was brought back slowly
     starts = np.flatnonzero(jumping)
     edges = np.unique(np.concatenate([[0], starts, [len(signals.time)]]))
     least = max(2, round(1.5 / step))

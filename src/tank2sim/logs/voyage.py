@@ -86,12 +86,14 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     for log in logs:
         repeated = 0
         for stream in log.streams:
-            tidy, doubled = tidied(stream)
+            tidy, doubled, found_in_time = tidied(stream)
             repeated += doubled
+            findings += found_in_time
             if len(tidy.values):
                 name = stream.name if len(logs) == 1 else f"{log.path.stem}: {stream.name}"
                 streams.append(replace(tidy, name=name))
         counts[log.path.name]["repeated_samples"] = repeated
+    findings = _gathered(findings)
     if len({log.dated for log in logs}) > 1:
         odd = next(log for log in logs if not log.dated)
         raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
@@ -116,6 +118,18 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     begin = min(float(entry.time_s[0]) for entry in series.values())
     end = max(float(entry.time_s[-1]) for entry in series.values())
     return Voyage(tuple(logs), found, series, origin, begin, end, tuple(findings), counts)
+
+
+def _gathered(findings: list[LogFinding]) -> list[LogFinding]:
+    """Findings that differ by the name of their stream alone as one."""
+    groups: dict[str, list[LogFinding]] = {}
+    for finding in findings:
+        key = finding.text.removeprefix(f"{finding.stream}: ") if finding.stream else finding.text
+        groups.setdefault(key, []).append(finding)
+    return [
+        group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
+        for key, group in groups.items()
+    ]
 
 
 def _remedy(named: Mapping[str, LogStream]) -> str:
