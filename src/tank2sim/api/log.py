@@ -28,7 +28,7 @@ from tank2sim.records.thinning import thin_line
 if TYPE_CHECKING:
     import pandas as pd
 
-DRAWN_SAMPLES = 1500
+VOYAGE_SAMPLES = 1500
 """Samples of the track and the time line in the JSON. Project choice: a chart is a few hundred pixels wide."""
 
 NO_RUDDER_NOTICE = (
@@ -223,7 +223,7 @@ class LogResult(PagedResult):
             return None
         x, time = series["x"], series["x"].time_s
         y = np.interp(time, series["y"].time_s, series["y"].values)
-        kept = thin_line([x.values, y], DRAWN_SAMPLES)
+        kept = thin_line([x.values, y], VOYAGE_SAMPLES)
         begin = self.voyage.begin_s
         return {"t_s": (time[kept] - begin).tolist(), "x_m": x.values[kept].tolist(), "y_m": y[kept].tolist()}
 
@@ -233,7 +233,7 @@ class LogResult(PagedResult):
         for name, entry in self.voyage.series.items():
             if name in ("x", "y", "a_x", "a_y", "latitude", "longitude"):
                 continue
-            kept = thin_line([entry.values], DRAWN_SAMPLES)
+            kept = thin_line([entry.values], VOYAGE_SAMPLES)
             time = (entry.time_s[kept] - self.voyage.begin_s).tolist()
             out[name] = {"t_s": time, "value": entry.values[kept].tolist()}
         return out

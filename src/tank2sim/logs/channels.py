@@ -50,7 +50,7 @@ LARGEST_OFFSET_RAD = math.radians(30.0)
 """Mean difference of heading and course beyond which a heading is doubtful. Project choice: leeway and current of a
 third of the speed turn a course by 20 deg; compasses mounted askew are off by 90 or 180."""
 
-FASTEST_MPS = 60.0
+FASTEST_TRACK_MPS = 60.0
 """Speed that no track of a vessel has, m/s: the record on water is 142, of vessels in service below 50."""
 
 _TESTED_STEP_S = 0.2
@@ -205,9 +205,9 @@ class _Search:
         swapped = self._swapped(track)
         for north_stream, east_stream, _ in tracks:
             for stream in (north_stream, east_stream):
-                confidence = (
-                    _CONTRADICTED if swapped else _BASE[stream.stated_by] if stream.stated_by == "format" else 0.9
-                )
+                confidence = _BASE["format"] if stream.stated_by == "format" else 0.9
+                confidence -= 0.0 if stream in (first, second) else 0.02
+                confidence = _CONTRADICTED if swapped else confidence
                 why = "its axes are exchanged" if swapped else "a track of a plausible speed"
                 unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
                 self.add(stream, confidence, why, unit=unit)
@@ -228,7 +228,7 @@ class _Search:
             a, b = local_metres(a, b, rounded_origin(a, b))
         at, v_north = differenced(time, a, POSITION_WINDOW_S)
         _, v_east = differenced(time, b, POSITION_WINDOW_S)
-        if not len(at) or np.percentile(np.hypot(v_north, v_east), 90) > FASTEST_MPS:
+        if not len(at) or np.percentile(np.hypot(v_north, v_east), 90) > FASTEST_TRACK_MPS:
             return None
         empty = np.zeros(0)
         return ReferenceMotion(at, v_north, v_east, empty, empty)

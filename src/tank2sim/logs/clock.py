@@ -8,11 +8,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.logs.streams import LogFinding, LogStream
-
-GAP_STEPS = 5.0
-"""Steps between two samples from which on it is a gap. Project choice: a few lost samples in a row are bridged by
-interpolation without harm; the trial format's own tools (``signals``) bridge as many."""
-
+from tank2sim.records.signals.sampling import GAP_STEPS
 
 _DOUBLED = 0.2
 """Share of samples at the time of another from which two instruments are suspected. Project choice."""

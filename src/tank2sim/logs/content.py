@@ -37,7 +37,7 @@ and more apart, scales of sensors are off by some per cent."""
 FEW_SAMPLES = 30
 """Samples that a test needs. Project choice: correlations of fewer are chance."""
 
-LEAST_TURN_RAD = math.radians(60.0)
+LEAST_TURNED_RAD = math.radians(60.0)
 """Change of heading in a log below which signs of headings are not judged. Project choice: on one course, a mirrored
 heading differs by a constant alone."""
 
@@ -110,7 +110,7 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     }
     as_it_is = shares[1, 0]
     best = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
-    turned = np.ptp(np.unwrap(course)) > LEAST_TURN_RAD
+    turned = np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
     sign, quarter = best
     difference = wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
     middle = float(np.median(difference)) - quarter * math.pi / 2

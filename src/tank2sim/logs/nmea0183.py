@@ -230,7 +230,7 @@ class _Reader:
             for name, series in group.items():
                 unit, quantity = self.stated[name, ""]
                 number = np.frombuffer(series.lines, dtype=np.int64)
-                time = self._ticks(number) if kind in _CLOCKS else steady_times(np.interp(number, lines, times))
+                time = self._ticks(number) if kind in _CLOCKS else steady_times(_time_of_lines(number, lines, times))
                 values = np.frombuffer(series.values, dtype=float)
                 streams.append(LogStream(self._unique(name, streams), time, values, unit, quantity, "format"))
         if not streams:
@@ -335,6 +335,13 @@ def _invalid(kind: str, cells: list[str]) -> bool:
 def _degrees(text: str, digits: int) -> float:
     """Degrees of ``dddmm.mmm``."""
     return int(text[:digits]) + float(text[digits:]) / 60
+
+
+def _time_of_lines(number: np.ndarray, lines: np.ndarray, times: Array) -> Array:
+    """Times (n,) of lines by the clocks before and after, and by the usual pace of lines before the first and last."""
+    pace = float(np.median(np.diff(times) / np.diff(lines)))
+    before, after = np.minimum(number - lines[0], 0), np.maximum(number - lines[-1], 0)
+    return np.asarray(np.interp(number, lines, times) + pace * (before + after))
 
 
 def steady_times(time: Array) -> Array:

@@ -18,7 +18,7 @@ from tank2sim.arrays import Array
 from tank2sim.logs.clock import usual_step
 from tank2sim.logs.content import steering_evidence
 from tank2sim.logs.reference import differenced, held, interpolated
-from tank2sim.logs.voyage import Series, Voyage
+from tank2sim.logs.voyage import QuantitySeries, Voyage
 
 HELD_RUDDER_RAD = math.radians(4.0)
 """Rudder from which on a vessel is steered to turn. Project choice: course keeping in fair weather stays below, and the
@@ -46,7 +46,10 @@ SPEED_CHANGE = 0.15
 LEAST_TURN_RAD = math.radians(15.0)
 """Change of heading of a piece from which it is a turn. Project choice: below, a correction of the course."""
 
-LEAST_ROWS = 30
+LEAST_TURN_S = 5.0
+"""Shortest turn, s. Project choice: what is shorter checks the swing after another manoeuvre."""
+
+LEAST_TRIAL_ROWS = 30
 """Samples of the heading in a stretch from which it becomes a trial. Project choice."""
 
 
@@ -142,7 +145,7 @@ def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
 def _signals(voyage: Voyage) -> _Signals | None:
     series = voyage.series
     steering = _steering(series)
-    if steering is None or len(steering[0].time_s) < LEAST_ROWS:
+    if steering is None or len(steering[0].time_s) < LEAST_TRIAL_ROWS:
         return None
     entry, threshold = steering
     step = float(np.clip(usual_step(entry.time_s), 0.2, 1.0))
@@ -160,7 +163,7 @@ def _signals(voyage: Voyage) -> _Signals | None:
     )
 
 
-def _steering(series: Mapping[str, Series]) -> tuple[Series, float] | None:
+def _steering(series: Mapping[str, QuantitySeries]) -> tuple[QuantitySeries, float] | None:
     """The order of the rudder, or its angle, or the difference of two thrusters; and the threshold of steering."""
     for name in ("rudder_order", "rudder_angle"):
         if name in series:
@@ -170,11 +173,11 @@ def _steering(series: Mapping[str, Series]) -> tuple[Series, float] | None:
         if port and starboard:
             other = np.interp(port.time_s, starboard.time_s, starboard.values)
             full = 1.0 if stem == "thrust_order" else max(float(np.percentile(np.abs(port.values), 99)), 1e-9)
-            return Series(port.time_s, (port.values - other) / full / 2), HELD_SHARE / 2
+            return QuantitySeries(port.time_s, (port.values - other) / full / 2), HELD_SHARE / 2
     return None
 
 
-def _propulsion(series: Mapping[str, Series], time: Array) -> tuple[Array, float]:
+def _propulsion(series: Mapping[str, QuantitySeries], time: Array) -> tuple[Array, float]:
     """Order of the propulsion (n,), or revolutions, and its largest; nan without."""
     if (entry := series.get("rpm_order", series.get("rpm"))) is not None:
         values = median_filter(_on_grid(time, entry), size=5, mode="nearest")
@@ -191,13 +194,13 @@ def _propulsion(series: Mapping[str, Series], time: Array) -> tuple[Array, float
     return values, max(float(np.nanpercentile(np.abs(values), 99)), 1e-9)
 
 
-def _on_grid(time: Array, entry: Series) -> Array:
+def _on_grid(time: Array, entry: QuantitySeries) -> Array:
     """Values of an order or a measured signal (n,), held, for orders are."""
     values = held(time, entry.time_s, entry.values)
     return np.where(np.isfinite(values), values, entry.values[0])
 
 
-def _speed(series: Mapping[str, Series], time: Array) -> Array:
+def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
     for name in ("u_water", "sog", "u_ground"):
         if name in series:
             values = interpolated(time, series[name].time_s, series[name].values, 30.0)
@@ -209,13 +212,13 @@ def _speed(series: Mapping[str, Series], time: Array) -> Array:
     return np.full(len(time), np.nan)
 
 
-def _rate(series: Mapping[str, Series]) -> Series | None:
+def _rate(series: Mapping[str, QuantitySeries]) -> QuantitySeries | None:
     if "yaw_rate" in series:
         return series["yaw_rate"]
     heading = series.get("heading", series.get("magnetic_heading"))
     if heading is None:
         return None
-    return Series(*differenced(heading.time_s, heading.values, 2.0))
+    return QuantitySeries(*differenced(heading.time_s, heading.values, 2.0))
 
 
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:
@@ -238,7 +241,13 @@ def _cuts(signals: _Signals) -> list[tuple[int, int]]:
     inactive = np.abs(signals.steering) < signals.threshold
     turns = np.flatnonzero(np.diff(inactive.astype(int))) + 1
     for begin, end in zip([0, *turns], [*turns, len(inactive)], strict=True):
-        if inactive[begin] and (end - begin) * step >= signals.rest_s and begin:
+        settling = round(signals.rest_s / step)
+        if (
+            begin > settling
+            and inactive[begin]
+            and end - begin >= settling
+            and not jumping[begin - settling : begin].any()
+        ):
             jumping[begin] = True  # a rudder that was brought back slowly
     starts = np.flatnonzero(jumping)
     edges = np.unique(np.concatenate([[0], starts, [len(signals.time)]]))
@@ -289,6 +298,8 @@ def _turned(signals: _Signals, begin: int, end: int) -> float:
 
 _UNSTEERED = (StretchKind.STEADY, StretchKind.ACCELERATE, StretchKind.COAST, StretchKind.REST, StretchKind.ASTERN)
 
+_JOINABLE = (StretchKind.STEADY, StretchKind.REST, StretchKind.ASTERN)
+
 _STEPS_LEAST = 4
 """Short stretches in a row that are one of steps. Project choice: fewer are an approach and a manoeuvre."""
 
@@ -303,7 +314,8 @@ def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     for piece in pieces:
         last = joined[-1] if joined else None
         lasted = (last.end - last.begin) * step if last else math.inf
-        movement = lasted < JUMP_S or (lasted < signals.rest_s and _straight(signals, piece))
+        moving = last is not None and lasted < signals.rest_s and _changes_power(signals, last)
+        movement = lasted < JUMP_S or (moving and _straight(signals, piece))
         if last is not None and last.kind in _UNSTEERED and movement:
             joined[-1] = _piece(signals, last.begin, piece.end)
         else:
@@ -317,15 +329,19 @@ def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
             groups.append([piece])
     out: list[_Piece] = []
     for piece in _steps(signals, [_joined(signals, group) for group in groups]):
-        if (
-            out
-            and out[-1].kind == piece.kind
-            and piece.kind in (StretchKind.STEADY, StretchKind.REST, StretchKind.ASTERN)
-        ):
+        same = out and out[-1].kind == piece.kind and piece.kind in _JOINABLE
+        settled = out and out[-1].kind is StretchKind.ACCELERATE and piece.kind is StretchKind.STEADY
+        if same or (settled and (piece.end - piece.begin) * step < 2 * signals.rest_s):
             out[-1] = replace(out[-1], end=piece.end)
         else:
             out.append(piece)
     return out
+
+
+def _changes_power(signals: _Signals, piece: _Piece) -> bool:
+    """Whether the propulsion moves to another order throughout a piece."""
+    values = signals.propulsion[piece.begin : piece.end]
+    return bool(np.ptp(values) > PROPULSION_STEP * signals.full)
 
 
 def _straight(signals: _Signals, piece: _Piece) -> bool:
@@ -374,7 +390,8 @@ def _joined(signals: _Signals, group: Sequence[_Piece]) -> _Piece:
     begin, end, first = group[0].begin, group[-1].end, group[0]
     if len(group) == 1:
         kind = first.kind
-        if kind is StretchKind.TURN and abs(_turned(signals, begin, end)) < LEAST_TURN_RAD:
+        lasted = (end - begin) * float(signals.time[1] - signals.time[0])
+        if kind is StretchKind.TURN and (abs(_turned(signals, begin, end)) < LEAST_TURN_RAD or lasted < LEAST_TURN_S):
             kind = StretchKind.STEADY
         return replace(first, kind=kind)
     levels = np.array([piece.level for piece in group if abs(piece.level) > signals.threshold])

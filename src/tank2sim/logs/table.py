@@ -81,9 +81,11 @@ def read_table_log(path: Path) -> VesselLog:
         )
     except (ValueError, csv.Error) as error:
         raise InputError(path, "", f"is not a table ({' '.join(str(error).split())})", "give a CSV") from None
+    rows = len(frame)
+    frame = frame.drop_duplicates(ignore_index=True)
     with path.open("rb") as file:
         lines = sum(1 for line in file if line.strip() and not line.startswith(b"#"))
-    skipped = max(0, lines - len(frame) - (2 if any(layout.units) else 1))
+    skipped = max(0, lines - rows - (2 if any(layout.units) else 1))
     findings = [LogFinding("note", f"{skipped} rows have too many cells and are left out")] if skipped else []
     time, dated, used = _time(path, frame, findings)
     streams = [
@@ -93,7 +95,8 @@ def read_table_log(path: Path) -> VesselLog:
     ]
     if not streams:
         raise InputError(path, "", "has no column of numbers next to its time", "give a table of measured values")
-    counts = {"rows": len(frame), "skipped": skipped, "without_time": int(np.isnan(time).sum())}
+    counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
+    counts["without_time"] = int(np.isnan(time).sum())
     return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
 
 

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.logs.clock import GAP_STEPS, usual_step, utc_text
+from tank2sim.logs.clock import usual_step, utc_text
 from tank2sim.logs.current import drift_current
 from tank2sim.logs.quantities import QUANTITIES
 from tank2sim.logs.reference import held, interpolated, thinned_series
-from tank2sim.logs.stretches import LEAST_ROWS, Stretch
-from tank2sim.logs.voyage import Series, Voyage
+from tank2sim.logs.stretches import LEAST_TRIAL_ROWS, Stretch
+from tank2sim.logs.voyage import QuantitySeries, Voyage
 from tank2sim.records.signals.columns import file_columns
+from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial
 
@@ -92,7 +93,7 @@ def _cut(voyage: Voyage, stretch: Stretch, begin: float, number: int) -> TrialCu
     first = clock.time_s[np.clip(np.searchsorted(clock.time_s, begin), 0, len(clock.time_s) - 1)]
     first -= step * math.floor((first - begin) / step)
     rows = math.floor((stretch.end_s - first) / step + 1e-6) + 1
-    if rows < LEAST_ROWS:
+    if rows < LEAST_TRIAL_ROWS:
         return None
     at = first + step * np.arange(rows)
     series = dict(voyage.series)
@@ -123,7 +124,7 @@ def _cut(voyage: Voyage, stretch: Stretch, begin: float, number: int) -> TrialCu
     return TrialCut(stretch, trial, first, text, steered)
 
 
-def _redundant(series: Mapping[str, Series]) -> tuple[str, ...]:
+def _redundant(series: Mapping[str, QuantitySeries]) -> tuple[str, ...]:
     """Velocities over the ground that positions hold already, next to velocities through the water.
 
     Without a current in the card they would contradict those through the water, and a position is the better record of
@@ -167,7 +168,7 @@ def _remarks(voyage: Voyage, stretch: Stretch, first: float) -> list[str]:
     return remarks
 
 
-def _sampled(entry: Series, at: Array, step: float, name: str) -> Array:
+def _sampled(entry: QuantitySeries, at: Array, step: float, name: str) -> Array:
     """Values (n,) at the rows: orders held, dense streams interpolated, of slow ones a sample in the nearest row."""
     near = (entry.time_s >= at[0] - 60) & (entry.time_s <= at[-1] + 60)
     time, values = entry.time_s[near], entry.values[near]

@@ -11,11 +11,12 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel, find_channels
-from tank2sim.logs.clock import GAP_STEPS, gaps_of, tidied, usual_step, utc_text
+from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.quantities import QUANTITIES
 from tank2sim.logs.reference import local_metres, rounded_origin
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
 from tank2sim.marks import UNCONFIRMED
+from tank2sim.records.signals.sampling import GAP_STEPS
 
 _GAP_LEAST_S = 3.0
 """Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds."""
@@ -25,7 +26,7 @@ _GAPS_LISTED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class QuantitySeries:
     """A quantity over time: `time_s` (n,), UTC s or from the beginning of the log, rising; `values` (n,), SI."""
 
     time_s: Array
@@ -53,7 +54,7 @@ class Voyage:
 
     logs: tuple[VesselLog, ...]
     channels: ChannelSet
-    series: Mapping[str, Series]
+    series: Mapping[str, QuantitySeries]
     origin_deg: tuple[float, float] | None
     begin_s: float
     end_s: float
@@ -100,7 +101,7 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     found = channels or find_channels(streams)
     findings += found.findings
     named = {stream.name: stream for stream in streams}
-    series: dict[str, Series] = {}
+    series: dict[str, QuantitySeries] = {}
     for channel in found.channels:
         if channel.use and channel.quantity != "ignore":
             if channel.stream not in named:
@@ -108,7 +109,7 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
                     logs[0].path, f"channel {channel.quantity}", f"no stream is called {channel.stream}", _remedy(named)
                 )
             stream = named[channel.stream]
-            series[channel.quantity] = Series(stream.time_s - channel.delay_s, channel.si(stream.values))
+            series[channel.quantity] = QuantitySeries(stream.time_s - channel.delay_s, channel.si(stream.values))
     if not series:
         problem = "no channel of it is understood"
         raise InputError(logs[0].path, "", problem, "name its streams in a channels file (--channels)")
@@ -162,7 +163,7 @@ _ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
 """Quantities without which no manoeuvre is understood."""
 
 
-def _derived(series: dict[str, Series]) -> tuple[dict[str, Series], tuple[float, float] | None]:
+def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySeries], tuple[float, float] | None]:
     """Local metres, continuous headings, and speed and course of velocities to north and east."""
     origin = None
     out = dict(series)
@@ -171,7 +172,7 @@ def _derived(series: dict[str, Series]) -> tuple[dict[str, Series], tuple[float,
         at = latitude.time_s
         origin = rounded_origin(latitude.values, longitude.values)
         x, y = local_metres(latitude.values, np.interp(at, longitude.time_s, longitude.values), origin)
-        out["x"], out["y"] = Series(at, x), Series(at, y)
+        out["x"], out["y"] = QuantitySeries(at, x), QuantitySeries(at, y)
     if ("x" in out) != ("y" in out):
         out.pop("x", None)
         out.pop("y", None)
@@ -179,16 +180,16 @@ def _derived(series: dict[str, Series]) -> tuple[dict[str, Series], tuple[float,
         north, east = out["v_north"], out["v_east"]
         at_east = np.interp(north.time_s, east.time_s, east.values)
         if "sog" not in out:
-            out["sog"] = Series(north.time_s, np.hypot(north.values, at_east))
+            out["sog"] = QuantitySeries(north.time_s, np.hypot(north.values, at_east))
         if "cog" not in out:
-            out["cog"] = Series(north.time_s, np.arctan2(at_east, north.values) % (2 * math.pi))
+            out["cog"] = QuantitySeries(north.time_s, np.arctan2(at_east, north.values) % (2 * math.pi))
     for name in ("heading", "magnetic_heading"):
         if name in out:
-            out[name] = Series(out[name].time_s, np.unwrap(out[name].values))
+            out[name] = QuantitySeries(out[name].time_s, np.unwrap(out[name].values))
     return out, origin
 
 
-def _gap_findings(series: Mapping[str, Series]) -> list[LogFinding]:
+def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
     """A note of the gaps of each set of channels that share them."""
     groups: dict[tuple[str, ...], list[tuple[str, list[tuple[float, float]]]]] = {}
     for name, entry in series.items():
