@@ -144,6 +144,7 @@ def rate_evidence(time_s: Array, values: Array, motion: ReferenceMotion) -> Cont
     scale = abs(float(np.sum(other * slope) / np.sum(other**2))) / max(best * best, 1e-9)
     unit = _nearest_unit(scale, "yaw_rate")
     text = f"correlates with the derivative of the heading by {best:.3f}"
+    text += f", {abs(best_lag):g} s {'late' if best_lag > 0 else 'early'}" if best_lag else ""
     return ContentEvidence(abs(best), 1 if best > 0 else -1, unit, delay_s=best_lag, text=text)
 
 
