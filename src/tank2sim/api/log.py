@@ -189,7 +189,7 @@ class LogResult(PagedResult):
             for entry in map(self._stretch_json, self.found)
         ]
         columns = ("stretch", "begins (s)", "lasts (s)", "steering", "heading change (deg)", "file")
-        return channels, ResultTable("Stretches", columns, stretches)
+        return channels, ResultTable("Stretches", columns, stretches, wide=True)
 
     def _cut_of(self, stretch: Stretch) -> TrialCut | None:
         return next((cut for cut in self.cuts if cut.stretch is stretch), None)

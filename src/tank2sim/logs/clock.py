@@ -8,6 +8,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.logs.streams import LogFinding, LogStream
+from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.signals.sampling import GAP_STEPS
 
 _DOUBLED = 0.2
@@ -56,7 +57,7 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     Of samples with one time the first stays; where many of them differ, two instruments share the name, and that is a
     fault.
     """
-    good = np.isfinite(stream.time_s) & np.isfinite(stream.values)
+    good = np.isfinite(stream.time_s) & (np.abs(stream.values) < LARGEST)  # nan is not
     time, findings = continued_clock(stream.time_s[good], stream.name)
     values = stream.values[good]
     order = np.argsort(time, kind="stable")

@@ -194,7 +194,8 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
     for name in named or list(frame.columns[:1]):
         if pd.api.types.is_numeric_dtype(frame[name]):
             values = frame[name].to_numpy(dtype=float)
-            if (np.diff(values[np.isfinite(values)]) >= 0).mean() > 0.9:
+            steps = np.diff(values[np.isfinite(values)])
+            if len(steps) and (steps >= 0).mean() > 0.9:
                 text = f"{name} counts from the beginning of the log: the trials have no date"
                 findings.append(LogFinding("note", text, name))
                 return values * _relative_scale(name, values), False, {name}
