@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 
 import tank2sim as t2s
@@ -77,6 +78,7 @@ def test_the_channels_file_of_the_folder_is_taken_as_it_is(folder) -> None:
     path.write_text(changed, encoding="utf-8")
     found = tank2sim("log", "voyage.csv", "-o", "voyage", cwd=folder)
     assert found.returncode == 0 and (folder / "voyage" / "02_turn_-25.csv").is_file()
+    assert "removed" in found.stdout and not (folder / "voyage" / "02_turn_+25.csv").exists()
     assert path.read_text(encoding="utf-8") == changed
 
 
@@ -160,3 +162,19 @@ def test_bad_input_is_refused_in_one_line(folder) -> None:
     refused(tank2sim("log", "empty.nmea", "-o", "voyage", cwd=folder), "is empty")
     refused(tank2sim("log", "voyage.csv", cwd=folder), "--output")
     assert not (folder / "voyage").exists()
+
+
+@pytest.mark.parametrize("ahead_s", [7.5, -20.0])
+def test_clocks_of_two_logs_that_differ_are_marked(folder, ahead_s) -> None:
+    pytest.importorskip("pynmea2")
+    (folder / "bridge.nmea").write_text("\n".join(nmea_lines()) + "\n", encoding="ascii")
+    table = frame()[["utc", "heading_deg", "rudder_deg"]]
+    moments = pd.to_datetime(table["utc"]) + pd.Timedelta(seconds=ahead_s)
+    table = table.assign(utc=moments.dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ"))
+    table.to_csv(folder / "second.csv", index=False)
+    result = t2s.log([folder / "bridge.nmea", folder / "second.csv"])
+    (found,) = [finding for finding in result.voyage.findings if "the clock of second" in finding.text]
+    assert found.kind == "fault" and found.evidence["shift_s"] == pytest.approx(ahead_s, abs=0.6)
+    table = table.assign(utc=frame()["utc"])
+    table.to_csv(folder / "second.csv", index=False)
+    assert not any("clock" in mark for mark in t2s.log([folder / "bridge.nmea", folder / "second.csv"]).marks)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from tank2sim.logs.current import DriftCurrent, drift_current
 from tank2sim.logs.quantities import QUANTITIES
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.stretches import Stretch, find_stretches
-from tank2sim.logs.trial_files import TrialCut, cut_trials
+from tank2sim.logs.trial_files import CUT_BY, TrialCut, cut_trials
 from tank2sim.logs.voyage import Voyage, channel_rows, make_voyage
 from tank2sim.records.thinning import thin_line
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 VOYAGE_SAMPLES = 1500
 """Samples of the track and the time line in the JSON. Project choice: a chart is a few hundred pixels wide."""
+
+_HEAD_LINES = 100
+"""Lines of a file in which the comments of a trial are looked for."""
 
 NO_RUDDER_NOTICE = (
     "the vessel is steered by two thrusters: its files have columns n_port_rpm, n_starboard_rpm, order_port and "
@@ -118,6 +122,7 @@ class LogResult(PagedResult):
         files = self.files(folder)
         writable_folder(Path(folder))
         write_together(files, inputs=[log.path for log in self.voyage.logs])
+        remove_earlier_trials(Path(folder), files)
         return list(files)
 
     def content(self) -> Mapping[str, object]:
@@ -237,6 +242,21 @@ class LogResult(PagedResult):
             time = (entry.time_s[kept] - self.voyage.begin_s).tolist()
             out[name] = {"t_s": time, "value": entry.values[kept].tolist()}
         return out
+
+
+def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
+    """Remove the trials that an earlier run cut into a folder and this one did not write; return their names.
+
+    Only files that say in their comments that they were cut by tank2sim are removed.
+    """
+    removed = []
+    for path in sorted(set(folder.glob("[0-9][0-9]*_*.csv")) - set(written)):
+        with path.open(encoding="utf-8", errors="replace") as file:
+            head = [line for line in itertools.islice(file, _HEAD_LINES) if line.startswith("#")]
+        if any(CUT_BY in line for line in head):
+            path.unlink()
+            removed.append(path.name)
+    return removed
 
 
 def log(files: str | Path | Sequence[str | Path], *, channels: str | Path | ChannelSet | None = None) -> LogResult:

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from tank2sim.api.gap_files import folder_made
-from tank2sim.api.log import log
-from tank2sim.cli.console import json_option, screen, show_result, write_result
+from tank2sim.api.log import log, remove_earlier_trials
+from tank2sim.cli.console import json_option, screen, show_notices, show_result, write_result
 from tank2sim.cli.options import page_option
 from tank2sim.logs.channel_file import CHANNELS_FILE
 
@@ -48,6 +48,9 @@ def command(
         files = result.files(output)
         inputs = [*logs, *([stated] if stated else [])]
         write_result(result, inputs, json_file=json_file, page=page, files=files)
+        removed = remove_earlier_trials(output, files)
     show_result(result)
+    if removed:
+        show_notices([f"removed what an earlier run cut: {', '.join(removed)}"])
     names = ", ".join(sorted(path.name for path in files))
     screen.print(f"{output}: {names or 'nothing written'}", soft_wrap=True, markup=False)

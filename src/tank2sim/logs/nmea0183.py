@@ -37,6 +37,7 @@ _STAMPS_AGREE_S = 5.0
 """Largest drift of a recorder's time stamps against the receiver's clock, s, with which they are used. Project choice:
 delays of serial lines stay below a second or two."""
 
+_BLOCK = 100_000
 _NEIGHBOURS = 10
 """Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual
 1 to 10 Hz, in which clocks do not drift and few sentences are lost."""
@@ -352,7 +353,8 @@ def steady_times(time: Array) -> Array:
     reach = np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)
     padded = np.pad(time, _NEIGHBOURS, mode="reflect", reflect_type="odd")
     windows = np.lib.stride_tricks.sliding_window_view(padded, len(reach))
-    smooth = np.median(windows - period * reach, axis=1)
+    blocks = range(0, len(time), _BLOCK)  # a day of sentences at once would take gigabytes
+    smooth = np.concatenate([np.median(windows[k : k + _BLOCK] - period * reach, axis=1) for k in blocks])
     # Where the clock leaps (a pause of the recorder), neighbours beyond the leap do not count.
     return np.where(np.abs(smooth - time) < 2 * period, smooth, time)
 

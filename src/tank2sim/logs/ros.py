@@ -129,6 +129,8 @@ class _Topic:
             quantity = quantity_of_name(name)
             if quantity and unit and unit not in QUANTITIES[quantity].units:
                 quantity = ""
+            if quantity.startswith("wind") and quantity.endswith("speed"):
+                unit = unit or "m/s"  # REP 103: SI; what can be tested by content is not taken for granted
             yield LogStream(name, time, values, unit, quantity, "name" if quantity else "")
 
     def _standard(self, kind: str, columns: dict[str, Array]) -> list[tuple[str, Array, str, str]]:

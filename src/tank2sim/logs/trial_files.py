@@ -22,6 +22,9 @@ from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial
 
+CUT_BY = "cut by tank2sim"
+"""Words in a comment of every trial that is cut from a log."""
+
 LEAD_S = 5.0
 """Time before the execute with which a trial begins, s. Project choice: long enough to see the approach, too short for
 a disturbance before it to matter."""
@@ -155,7 +158,7 @@ def _name(number: int, stretch: Stretch, steered: bool) -> str:
 def _remarks(voyage: Voyage, stretch: Stretch, first: float) -> list[str]:
     logs = ", ".join(log.path.name for log in voyage.logs)
     remarks = [notice for notice in voyage.notices if notice.startswith("UNCONFIRMED")]
-    remarks.append(f"{stretch.kind}, cut by tank2sim from {logs}")
+    remarks.append(f"{stretch.kind}, {CUT_BY} from {logs}")
     if voyage.dated:
         remarks.append(f"begins: {utc_text(first)}")
     remarks.append(f"execute: {stretch.begin_s - first:.2f}")

@@ -12,8 +12,9 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel, find_channels
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
+from tank2sim.logs.content import AGREES
 from tank2sim.logs.quantities import QUANTITIES
-from tank2sim.logs.reference import local_metres, rounded_origin
+from tank2sim.logs.reference import HEADING_WINDOW_S, differenced, local_metres, rounded_origin
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
 from tank2sim.marks import UNCONFIRMED
 from tank2sim.records.signals.sampling import GAP_STEPS
@@ -100,6 +101,8 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
         raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
     found = channels or find_channels(streams)
     findings += found.findings
+    if len(logs) > 1 and channels is None:
+        findings += _clock_findings([log.path.stem for log in logs], found, streams)
     named = {stream.name: stream for stream in streams}
     series: dict[str, QuantitySeries] = {}
     for channel in found.channels:
@@ -131,6 +134,54 @@ def _gathered(findings: list[LogFinding]) -> list[LogFinding]:
         group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
         for key, group in groups.items()
     ]
+
+
+_CLOCKS_AGREE_S = 0.5
+"""Difference of the clocks of two logs that is reported, s. Project choice: a ship turns by a degree at most."""
+
+_LARGEST_SHIFT_S = 120.0
+"""Largest difference that is looked for, s. Project choice: clocks that nobody set are off by years, and then the logs
+do not overlap."""
+
+
+def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream]) -> list[LogFinding]:
+    """Differences of the clocks of several logs, by rates of turn or headings that two of them hold."""
+    named = {stream.name: stream for stream in streams}
+    rates: dict[str, tuple[Array, Array]] = {}
+    for quantity in ("yaw_rate", "heading"):
+        for channel in found.channels:
+            name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
+            if channel.quantity == quantity and channel.confidence >= SURE_FROM and name not in rates:
+                stream = named[channel.stream]
+                values = channel.si(stream.values)
+                rate = (stream.time_s, values) if quantity == "yaw_rate" else None
+                rates[name] = rate or differenced(stream.time_s, np.unwrap(values), HEADING_WINDOW_S)
+    findings = []
+    for name in names[1:]:
+        if names[0] in rates and name in rates:
+            shift = _shift(rates[names[0]], rates[name])
+            if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
+                side = "ahead of" if shift > 0 else "behind"
+                text = f"the clock of {name} is {abs(shift):.3g} s {side} that of {names[0]} by the rate of turn: give "
+                text += f"its channels delay_s = {shift:.3g}"
+                findings.append(LogFinding("fault", text, evidence={"shift_s": shift}))
+    return findings
+
+
+def _shift(first: tuple[Array, Array], second: tuple[Array, Array]) -> float | None:
+    """By how much the second of two rates of turn is late, s, where they correlate well; else None."""
+    step = 0.25
+    begin, end = max(first[0][0], second[0][0]), min(first[0][-1], second[0][-1])
+    if end - begin < 4 * _LARGEST_SHIFT_S:
+        return None
+    grid = np.arange(begin + _LARGEST_SHIFT_S, end - _LARGEST_SHIFT_S, step)
+    reference = np.interp(grid, *first)
+    lags = np.arange(-_LARGEST_SHIFT_S, _LARGEST_SHIFT_S + step, step)
+    if np.ptp(reference) == 0 or np.ptp(second[1]) == 0:
+        return None
+    correlations = [float(np.corrcoef(reference, np.interp(grid + lag, *second))[0, 1]) for lag in lags]
+    best = int(np.nanargmax(correlations))
+    return float(lags[best]) if correlations[best] > AGREES else None
 
 
 def _remedy(named: Mapping[str, LogStream]) -> str:
