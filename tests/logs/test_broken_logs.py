@@ -258,3 +258,28 @@ def test_a_missing_library_is_asked_for_in_one_line(nmea, monkeypatch) -> None:
     monkeypatch.setattr("importlib.import_module", refuse)
     with pytest.raises(InputError, match=r"pip install 'tank2sim\[logs\]'"):
         read_log(path)
+
+
+def test_an_exchanged_heading_and_course_are_left_out(written) -> None:
+    table = frame()
+    table["cog_deg"] += np.random.default_rng(1).normal(0, 1.0, len(table))
+    table[["heading_deg", "cog_deg"]] = table[["cog_deg", "heading_deg"]].to_numpy()
+    result = log(written(table))
+    assert any("exchanged" in mark for mark in result.marks) and not {"heading", "cog"} & set(used(result))
+
+
+def test_a_longitude_with_the_wrong_sign_is_left_out(written) -> None:
+    table = frame()
+    table["longitude"] = -table["longitude"]
+    result = log(written(table))
+    assert any("wrong sign of the second" in mark for mark in result.marks)
+    assert "longitude" not in used(result) and "heading" in used(result)
+
+
+def test_an_exchanged_order_and_angle_of_the_rudder_are_left_out(written) -> None:
+    table = frame()
+    table["rudder_order_deg"] = table["rudder_deg"]
+    table["rudder_deg"] = np.degrees(voyage().rudder).round(0)
+    result = log(written(table))
+    assert any("as an order does" in mark for mark in result.marks)
+    assert not {"rudder_angle", "rudder_order"} & set(used(result))

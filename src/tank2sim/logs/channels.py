@@ -53,6 +53,10 @@ third of the speed turn a course by 20 deg; compasses mounted askew are off by 9
 FASTEST_TRACK_MPS = 60.0
 """Speed that no track of a vessel has, m/s: the record on water is 142, of vessels in service below 50."""
 
+_DERIVATIVE = 0.95
+"""Correlation of a rate of turn with the derivative of its heading. Project choice: sensors reach 0.99, and a course
+over ground, which is noisier and has the drift in it, does not."""
+
 _TESTED_STEP_S = 0.2
 """Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more."""
 
@@ -202,19 +206,18 @@ class _Search:
         tracks.sort(key=lambda entry: (entry[0].quantity != "latitude", -self._coverage(entry[0].name)))
         first, second, track = tracks[0]
         self.motion = track
-        swapped = self._swapped(track)
+        wrong = self._wrong_axes(track)
         for north_stream, east_stream, _ in tracks:
             for stream in (north_stream, east_stream):
                 confidence = _BASE["format"] if stream.stated_by == "format" else 0.9
                 confidence -= 0.0 if stream in (first, second) else 0.02
-                confidence = _CONTRADICTED if swapped else confidence
-                why = "its axes are exchanged" if swapped else "a track of a plausible speed"
+                why = f"its track {wrong[0]}" if wrong else "a track of a plausible speed"
                 unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
-                self.add(stream, confidence, why, unit=unit)
+                self.add(stream, _CONTRADICTED if wrong else confidence, why, unit=unit)
         self._two_receivers([entry for entry in tracks if entry[0].quantity == "latitude"])
-        if swapped:
-            self.fault(first, f"headings and courses fit its track only with {second.name} exchanged for it")
-            self.motion = replace(track, v_north_mps=track.v_east_mps, v_east_mps=track.v_north_mps)
+        if wrong:
+            self.fault(first, f"with {second.name}, its track {wrong[0]}, by headings and courses")
+            self.motion = wrong[1]
 
     def _track(self, first: LogStream, second: LogStream) -> ReferenceMotion | None:
         time, a, b = first.time_s, first.values, second.values
@@ -233,16 +236,23 @@ class _Search:
         empty = np.zeros(0)
         return ReferenceMotion(at, v_north, v_east, empty, empty)
 
-    def _swapped(self, track: ReferenceMotion) -> bool:
-        """Whether every heading and course fits the track better with its axes exchanged."""
-        other = replace(track, v_north_mps=track.v_east_mps, v_east_mps=track.v_north_mps)
-        votes = []
-        for stream in self.named("heading", "cog"):
-            time, angle = self._angle(stream)
-            as_it_is, exchanged = (direction_evidence(time, angle, motion).agreement for motion in (track, other))
-            if as_it_is is not None and exchanged is not None:
-                votes.append(as_it_is < DIFFERS and exchanged > AGREES)
-        return len(votes) > 1 and all(votes)
+    def _wrong_axes(self, track: ReferenceMotion) -> tuple[str, ReferenceMotion] | None:
+        """What is wrong with the axes of a track, and the motion without it; None unless all directions show it."""
+        north, east = track.v_north_mps, track.v_east_mps
+        others = {
+            "has its axes exchanged": replace(track, v_north_mps=east, v_east_mps=north),
+            "is mirrored, as by a wrong sign of the second": replace(track, v_east_mps=-east),
+            "is mirrored, as by a wrong sign of the first": replace(track, v_north_mps=-north),
+        }
+        angles = [self._angle(stream) for stream in self.named("heading", "cog")]
+        as_it_is = [direction_evidence(*angle, track).agreement for angle in angles]
+        if len(angles) < 2 or any(agreement is None or agreement > DIFFERS for agreement in as_it_is):
+            return None
+        for text, motion in others.items():
+            agreements = [direction_evidence(*angle, motion).agreement for angle in angles]
+            if all(agreement is not None and agreement > AGREES for agreement in agreements):
+                return text, motion
+        return None
 
     def _two_receivers(self, tracks: list[tuple[LogStream, LogStream, ReferenceMotion]]) -> None:
         for north, east, _ in tracks[1:]:
@@ -281,7 +291,30 @@ class _Search:
             if confidence < DIFFERS:
                 self.fault(stream, why)
             self.add(stream, confidence, why, unit=angle_unit(stream.values, stream.unit))
+        self._exchanged_directions()
         self._take_heading()
+
+    def _exchanged_directions(self) -> None:
+        """Refuse a heading and a course where the rate of turn is the derivative of the course alone."""
+        rates, heading, course = self.named("yaw_rate"), self._best("heading"), self._best("cog")
+        if not rates or heading is None or course is None:
+            return
+        agreements = []
+        for channel in (heading, course):
+            time, angle = self._angle(self._stream(channel.stream))
+            motion = replace(self.motion, heading_time_s=time, heading_rad=np.unwrap(angle))
+            agreements.append(rate_evidence(*self.thin(rates[0]), motion).agreement or 0.0)
+        if agreements[1] > _DERIVATIVE and agreements[0] < agreements[1] - (1 - _DERIVATIVE):
+            text = f"{rates[0].name} is the derivative of the course {course.stream}, and not of it: exchanged"
+            self.fault(self._stream(heading.stream), text)
+            self._doubt((heading.stream, course.stream), "heading and course seem exchanged")
+
+    def _doubt(self, streams: Iterable[str], why: str) -> None:
+        """Let no channel of these streams be used."""
+        names = set(streams)
+        for place, channel in enumerate(self.found):
+            if channel.stream in names:
+                self.found[place] = replace(channel, confidence=_CONTRADICTED, why=f"{channel.why}, but {why}")
 
     def _take_heading(self) -> None:
         best = self._best("heading") or self._best("magnetic_heading")
@@ -437,9 +470,20 @@ class _Search:
             time, values = self.thin(stream)
             evidence, _ = steering_evidence(time, values, *self.rate)
             self._rudder(stream, evidence)
+        self._exchanged_rudders()
         if not self.named("rudder_angle", "rudder_order") and not self.named("thrust_order_port", "rpm_port"):
             self._unnamed_rudder()
         self._rudder_shares()
+
+    def _exchanged_rudders(self) -> None:
+        """Refuse an angle that stays at its values and an order that never does: an order holds until the next."""
+        angle, order = self._best("rudder_angle"), self._best("rudder_order")
+        if angle is None or order is None:
+            return
+        held = [float((np.diff(self._stream(channel.stream).values) == 0).mean()) for channel in (angle, order)]
+        if held[0] > 0.5 and held[1] < 0.2:
+            self.fault(self._stream(angle.stream), f"holds its values as an order does, and {order.stream} does not")
+            self._doubt((angle.stream, order.stream), "order and angle seem exchanged")
 
     def _rudder(self, stream: LogStream, evidence: ContentEvidence) -> None:
         if evidence.agreement is not None and evidence.agreement < DIFFERS and np.ptp(stream.values) == 0:
