@@ -284,3 +284,18 @@ def test_a_log_of_a_day_at_2_hz_is_read_in_seconds(tmp_path) -> None:
     begin = time.monotonic()
     read_log(path)
     assert time.monotonic() - begin < 20
+
+
+def test_a_table_without_names_is_named_by_a_channels_file(tmp_path) -> None:
+    path = tmp_path / "rows.csv"
+    frame().to_csv(path, index=False, header=False)
+    found = read_table_log(path)
+    assert [stream.name for stream in found.streams][:2] == ["column 2", "column 3"]
+    assert len(found.streams[0].values) == len(frame())
+    channels = tmp_path / "channels.toml"
+    text = 'format = "tank2sim-channels/1"\n'
+    for number, quantity, unit in ((6, "heading", "deg"), (8, "rudder_angle", "deg")):
+        text += f'[[channels]]\nquantity = "{quantity}"\nstream = "column {number}"\nunit = "{unit}"\n'
+    channels.write_text(text)
+    result = log(path, channels=channels)
+    assert [stretch.kind.value for stretch in result.found if stretch.kind.excites] == ["zigzag", "turn"]

@@ -55,12 +55,13 @@ def read_table_log(path: Path) -> VesselLog:
     Separator, decimal sign, encoding (UTF-8 or Windows-1252) and a row of units under the names are found from the
     first lines; the time is a column of ISO 8601, of date and time of day, or of seconds (ms, us, ns) since 1970, in
     UTC unless the name of the column has a zone (``MEZ``, ``UTC+2``). Seconds that count from the beginning are taken
-    too; the log then has no date. Rows that cannot be read are counted and left out.
+    too; the log then has no date. Columns without names are ``column 1`` and so on. Rows that cannot be read are
+    counted and left out.
 
     Raises
     ------
     InputError
-        The file cannot be read, or has no header, no rows or no time.
+        The file cannot be read, or has no rows or no time.
     """
     import pandas as pd
 
@@ -130,19 +131,22 @@ def _layout(path: Path) -> _Layout:
     lines = [line for _, line in numbered[:_HEAD_LINES]]
     separator = max(";\t|,", key=lambda sign: min(line.count(sign) for line in lines[:4]))
     names = [name.strip() or f"column {place}" for place, name in enumerate(_cells(lines[0], separator), start=1)]
-    if sum(_is_number(name) for name in names) > len(names) / 2:
-        remedy = "put a line of column names above the rows"
-        raise InputError(path, f"line {numbered[0][0] + 1}", "has numbers where names were expected", remedy)
+    header = sum(_is_number(name) for name in names) <= len(names) / 2
+    if not header:
+        names = [f"column {place}" for place in range(1, len(names) + 1)]
+        lines = [lines[0], *lines]
     names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
     second = _cells(lines[1], separator)
-    has_units = len(lines) > 2 and not any(
-        re.search(r"\d{2}|^-?\d", cell.strip()) and cell not in _UNIT_NUMBERS for cell in second
+    has_units = (
+        header
+        and len(lines) > 2
+        and not any(re.search(r"\d{2}|^-?\d", cell.strip()) and cell not in _UNIT_NUMBERS for cell in second)
     )
     units = [unit_of_text(cell) for cell in second] if has_units else []
     units = [*units, *[""] * len(names)][: len(names)]
     body = lines[2 if has_units else 1 :]
     comma = separator != "," and any(re.search(rf"(?:^|{re.escape(separator)})\s*-?\d+,\d+", line) for line in body)
-    skip = numbered[1 if has_units else 0][0] + 1
+    skip = numbered[1 if has_units else 0][0] + 1 if header else 0
     return _Layout(encoding, separator, comma, tuple(names), tuple(units), skip)
 
 
