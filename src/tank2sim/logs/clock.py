@@ -26,28 +26,36 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     """Times (n,) of a clock in the order of recording, continued over places where it was set back.
 
     A clock that falls by more than :data:`FALL_STEPS` steps is taken to continue from where it was; a later leap
-    forward by the same amount ends the shift. Each fall is a fault in the findings. Smaller ones are samples out of
-    order.
+    forward by the same amount ends the shift. A leap forward that a fall of the same size follows is taken back. Each
+    is a fault in the findings. Smaller falls are samples out of order.
     """
     steps = np.diff(time_s)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    falls = np.flatnonzero(steps < -FALL_STEPS * usual)
-    if not len(falls):
+    if not (steps < -FALL_STEPS * usual).any():
         return time_s, []
     times, findings, shift = time_s.copy(), [], 0.0
-    changes = np.flatnonzero((steps < -FALL_STEPS * usual) | (steps > GAP_STEPS * usual))
-    for place in changes:
+    leaps: list[int] = []
+    for place in np.flatnonzero((steps < -FALL_STEPS * usual) | (steps > GAP_STEPS * usual)):
         step = float(steps[place])
-        if step < 0:
-            change = usual - step
-            text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
-            findings.append(LogFinding("fault", text, name, {"fall_s": -step}))
-        elif shift > 0 and abs(step - usual - shift) < 2 * usual:
-            change = -shift
-        else:
+        if step > 0:
+            if shift > 0 and abs(step - usual - shift) < 2 * usual:
+                times[place + 1 :] -= shift
+                shift = 0.0
+            else:
+                leaps.append(int(place))
             continue
+        ahead = next((leap for leap in reversed(leaps) if abs(steps[leap] + step - 2 * usual) < 2 * usual), None)
+        if ahead is not None:
+            leaps.remove(ahead)
+            times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
+            text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
+            findings.append(LogFinding("fault", f"{text}; that is taken back", name, {"leap_s": -step + usual}))
+            continue
+        change = usual - step
         shift += change
         times[place + 1 :] += change
+        text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
+        findings.append(LogFinding("fault", text, name, {"fall_s": -step}))
     return times, findings
 
 
