@@ -10,7 +10,8 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel, find_channels
+from tank2sim.logs.channel_search import find_channels
+from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
 from tank2sim.logs.quantities import QUANTITIES
