@@ -248,6 +248,12 @@ def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
     """Remove the trials that an earlier run cut into a folder and this one did not write; return their names.
 
     Only files that say in their comments that they were cut by tank2sim are removed.
+
+    Parameters
+    ----------
+    folder : Path
+    written : iterable of Path
+        Files of this run, which stay.
     """
     removed = []
     for path in sorted(set(folder.glob("[0-9][0-9]*_*.csv")) - set(written)):
