@@ -170,8 +170,7 @@ class _Search:
         if len(time) < 3:
             return None
         if first.quantity == "latitude":
-            factor = QUANTITIES["latitude"].units.get(first.unit or "deg", 1.0)
-            a, b = factor * a, factor * b
+            a, b = _degrees(first), _degrees(second)
             if np.abs(a).max() > 90 or np.abs(b).max() > 360:
                 return None
             a, b = local_metres(a, b, rounded_origin(a, b))
@@ -204,9 +203,9 @@ class _Search:
         for north, east, _ in tracks[1:]:
             first, second = tracks[0][:2]
             step = 2 * usual_step(first.time_s)
-            origin = rounded_origin(first.values, second.values)
-            a, b = local_metres(first.values, second.values, origin)
-            c, d = local_metres(north.values, east.values, origin)
+            origin = rounded_origin(_degrees(first), _degrees(second))
+            a, b = local_metres(_degrees(first), _degrees(second), origin)
+            c, d = local_metres(_degrees(north), _degrees(east), origin)
             dx = interpolated(north.time_s, first.time_s, a, step) - c
             dy = interpolated(north.time_s, first.time_s, b, step) - d
             if not np.isfinite(dx).any():
@@ -575,6 +574,11 @@ class _Search:
         order = {name: place for place, name in enumerate(QUANTITIES)}
         channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
         return ChannelSet(tuple(channels), tuple(self.findings))
+
+
+def _degrees(stream: LogStream) -> Array:
+    """Latitude or longitude (n,) in degrees."""
+    return np.asarray(stream.values * QUANTITIES["latitude"].units.get(stream.unit or "deg", 1.0))
 
 
 def _share_unit(stream: LogStream, quantity: str) -> str:
