@@ -79,6 +79,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "influence of a steering card": lambda _: t2s.steering_models("poznyakov-yudin"),
     "influence with targets": _tune,
     "influence through two points": lambda _: t2s.load("mariner").tune_through("35@35", "1400m@3"),
+    "log": lambda folder: t2s.log(_trials(folder)),
     "pilotcard": lambda _: t2s.load("mariner").pilot_card(),
     "poster": lambda _: t2s.load("mariner").poster(),
     "ships": lambda _: list_ships(),

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tank2sim.api.glide import GlideResult
     from tank2sim.api.identification import IdentificationResult, identify
     from tank2sim.api.influence import InfluenceResult, TuningResult
+    from tank2sim.api.log import LogResult, log
     from tank2sim.api.manoeuvre import ManoeuvreResult
     from tank2sim.api.reduction import ReductionResult, reduce
     from tank2sim.api.report import ReportResult, make_report
@@ -51,6 +52,7 @@ _HOMES = {
     "IdentificationResult": "api.identification",
     "InfluenceResult": "api.influence",
     "InputError": "errors",
+    "LogResult": "api.log",
     "ManoeuvreResult": "api.manoeuvre",
     "PilotCardResult": "api.bridge",
     "PosterResult": "api.bridge",
@@ -77,6 +79,7 @@ _HOMES = {
     "identify": "api.identification",
     "json_schema": "api.schemas",
     "load": "api.ship",
+    "log": "api.log",
     "make_report": "api.report",
     "read_trial": "api.trial",
     "reduce": "api.reduction",
@@ -102,6 +105,7 @@ __all__ = [
     "IdentificationResult",
     "InfluenceResult",
     "InputError",
+    "LogResult",
     "ManoeuvreResult",
     "PilotCardResult",
     "PosterResult",
@@ -128,6 +132,7 @@ __all__ = [
     "identify",
     "json_schema",
     "load",
+    "log",
     "make_report",
     "read_trial",
     "reduce",

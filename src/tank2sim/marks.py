@@ -13,9 +13,14 @@ ASSUMED = "ASSUMED standard errors"
 FORCED = "FORCED"
 """A refusal was overridden."""
 
+UNCONFIRMED = "UNCONFIRMED"
+"""A channel of a log, or its clock, is not what it seems; somebody must confirm or correct it."""
+
 
 def marked(messages: Iterable[str]) -> list[str]:
     """The messages that contain a mark, each once, in their order."""
     return list(
-        dict.fromkeys(text for text in messages if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, FORCED)))
+        dict.fromkeys(
+            text for text in messages if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, FORCED, UNCONFIRMED))
+        )
     )

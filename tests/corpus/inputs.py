@@ -11,6 +11,7 @@ import numpy as np
 
 from tests.corpus.mutations import Files
 from tests.identification.captive.generator import Campaign, write
+from tests.logs.made_logs import candump_lines, frame, nmea_lines
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 
@@ -82,6 +83,9 @@ def plain() -> Files:
             (b, d, 1.2, -0.016 - 1e-5 * d * d, 0.005 * b - 0.0003 * d, 0.002 * b + 0.0001 * d)
             for b, d in [(b, 0.0) for b in range(-8, 9, 2)] + [(0.0, d) for d in range(-20, 21, 5)]
         ])[0:],
+        "voyage.csv": frame().iloc[::4].to_csv(index=False).encode(),
+        "voyage.nmea": "\n".join(nmea_lines()[:2400]).encode() + b"\n",
+        "voyage.log": "\n".join(list(candump_lines())[:3000]).encode() + b"\n",
         "noise.csv": _csv([], "t_s,delta_deg,r_degps", [(i * 0.5, 0.0, float(r)) for i, r in enumerate(oscillating)]),
     }  # fmt: skip
 

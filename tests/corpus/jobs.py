@@ -56,6 +56,11 @@ RECIPES: dict[str, list[Recipe]] = {
         (["noise.csv", "--column", "r_degps"], ["noise.csv"]),
         (["zigzag.csv", "--column", "r_degps", "--filter", "lowpass:0.2", "--out", "out.csv"], ["zigzag.csv"]),
     ],
+    "log": [
+        (["voyage.csv", "-o", "voyage", "--json", "out.json"], ["voyage.csv"]),
+        (["voyage.nmea", "-o", "voyage"], ["voyage.nmea"]),
+        (["voyage.log", "-o", "voyage"], ["voyage.log"]),
+    ],
     "validate": [(["card.toml", "zigzag.csv", "--members", "0"], ["card.toml", "zigzag.csv"]),
                  (["card.toml", "turn.csv", "--members", "0", "--json", "out.json"], ["turn.csv"])],
     "compare": [(["card.toml", "tanker.toml", "--members", "0", "--json", "out.json"], ["card.toml", "tanker.toml"])],
@@ -81,7 +86,8 @@ RECIPES: dict[str, list[Recipe]] = {
 }  # fmt: skip
 
 SHARES: dict[str, int] = {
-    "simulate": 380, "reduce": 340, "tow": 270, "yaw": 150, "audit": 420, "identify": 180, "gap": 25, "signals": 270,
+    "simulate": 380, "reduce": 340, "tow": 270, "yaw": 150, "audit": 300, "log": 120, "identify": 180, "gap": 25,
+    "signals": 270,
     "validate": 120, "compare": 60, "influence": 130, "autopilot": 75, "glide": 200, "export": 30, "check": 20,
     "stability": 60, "report": 270,
 }  # fmt: skip

@@ -414,6 +414,52 @@ class AuditKeys(_Keys):
     trials: list[dict[str, Any]]
 
 
+class LogChannelKeys(_Part):
+    """A stream and the quantity that it holds."""
+
+    quantity: str
+    stream: str
+    unit: str
+    sign: int
+    confidence: float
+    use: bool
+    why: str
+
+
+class LogStretchKeys(_Part):
+    """A stretch of a voyage, and the trial that it became."""
+
+    kind: str
+    excites: bool
+    begins_utc: str | None
+    begins_s: float
+    duration_s: float
+    steering: str | None
+    heading_change_deg: Number
+    reversals: int
+    speed_mps: Number
+    least_speed_mps: Number
+    largest_speed_mps: Number
+    yaw_rate_rms_degps: Number
+    file: str | None
+
+
+class LogKeys(_Keys):
+    """What a vessel's log holds."""
+
+    logs: list[dict[str, Any]]
+    begins_utc: str | None
+    duration_s: float
+    origin_deg: list[float] | None
+    channels: list[LogChannelKeys]
+    stretches: list[LogStretchKeys]
+    current: dict[str, str | float] | None
+    track: Columns | None
+    time_line: dict[str, Columns]
+    findings: list[dict[str, Any]]
+    notices: list[str]
+
+
 class AutopilotKeys(_Keys):
     """A heading controller, its margins and its runs."""
 
@@ -655,6 +701,7 @@ KEYS: dict[str, Any] = {
     "glide": GlideKeys,
     "identify": IdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
+    "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "reduce": ReduceKeys,

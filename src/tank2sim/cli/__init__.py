@@ -26,6 +26,7 @@ from tank2sim.plugins import PluginWarning
 
 GROUPS = {
     "Measure": {
+        "log": "a vessel's own log, cut into trials",
         "reduce": "captive tests to derivatives",
         "tow": "surge mass and drag from accelerating tows",
         "yaw": "added yaw inertia and dissipation from records of a yaw rig",

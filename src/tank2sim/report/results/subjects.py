@@ -15,6 +15,7 @@ from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
+from tank2sim.report.logs.page import log_page
 from tank2sim.report.results.motions import audit_sections, from_the_bridge, simulated
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
@@ -106,6 +107,7 @@ _PAGES: Mapping[str, _Page] = {
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
         | {"imo": list, "replays": list, "notices": list},
     ),
+    "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),
     "Captive tests": _Page(
         reduction_page,

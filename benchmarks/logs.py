@@ -1,0 +1,107 @@
+"""Logs of two made-up voyages in seven formats: manoeuvres found against the truth, and a turn that was not fitted.
+
+For each format: how many manoeuvres of the truth file are found with their kind, and the largest error of a begin. Then
+the bundled Mariner with the reported current is fitted to the zigzag and the turn of 20 deg of the ship's log, and the
+tactical diameter of the turn of -35 deg, which is held out, is predicted. Last, a log of 24 h at 10 Hz is written, read
+and cut.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import tank2sim as t2s
+from tank2sim.cards import parse_card
+
+LOGS = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data" / "logs"
+FORMATS = ("voyage.nmea", "voyage.bag", "voyage.mcap", "voyage.bin", "voyage.ulg", "voyage.csv", "voyage_eu.csv")
+KINDS = {
+    "ship_21": {"zigzag", "turn", "stop"},
+    "usv_22": {"zigzag", "turn", "steps", "pivot", "coast", "astern", "accelerate"},
+}
+
+
+def manoeuvres_found(vessel: str, name: str) -> tuple[int, int, float]:
+    """Manoeuvres found, those of the truth, and the largest error of a begin among those found, s."""
+    truth = json.loads((LOGS / f"{vessel}-truth.json").read_text(encoding="utf-8"))["manoeuvres"]
+    wanted = [entry for entry in truth if entry["kind"] in KINDS[vessel]]
+    found = t2s.log(LOGS / vessel / name).found
+    errors = []
+    for entry in wanted:
+        begin = pd.Timestamp(entry["utc_start"]).timestamp()
+        near = [abs(stretch.begin_s - begin) for stretch in found if stretch.kind.value == entry["kind"]]
+        if near and min(near) < 5.0:
+            errors.append(min(near))
+    return len(errors), len(wanted), max(errors, default=float("nan"))
+
+
+def held_out_turn(name: str, folder: Path) -> str:
+    """Tactical diameter of the turn that was not fitted: measured, and its error by the bundled and the fitted card."""
+    result = t2s.log(LOGS / "ship_21" / name)
+    paths = {path.stem: path for path in result.save(folder / name)}
+    fitted = [path for stem, path in paths.items() if "zigzag" in stem or "turn_+20" in stem]
+    (held,) = (path for stem, path in paths.items() if "turn_-35" in stem)
+    text = t2s.load("mariner").card.text
+    if current := result.current:
+        text += f'\n[[effects]]\nname = "current"\nparameters = {{ speed_mps = {current.speed_mps:.4f}, '
+        text += f"direction_deg = {current.direction_deg:.2f} }}\n"
+    fit = t2s.identify(t2s.Ship(parse_card(text, "mariner with current")), fitted, holdout=held, members=0).to_dict()
+    (figure,) = (entry for entry in fit["figures"]["holdout"] if entry["figure"] == "tactical_diameter_m")
+    before, now = (100 * (figure[key] / figure["measured"] - 1) for key in ("before", "predicted"))
+    return f"{figure['measured']:.0f} m; bundled card {before:+.1f} %, fitted {now:+.1f} %"
+
+
+def day(folder: Path) -> str:
+    """Time and memory of a day at 10 Hz with two turns an hour."""
+    count = 864_000
+    seconds = np.arange(count) * 0.1
+    rudder = np.where(seconds % 1800 >= 1500, np.radians(20.0), 0.0) * np.where(seconds % 3600 < 1800, 1, -1)
+    rate = 0.02 * rudder
+    heading = np.cumsum(rate) * 0.1
+    north, east = (np.cumsum(0.7 * part) for part in (np.cos(heading), np.sin(heading)))
+    table = {
+        "utc": 1_700_000_000 + seconds,
+        "latitude": 50 + north / 111_200,
+        "longitude": east / 71_500,
+        "heading_deg": np.degrees(heading) % 360,
+        "rot_deg_min": np.degrees(rate) * 60,
+        "rudder_deg": np.degrees(rudder),
+        "sog_kn": np.full(count, 13.61),
+        "rpm": np.full(count, 84.0),
+    }
+    path = folder / "day.csv"
+    pd.DataFrame(table).to_csv(path, index=False, float_format="%.7f")
+    begin = time.perf_counter()
+    result = t2s.log(path)
+    result.save(folder / "day")
+    result.to_json(folder / "day.json")
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    return f"{time.perf_counter() - begin:.0f} s, {memory:.2f} GB at most, {len(result.cuts)} trials of 48"
+
+
+def main() -> None:
+    """Print the figures."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        print(f"24 h at 10 Hz as CSV: {day(folder)}")
+        if not LOGS.is_dir():
+            sys.exit(f"the made-up logs are missing: no folder {LOGS} (set TANK2SIM_DATA)")
+        for vessel in KINDS:
+            for file in FORMATS:
+                found, wanted, error = manoeuvres_found(vessel, file)
+                print(f"{vessel} {file}: {found} of {wanted} manoeuvres, begins within {error:.1f} s")
+        for file in ("voyage.nmea", "voyage.bag", "voyage.csv"):
+            print(f"held-out turn, {file}: tactical diameter {held_out_turn(file, folder)}")
+
+
+if __name__ == "__main__":
+    main()

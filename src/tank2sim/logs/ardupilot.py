@@ -1,0 +1,219 @@
+"""ArduPilot: dataflash logs (``.bin``, ``.log``) and telemetry logs (``.tlog``)."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections import defaultdict
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.logs.quantities import unit_of_text
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
+
+GPS_EPOCH_S = 315964800.0
+"""1980-01-06 in seconds since 1970 (IS-GPS-200, 3.3.4)."""
+
+LEAP_SECONDS = 18.0
+"""GPS time is this many seconds ahead of UTC since 2017-01-01 (IERS Bulletin C 52; none was added up to 2025)."""
+
+_WEEK_S = 604800.0
+
+_SERVO_FUNCTIONS = {
+    26: "rudder_order",
+    70: "rpm_order",
+    73: "thrust_order_port",
+    74: "thrust_order_starboard",
+}
+"""SERVOn_FUNCTION of ArduPilot Rover: GroundSteering, Throttle, ThrottleLeft, ThrottleRight."""
+
+_FIELDS: dict[str, dict[str, tuple[str, str]]] = {
+    # message: field to (unit where the file states none, quantity)
+    "GPS": {"Lat": ("deg", "latitude"), "Lng": ("deg", "longitude"), "Spd": ("m/s", "sog"), "GCrs": ("deg", "cog")},
+    "ATT": {"Yaw": ("deg", "heading"), "Roll": ("deg", "heel")},
+    "IMU": {"GyrZ": ("rad/s", "yaw_rate"), "AccX": ("m/s2", "a_x"), "AccY": ("m/s2", "a_y")},
+    "XKF1": {"PN": ("m", "x"), "PE": ("m", "y"), "VN": ("m/s", "v_north"), "VE": ("m/s", "v_east")},
+    "WIND": {
+        "DirApp": ("deg", "wind_rel_direction"),
+        "SpdApp": ("m/s", "wind_rel_speed"),
+        "DirTrue": ("deg", "wind_direction"),
+        "SpdTrue": ("m/s", "wind_speed"),
+    },
+    "RPM": {"RPM": ("rpm", "rpm")},
+}
+"""Fields of dataflash messages: ardupilot.org, "Onboard message log messages" of Rover."""
+
+_INSTANCES = ("I", "C", "Inst")
+_COMMONEST = 3
+"""Status of a GPS fix in three dimensions (GPS_STATUS of ArduPilot); less is no fix, except 2, a fix in two."""
+
+
+def read_ardupilot_bin(path: Path) -> VesselLog:
+    """Read a dataflash log.
+
+    Orders to servos (RCOU) become shares of their range by the parameters SERVOn_FUNCTION, _MIN, _TRIM, _MAX and
+    _REVERSED. Times are those of the board, set to UTC by the GPS with the least delay; a GPS fix has the time of the
+    receiver.
+
+    Raises
+    ------
+    InputError
+        The file is not such a log, is empty, or holds no GPS time.
+    """
+    library = optional_library("pymavlink.DFReader", path)
+    try:
+        reader = (
+            library.DFReader_text(str(path)) if path.suffix.lower() == ".log" else library.DFReader_binary(str(path))
+        )
+        tables, units, params = _dataflash_tables(reader)
+    except Exception as error:  # the library lets errors of struct through
+        problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
+        raise InputError(path, "", problem, "give a whole dataflash log") from None
+    gps = tables.get(("GPS", 0))
+    if gps is None or not {"GWk", "GMS"} <= set(gps) or not (gps["GWk"] > 0).any():
+        raise InputError(path, "", "holds no time of a GPS", "log GPS messages, or export the log with UTC")
+    utc = GPS_EPOCH_S + _WEEK_S * gps["GWk"] + gps["GMS"] / 1000 - LEAP_SECONDS
+    fixed = (gps["GWk"] > 0) & (gps.get("Status", np.full(len(utc), _COMMONEST)) >= 2)
+    # The message is written after the fix was measured: the least difference has the least delay.
+    boot = float(np.min(gps["TimeUS"][fixed] * 1e-6 - utc[fixed]))
+    findings: list[LogFinding] = []
+    if (spread := float(np.ptp(gps["TimeUS"][fixed] * 1e-6 - utc[fixed]))) > 1.0:
+        text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
+        findings.append(LogFinding("fault", text, "GPS"))
+    streams = []
+    for (kind, instance), table in tables.items():
+        time = table["TimeUS"] * 1e-6 - boot
+        label = kind if instance in (0, None) and (kind, 1) not in tables else f"{kind}[{instance}]"
+        for field, (unit, quantity) in _FIELDS.get(kind, {}).items():
+            if field not in table or (kind == "XKF1" and instance):
+                continue
+            values, stamps = table[field], time
+            if kind == "GPS":
+                at = GPS_EPOCH_S + _WEEK_S * table["GWk"] + table["GMS"] / 1000 - LEAP_SECONDS
+                stamps = at if not findings else time
+                values = np.where(table.get("Status", np.full(len(at), _COMMONEST)) >= 2, values, np.nan)
+            stated = unit_of_text(units.get((kind, field), "")) or unit
+            meaning = (quantity, "format")
+            if kind == "RPM" and ("RPM", 1) in tables:  # a guess, which the turn confirms or not
+                meaning = ("rpm_port" if instance == 0 else "rpm_starboard", "")
+            streams.append(LogStream(f"{label}.{field}", stamps, values, stated, *meaning))
+        if kind == "RCOU":
+            streams += list(_servo_orders(time, table, params))
+    if not streams:
+        raise InputError(path, "", "no message of it is understood", "log GPS, ATT, IMU and RCOU")
+    counts = {"messages": sum(len(table["TimeUS"]) for table in tables.values())}
+    return VesselLog(path, "ArduPilot dataflash", tuple(streams), counts, tuple(findings))
+
+
+_Tables = dict[tuple[str, Any], dict[str, Array]]
+
+
+def _dataflash_tables(reader: Any) -> tuple[_Tables, dict[tuple[str, str], str], Mapping[str, float]]:
+    """Columns by message and instance, and units by message and field."""
+    wanted = {*_FIELDS, "RCOU"}
+    rows: dict[tuple[str, Any], dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
+    units: dict[tuple[str, str], str] = {}
+    while (message := reader.recv_match(type=[*wanted, "PARM"])) is not None:
+        kind = message.get_type()
+        if kind == "PARM":
+            continue
+        names = message.fmt.columns
+        instance = next((getattr(message, name) for name in _INSTANCES if name in names), None)
+        if (kind, instance) not in rows:
+            stated = message.fmt.units or [""] * len(names)
+            units |= {(kind, name): unit for name, unit in zip(names, stated, strict=False)}
+        group = rows[kind, instance]
+        for name in names:
+            group[name].append(float(getattr(message, name)))
+    tables = {key: {name: np.array(values) for name, values in group.items()} for key, group in rows.items()}
+    return tables, units, reader.params
+
+
+def _servo_orders(time: Array, table: Mapping[str, Array], params: Mapping[str, float]) -> list[LogStream]:
+    """Orders as shares of the range, positive to starboard and ahead, of the outputs with a known function."""
+    streams = []
+    for number in range(1, 17):
+        quantity = _SERVO_FUNCTIONS.get(int(params.get(f"SERVO{number}_FUNCTION", 0)))
+        pulses = table.get(f"C{number}", table.get(f"Ch{number}"))
+        if quantity is None or pulses is None:
+            continue
+        least, trim, most = (
+            params.get(f"SERVO{number}_{name}", usual)
+            for name, usual in (("MIN", 1100.0), ("TRIM", 1500.0), ("MAX", 1900.0))
+        )
+        share = np.where(
+            pulses >= trim, (pulses - trim) / max(most - trim, 1.0), (pulses - trim) / max(trim - least, 1.0)
+        )
+        sign = -1.0 if params.get(f"SERVO{number}_REVERSED", 0) else 1.0
+        share = np.where(pulses > 0, sign * share, math.nan)
+        streams.append(LogStream(f"RCOU.C{number}", time, share, "1", quantity, "format"))
+    return streams
+
+
+_TELEMETRY: dict[str, dict[str, tuple[float, str, str]]] = {
+    # message: field to (factor, unit, quantity)
+    "GLOBAL_POSITION_INT": {
+        "lat": (1e-7, "deg", "latitude"),
+        "lon": (1e-7, "deg", "longitude"),
+        "vx": (0.01, "m/s", "v_north"),
+        "vy": (0.01, "m/s", "v_east"),
+    },
+    "GPS_RAW_INT": {"vel": (0.01, "m/s", "sog"), "cog": (0.01, "deg", "cog")},
+    "ATTITUDE": {"yaw": (1.0, "rad", "heading"), "yawspeed": (1.0, "rad/s", "yaw_rate"), "roll": (1.0, "rad", "heel")},
+    "RPM": {"rpm1": (1.0, "rpm", "rpm")},
+}
+"""Fields of MAVLink messages (mavlink.io, common message set)."""
+
+_UNKNOWN_16_BITS = 65535
+"""What a field of 16 bits holds where nothing is known (mavlink.io)."""
+
+
+def read_ardupilot_tlog(path: Path) -> VesselLog:
+    """Read a telemetry log: MAVLink messages with the time of the ground station. Raises as :func:`read_ardupilot_bin`.
+
+    Orders to servos become shares of their range where the log holds the parameters SERVOn_FUNCTION.
+    """
+    mavutil = optional_library("pymavlink.mavutil", path)
+    rows: dict[str, dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
+    params: dict[str, float] = {}
+    try:
+        link = mavutil.mavlink_connection(str(path), robust_parsing=True)
+        wanted = [*_TELEMETRY, "SERVO_OUTPUT_RAW", "PARAM_VALUE", "SYSTEM_TIME"]
+        while (message := link.recv_match(type=wanted)) is not None:
+            kind = message.get_type()
+            if kind == "PARAM_VALUE":
+                params[message.param_id] = message.param_value
+                continue
+            group = rows[kind]
+            group["_time"].append(message._timestamp)
+            for name in message.get_fieldnames():
+                value = getattr(message, name)
+                if isinstance(value, int | float):
+                    group[name].append(float(value))
+    except Exception as error:
+        problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
+        raise InputError(path, "", problem, "give a whole telemetry log") from None
+    tables = {kind: {name: np.array(values) for name, values in group.items()} for kind, group in rows.items()}
+    streams = []
+    for kind, table in tables.items():
+        for field, (factor, unit, quantity) in _TELEMETRY.get(kind, {}).items():
+            if field in table:
+                values = np.where(table[field] == _UNKNOWN_16_BITS, np.nan, factor * table[field])
+                streams.append(LogStream(f"{kind}.{field}", table["_time"], values, unit, quantity, "format"))
+    if "SERVO_OUTPUT_RAW" in tables:
+        servos = tables["SERVO_OUTPUT_RAW"]
+        pulses = {
+            f"C{number}": servos[f"servo{number}_raw"] for number in range(1, 17) if f"servo{number}_raw" in servos
+        }
+        streams += _servo_orders(servos["_time"], pulses, params)
+    if not streams:
+        raise InputError(
+            path, "", "no message of it is understood", "give a telemetry log with positions and attitudes"
+        )
+    counts = {"messages": sum(len(table["_time"]) for table in tables.values())}
+    return VesselLog(path, "MAVLink telemetry", tuple(streams), counts)

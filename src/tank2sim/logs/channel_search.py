@@ -1,0 +1,596 @@
+"""The search for the channels of a voyage: by format, names, units and content, with a confidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.logs.channels import USED_FROM, ChannelSet, LogChannel
+from tank2sim.logs.clock import usual_step
+from tank2sim.logs.content import (
+    AGREES,
+    DIFFERS,
+    FEW_SAMPLES,
+    UNTESTED,
+    ContentEvidence,
+    angle_unit,
+    component_evidence,
+    direction_evidence,
+    rate_evidence,
+    rudder_unit,
+    speed_evidence,
+    steering_evidence,
+)
+from tank2sim.logs.quantities import QUANTITIES, sign_of_name
+from tank2sim.logs.reference import (
+    POSITION_WINDOW_S,
+    ReferenceMotion,
+    differenced,
+    interpolated,
+    local_metres,
+    rounded_origin,
+    thinned_series,
+)
+from tank2sim.logs.streams import LogFinding, LogStream
+
+FULL_RUDDER_DEG = 35.0
+"""Rudder angle at full order where a log has shares alone: 35 deg on either side (SOLAS II-1, regulation 29.3.1)."""
+
+LARGEST_OFFSET_RAD = math.radians(30.0)
+"""Mean difference of heading and course beyond which a heading is doubtful. Project choice: leeway and current of a
+third of the speed turn a course by 20 deg; compasses mounted askew are off by 90 or 180."""
+
+RECEIVERS_APART_M = 10.0
+"""Median distance of two tracks from which they are reported as of two receivers, m. Project choice: beyond the errors
+of a receiver; antennas of a ship may be as far apart, which a track has to know too."""
+
+FASTEST_TRACK_MPS = 60.0
+"""Speed that no track of a vessel has, m/s: the record on water is 142, of vessels in service below 50."""
+
+_DERIVATIVE = 0.95
+"""Correlation of a rate of turn with the derivative of its heading. Project choice: sensors reach 0.99, and a course
+over ground, which is noisier and has the drift in it, does not."""
+
+_TESTED_STEP_S = 0.2
+"""Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more."""
+
+_BASE = {"format": 0.95, "name": 0.75, "": 0.6}
+_AGREED = {"format": 0.99, "name": 0.96, "": 0.9}
+_CONTRADICTED = 0.2
+
+
+def find_channels(streams: Iterable[LogStream]) -> ChannelSet:
+    """Find the channel of each quantity.
+
+    The position gives the motion against which headings, courses and speeds are tested; the heading gives the rate of
+    turn; the rate of turn gives rudders and thrusters. A stream whose content contradicts its name or format is not
+    used, and is a fault in the findings; the one of several that agrees best is used.
+    """
+    search = _Search([stream for stream in streams if len(stream.values) >= 2])
+    search.positions()
+    search.headings()
+    search.rates()
+    search.speeds()
+    search.unnamed()
+    search.steering()
+    search.thrusters()
+    search.others()
+    return search.result()
+
+
+class _Search:
+    """The search in its steps; each leaves channels and what later steps compare with."""
+
+    def __init__(self, streams: Sequence[LogStream]) -> None:
+        self.streams = list(streams)
+        self.found: list[LogChannel] = []
+        self.findings: list[LogFinding] = []
+        empty = np.zeros(0)
+        self.motion = ReferenceMotion(empty, empty, empty, empty, empty)
+        self.rate: tuple[Array, Array] = (empty, empty)
+
+    def named(self, *quantities: str) -> list[LogStream]:
+        return [stream for stream in self.streams if stream.quantity in quantities]
+
+    def thin(self, stream: LogStream) -> tuple[Array, Array]:
+        return thinned_series(stream.time_s, stream.values, _TESTED_STEP_S)
+
+    def add(self, stream: LogStream, confidence: float, why: str, **changes: object) -> None:
+        quantity = str(changes.pop("quantity", stream.quantity))
+        unit = str(changes.pop("unit", stream.unit))
+        if unit not in QUANTITIES[quantity].units:
+            unit, confidence, why = "", min(confidence, 0.6), f"{why}; its unit is unknown"
+        values: dict[str, object] = {"confidence": round(confidence, 2), "why": why, "use": False, **changes}
+        self.found.append(LogChannel(quantity, stream.name, unit, **values))  # type: ignore[arg-type]
+
+    def fault(self, stream: LogStream, text: str) -> None:
+        self.findings.append(LogFinding("fault", f"{stream.name}: {text}", stream.name))
+
+    def judged(self, stream: LogStream, evidence: ContentEvidence, *, agrees: float = AGREES) -> tuple[float, str]:
+        """Confidence of a stream in its quantity by content, and why."""
+        basis = {"format": "by its format", "name": "by its name", "": "by its place"}[stream.stated_by]
+        if evidence.agreement is None:
+            stated = 0.1 if stream.stated_by == "name" and stream.unit else 0.0
+            return _BASE[stream.stated_by] + stated, f"{basis}{' and unit' if stated else ''}; {evidence.text}"
+        if evidence.agreement >= agrees:
+            return _AGREED[stream.stated_by], f"{basis}; {evidence.text}"
+        if evidence.agreement < DIFFERS:
+            return _CONTRADICTED, f"{basis}, but {evidence.text}"
+        return _BASE[stream.stated_by] - 0.1, f"{basis}; {evidence.text}, which is weak"
+
+    # Position ---------------------------------------------------------------------------------------------------
+
+    def positions(self) -> None:
+        pairs = []
+        for north, east in (("latitude", "longitude"), ("x", "y")):
+            for first in self.named(north):
+                second = next(
+                    (
+                        s
+                        for s in self.named(east)
+                        if len(s.time_s) == len(first.time_s) and s.time_s[0] == first.time_s[0]
+                    ),
+                    None,
+                )
+                if second is not None:
+                    pairs.append((first, second))
+        tracks = []
+        for first, second in pairs:
+            track = self._track(first, second)
+            if track is None:
+                self.add(first, _CONTRADICTED, "its values are no position, or leap", unit=first.unit or "deg")
+                self.add(second, _CONTRADICTED, "its values are no position, or leap", unit=second.unit or "deg")
+                self.fault(first, "holds no position, or leaps")
+                continue
+            tracks.append((first, second, track))
+        if not tracks:
+            return
+        tracks.sort(key=lambda entry: (entry[0].quantity != "latitude", -self._coverage(entry[0].name)))
+        first, second, track = tracks[0]
+        self.motion = track
+        wrong = self._wrong_axes(track)
+        for north_stream, east_stream, _ in tracks:
+            for stream in (north_stream, east_stream):
+                confidence = _BASE["format"] if stream.stated_by == "format" else 0.9
+                confidence -= 0.0 if stream in (first, second) else 0.02
+                why = f"its track {wrong[0]}" if wrong else "a track of a plausible speed"
+                unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
+                self.add(stream, _CONTRADICTED if wrong else confidence, why, unit=unit)
+        self._two_receivers([entry for entry in tracks if entry[0].quantity == "latitude"])
+        if wrong:
+            self.fault(first, f"with {second.name}, its track {wrong[0]}, by headings and courses")
+            self.motion = wrong[1]
+
+    def _track(self, first: LogStream, second: LogStream) -> ReferenceMotion | None:
+        time, a, b = first.time_s, first.values, second.values
+        if len(time) < 3:
+            return None
+        if first.quantity == "latitude":
+            a, b = _degrees(first), _degrees(second)
+            if np.abs(a).max() > 90 or np.abs(b).max() > 360:
+                return None
+            a, b = local_metres(a, b, rounded_origin(a, b))
+        at, v_north = differenced(time, a, POSITION_WINDOW_S)
+        _, v_east = differenced(time, b, POSITION_WINDOW_S)
+        if not len(at) or np.percentile(np.hypot(v_north, v_east), 90) > FASTEST_TRACK_MPS:
+            return None
+        empty = np.zeros(0)
+        return ReferenceMotion(at, v_north, v_east, empty, empty)
+
+    def _wrong_axes(self, track: ReferenceMotion) -> tuple[str, ReferenceMotion] | None:
+        """What is wrong with the axes of a track, and the motion without it; None unless all directions show it."""
+        north, east = track.v_north_mps, track.v_east_mps
+        others = {
+            "has its axes exchanged": replace(track, v_north_mps=east, v_east_mps=north),
+            "is mirrored, as by a wrong sign of the second": replace(track, v_east_mps=-east),
+            "is mirrored, as by a wrong sign of the first": replace(track, v_north_mps=-north),
+        }
+        angles = [self._angle(stream) for stream in self.named("heading", "cog")]
+        as_it_is = [direction_evidence(*angle, track).agreement for angle in angles]
+        if len(angles) < 2 or any(agreement is None or agreement > DIFFERS for agreement in as_it_is):
+            return None
+        for text, motion in others.items():
+            agreements = [direction_evidence(*angle, motion).agreement for angle in angles]
+            if all(agreement is not None and agreement > AGREES for agreement in agreements):
+                return text, motion
+        return None
+
+    def _two_receivers(self, tracks: list[tuple[LogStream, LogStream, ReferenceMotion]]) -> None:
+        for north, east, _ in tracks[1:]:
+            first, second = tracks[0][:2]
+            step = 2 * usual_step(first.time_s)
+            origin = rounded_origin(_degrees(first), _degrees(second))
+            a, b = local_metres(_degrees(first), _degrees(second), origin)
+            c, d = local_metres(_degrees(north), _degrees(east), origin)
+            dx = interpolated(north.time_s, first.time_s, a, step) - c
+            dy = interpolated(north.time_s, first.time_s, b, step) - d
+            if not np.isfinite(dx).any():
+                continue
+            apart = float(np.nanmedian(np.hypot(dx, dy)))
+            if apart > RECEIVERS_APART_M:
+                text = f"{north.name} is {apart:.3g} m from {first.name} (median): two receivers; {first.name} is used"
+                self.findings.append(LogFinding("fault", text, north.name, {"apart_m": apart}))
+
+    # Heading and course -----------------------------------------------------------------------------------------
+
+    def _angle(self, stream: LogStream) -> tuple[Array, Array]:
+        """Time and angle of a direction, rad, thinned by picking."""
+        stride = max(1, round(_TESTED_STEP_S / usual_step(stream.time_s)))
+        unit = angle_unit(stream.values, stream.unit)
+        return stream.time_s[::stride], stream.values[::stride] * QUANTITIES["heading"].units[unit]
+
+    def headings(self) -> None:
+        for stream in self.named("heading", "cog", "magnetic_heading"):
+            time, angle = self._angle(stream)
+            evidence = direction_evidence(time, angle, self.motion)
+            confidence, why = self.judged(stream, evidence)
+            astray = abs(evidence.offset_rad) > LARGEST_OFFSET_RAD
+            if stream.quantity == "heading" and evidence.agreement is not None and (astray or evidence.sign < 0):
+                confidence = _CONTRADICTED
+                degrees = math.degrees(evidence.offset_rad)
+                why = f"{evidence.text}; mean difference {degrees:.0f} deg"
+            if confidence < DIFFERS:
+                self.fault(stream, why)
+            self.add(stream, confidence, why, unit=angle_unit(stream.values, stream.unit))
+        self._exchanged_directions()
+        self._take_heading()
+
+    def _exchanged_directions(self) -> None:
+        """Refuse a heading and a course where the rate of turn is the derivative of the course alone."""
+        rates, heading, course = self.named("yaw_rate"), self._best("heading"), self._best("cog")
+        if not rates or heading is None or course is None:
+            return
+        agreements = []
+        for channel in (heading, course):
+            time, angle = self._angle(self._stream(channel.stream))
+            motion = replace(self.motion, heading_time_s=time, heading_rad=np.unwrap(angle))
+            agreements.append(rate_evidence(*self.thin(rates[0]), motion).agreement or 0.0)
+        if agreements[1] > _DERIVATIVE and agreements[0] < agreements[1] - (1 - _DERIVATIVE):
+            text = f"{rates[0].name} is the derivative of the course {course.stream}, and not of it: exchanged"
+            self.fault(self._stream(heading.stream), text)
+            self._doubt((heading.stream, course.stream), "heading and course seem exchanged")
+
+    def _doubt(self, streams: Iterable[str], why: str) -> None:
+        """Let no channel of these streams be used."""
+        names = set(streams)
+        for place, channel in enumerate(self.found):
+            if channel.stream in names:
+                self.found[place] = replace(channel, confidence=_CONTRADICTED, why=f"{channel.why}, but {why}")
+
+    def _take_heading(self) -> None:
+        best = self._best("heading") or self._best("magnetic_heading")
+        if best is not None:
+            time, angle = self._angle(self._stream(best.stream))
+            self.motion = replace(self.motion, heading_time_s=time, heading_rad=np.unwrap(angle))
+
+    def _best(self, quantity: str) -> LogChannel | None:
+        good = [channel for channel in self.found if channel.quantity == quantity and channel.confidence >= USED_FROM]
+        order = {stream.name: place for place, stream in enumerate(self.streams)}
+        return max(good, key=lambda c: (c.confidence, self._coverage(c.stream), -order[c.stream]), default=None)
+
+    def _coverage(self, name: str) -> float:
+        """Samples of a stream, to a factor of two: a slower one is not better for a few gaps fewer."""
+        return round(math.log2(max(len(self._stream(name).values), 1)))
+
+    def _stream(self, name: str) -> LogStream:
+        return next(stream for stream in self.streams if stream.name == name)
+
+    # Rates and speeds -------------------------------------------------------------------------------------------
+
+    def rates(self) -> None:
+        for stream in self.named("yaw_rate"):
+            evidence = rate_evidence(*self.thin(stream), self.motion)
+            self._rate(stream, evidence)
+        best = self._best("yaw_rate")
+        if best is not None:
+            time, values = self.thin(self._stream(best.stream))
+            self.rate = time, best.si(values)
+        elif len(self.motion.heading_time_s):
+            self.rate = differenced(self.motion.heading_time_s, self.motion.heading_rad, 2.0)
+
+    def _rate(self, stream: LogStream, evidence: ContentEvidence) -> None:
+        confidence, why = self.judged(stream, evidence)
+        unit = stream.unit or evidence.unit
+        agrees = evidence.agreement is not None and evidence.agreement >= AGREES
+        sign = 1
+        if agrees and evidence.unit and stream.unit and evidence.unit != stream.unit:
+            confidence, why = _CONTRADICTED, f"states {stream.unit}, but its values are in {evidence.unit}"
+        elif agrees and not evidence.unit:
+            confidence, why = min(confidence, 0.6), f"{why}, but with a scale of no unit"
+        if agrees and evidence.sign < 0:
+            if stream.stated_by == "format":
+                confidence, why = _CONTRADICTED, f"{why}: its sign is the other one"
+            else:
+                sign, confidence, why = -1, min(confidence, 0.9), f"{why}: positive to port"
+                self.findings.append(LogFinding("note", f"{stream.name} is positive to port", stream.name))
+        if confidence < DIFFERS:
+            self.fault(stream, why)
+        self.add(stream, confidence, why, unit=unit, sign=sign, quantity="yaw_rate")
+
+    def speeds(self) -> None:
+        for stream in self.named("sog", "u_water", "u_ground"):
+            evidence = speed_evidence(*self.thin(stream), self.motion, stream.quantity)
+            confidence, why = self.judged(stream, evidence, agrees=AGREES - 0.1)
+            unit = stream.unit or evidence.unit
+            known = evidence.agreement is not None and evidence.agreement > DIFFERS
+            if known and evidence.unit and stream.unit and evidence.unit != stream.unit:
+                confidence, why = _CONTRADICTED, f"states {stream.unit}, but its values are in {evidence.unit}"
+            if known and evidence.sign < 0 and stream.quantity != "sog":
+                confidence, why = _CONTRADICTED, f"{why}, and is negative"
+            if confidence < DIFFERS:
+                self.fault(stream, why)
+            self.add(stream, confidence, why, unit=unit)
+        at, north, east = self.motion.time_s, self.motion.v_north_mps, self.motion.v_east_mps
+        heading = self._heading_at(at)
+        lateral = east * np.cos(heading) - north * np.sin(heading)
+        references: Mapping[str, Array] = {"v_north": north, "v_east": east, "v_ground": lateral, "v_water": lateral}
+        for stream in self.named(*references):
+            unit = stream.unit or "m/s"
+            factor = QUANTITIES[stream.quantity].units.get(unit, 1.0)
+            time, values = self.thin(stream)
+            evidence = component_evidence(time, factor * values, references[stream.quantity], self.motion)
+            transverse = stream.quantity in ("v_ground", "v_water")
+            if transverse and evidence.agreement is not None and evidence.agreement < AGREES:
+                evidence = replace(evidence, agreement=None if evidence.agreement < DIFFERS else evidence.agreement)
+            confidence, why = self.judged(stream, evidence, agrees=DIFFERS if transverse else AGREES)
+            sign = 1
+            if evidence.agreement is not None and evidence.agreement >= DIFFERS and evidence.sign < 0:
+                if stream.stated_by == "name":
+                    sign, confidence, why = -1, 0.8, f"{why}: positive to port"
+                else:
+                    confidence, why = _CONTRADICTED, f"{why}: its sign is the other one"
+            if not stream.unit:
+                confidence = min(confidence, 0.6)
+            if confidence < DIFFERS:
+                self.fault(stream, why)
+            self.add(stream, confidence, why, unit=stream.unit, sign=sign)
+
+    def _heading_at(self, at: Array) -> Array:
+        if not len(self.motion.heading_time_s):
+            return np.full(len(at), np.nan)
+        return interpolated(at, self.motion.heading_time_s, self.motion.heading_rad, 10.0)
+
+    # Streams whose names say nothing ----------------------------------------------------------------------------
+
+    def unnamed(self) -> None:
+        """Find rates of turn, headings, courses and speeds among streams without a quantity, by content alone."""
+        nameless = [
+            stream
+            for stream in self.streams
+            if not stream.quantity and len(stream.values) >= FEW_SAMPLES and np.ptp(stream.values) > 0
+        ]
+        if self._best("heading") is None:
+            self._unnamed_directions([stream for stream in nameless if self._circular(stream)])
+        for stream in nameless:
+            if any(channel.stream == stream.name for channel in self.found):
+                continue
+            time, values = self.thin(stream)
+            if self._best("yaw_rate") is None and stream.unit in ("", *QUANTITIES["yaw_rate"].units):
+                evidence = rate_evidence(time, values, self.motion)
+                if evidence.agreement is not None and evidence.agreement > 0.97 and evidence.unit:
+                    unit, text = stream.unit or evidence.unit, f"by content alone: {evidence.text}"
+                    self.add(stream, 0.85, text, quantity="yaw_rate", unit=unit, sign=evidence.sign)
+                    self.rate = time, self.found[-1].si(values)
+                    continue
+            speeds = ("sog", "u_water", "u_ground", "v_north")
+            if any(self._best(name) for name in speeds) or stream.unit not in ("", *QUANTITIES["sog"].units):
+                continue
+            evidence = speed_evidence(time, values, self.motion, "sog")
+            if evidence.agreement is not None and evidence.agreement > 0.9 and evidence.unit and values.min() >= 0:
+                text = f"by content alone: {evidence.text}"
+                self.add(stream, 0.75, text, quantity="sog", unit=stream.unit or evidence.unit)
+        if not len(self.rate[0]) and len(self.motion.heading_time_s):
+            self.rate = differenced(self.motion.heading_time_s, self.motion.heading_rad, 2.0)
+
+    def _unnamed_directions(self, streams: list[LogStream]) -> None:
+        """A course and a heading by content: both follow the track, and the course more closely."""
+        candidates = []
+        for stream in streams:
+            evidence = direction_evidence(*self._angle(stream), self.motion)
+            near = abs(evidence.offset_rad) < LARGEST_OFFSET_RAD
+            if evidence.agreement is not None and evidence.agreement > 0.95 and evidence.sign > 0 and near:
+                candidates.append((evidence.spread_rad, stream, evidence))
+        candidates.sort(key=lambda entry: entry[0])
+        distinct = len(candidates) == 2 and candidates[1][0] > 1.5 * candidates[0][0]
+        for place, (_, stream, evidence) in enumerate(candidates):
+            quantity = "cog" if distinct and place == 0 else "heading"
+            text = f"by content alone: {evidence.text}" + ("" if distinct else "; it may be the course over ground")
+            unit = angle_unit(stream.values, stream.unit)
+            self.add(stream, 0.85 if distinct else 0.7, text, quantity=quantity, unit=unit)
+        self._take_heading()
+
+    @staticmethod
+    def _circular(stream: LogStream) -> bool:
+        most, least = float(stream.values.max()), float(stream.values.min())
+        return stream.unit in ("", "deg", "rad") and (most > 1.0 or least < -1.0) and least >= -181 and most <= 361
+
+    # Rudders and thrusters --------------------------------------------------------------------------------------
+
+    def steering(self) -> None:
+        for stream in self.named("rudder_angle", "rudder_order", "port_rudder_angle"):
+            time, values = self.thin(stream)
+            evidence, _ = steering_evidence(time, values, *self.rate)
+            self._rudder(stream, evidence)
+        self._exchanged_rudders()
+        if not self.named("rudder_angle", "rudder_order") and not self.named("thrust_order_port", "rpm_port"):
+            self._unnamed_rudder()
+        self._rudder_shares()
+
+    def _exchanged_rudders(self) -> None:
+        """Refuse an angle that stays at its values and an order that never does: an order holds until the next."""
+        angle, order = self._best("rudder_angle"), self._best("rudder_order")
+        if angle is None or order is None:
+            return
+        held = [float((np.diff(self._stream(channel.stream).values) == 0).mean()) for channel in (angle, order)]
+        if held[0] > 0.5 and held[1] < 0.2:
+            self.fault(self._stream(angle.stream), f"holds its values as an order does, and {order.stream} does not")
+            self._doubt((angle.stream, order.stream), "order and angle seem exchanged")
+
+    def _rudder(self, stream: LogStream, evidence: ContentEvidence) -> None:
+        if evidence.agreement is not None and evidence.agreement < DIFFERS and np.ptp(stream.values) == 0:
+            evidence = UNTESTED
+        confidence, why = self.judged(stream, evidence, agrees=0.6)
+        unit = stream.unit or rudder_unit(stream.values)
+        stated, sign = sign_of_name(stream.name), 1
+        shown = evidence.agreement is not None and evidence.agreement >= 0.6
+        if stated:
+            sign = stated
+            if shown and evidence.sign != stated:
+                confidence, why = _CONTRADICTED, f"{why}: the turn contradicts the sign in its name"
+        elif shown and evidence.sign < 0:
+            if stream.stated_by == "format":
+                confidence, why = _CONTRADICTED, f"{why}: it is positive to port, against its format"
+            else:
+                sign, confidence, why = -1, 0.9, f"{why}: positive to port"
+                self.findings.append(LogFinding("note", f"{stream.name} is positive to port", stream.name))
+        if confidence < DIFFERS:
+            self.fault(stream, why)
+        self.add(stream, confidence, why, unit=unit, sign=sign)
+
+    def _unnamed_rudder(self) -> None:
+        """The stream without a name that leads the turn as a rudder does; none where no rate of turn is certain."""
+        if all((best := self._best(name)) is None or best.confidence < 0.8 for name in ("yaw_rate", "heading")):
+            return
+        taken = {channel.stream for channel in self.found if channel.confidence >= USED_FROM}
+        candidates = []
+        for stream in self.streams:
+            if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0:
+                continue
+            time, values = self.thin(stream)
+            evidence, lag = steering_evidence(time, values, *self.rate)
+            unit = stream.unit or rudder_unit(stream.values)
+            if evidence.agreement is not None and evidence.agreement > AGREES and lag >= 1.0 and unit:
+                candidates.append((evidence.agreement, stream, evidence, unit))
+        candidates.sort(key=lambda entry: -entry[0])
+        one_rudder = len(candidates) < 3 and all(self._alike(candidates[0][1], entry[1]) for entry in candidates[1:])
+        for _, stream, evidence, unit in candidates:
+            steps = float((np.diff(stream.values) == 0).mean())
+            quantity = "rudder_order" if steps > 0.5 else "rudder_angle"
+            single = one_rudder or (stream is candidates[0][1] and candidates[0][0] > candidates[1][0] + 0.05)
+            text = f"by content alone: {evidence.text}" + ("" if single else f"; {len(candidates)} streams would do")
+            self.add(stream, 0.75 if single else 0.5, text, quantity=quantity, unit=unit, sign=evidence.sign)
+
+    @staticmethod
+    def _alike(first: LogStream, second: LogStream) -> bool:
+        """Whether two streams are the order and the angle of one rudder."""
+        other = np.interp(first.time_s, second.time_s, second.values)
+        return abs(float(np.corrcoef(first.values, other)[0, 1])) > 0.95
+
+    def _rudder_shares(self) -> None:
+        """Orders in shares of the full rudder, scaled by the angle where it is known, else by the usual full rudder."""
+        for place, channel in enumerate(self.found):
+            if channel.quantity not in ("rudder_order", "rudder_angle") or channel.unit not in ("1", "%"):
+                continue
+            share = QUANTITIES["rudder_order"].units[channel.unit]
+            angle = next((c for c in self.found if c.quantity == "rudder_angle" and c.unit in ("deg", "rad")), None)
+            scale, confidence, why = FULL_RUDDER_DEG * share, min(channel.confidence, 0.75), channel.why
+            if angle is not None and angle.confidence >= USED_FROM:
+                ratio = self._ratio(angle, channel)
+                if ratio is not None:
+                    scale, confidence = math.degrees(ratio) * share, channel.confidence
+                    why += f"; full order is {math.degrees(ratio):.3g} deg by {angle.stream}"
+            else:
+                why += f"; full order is taken as {FULL_RUDDER_DEG:g} deg"
+            self.found[place] = replace(channel, unit="deg", scale=scale, confidence=confidence, why=why)
+
+    def _ratio(self, measured: LogChannel, order: LogChannel) -> float | None:
+        """Measured value (SI) over ordered share, where the order is held and not small; None where it never is."""
+        given, shown = self._stream(order.stream), self._stream(measured.stream)
+        share = order.si(given.values)
+        value = interpolated(given.time_s, shown.time_s, measured.si(shown.values), 10.0)
+        good = np.isfinite(value) & (np.abs(share) > 0.3)
+        if good.sum() < FEW_SAMPLES:
+            return None
+        ratio = value[good] / share[good]
+        middle = float(np.median(ratio))
+        return middle if np.median(np.abs(ratio - middle)) < 0.1 * abs(middle) and middle > 0 else None
+
+    def thrusters(self) -> None:
+        pairs = (("thrust_order_port", "thrust_order_starboard"), ("rpm_port", "rpm_starboard"))
+        for port_name, starboard_name in pairs:
+            ports, starboards = self.named(port_name), self.named(starboard_name)
+            for port, starboard in zip(ports, starboards, strict=False):
+                time, values = self.thin(port)
+                other = np.interp(time, *self.thin(starboard))
+                evidence, _ = steering_evidence(time, values - other, *self.rate)
+                swap = evidence.agreement is not None and evidence.agreement > 0.6 and evidence.sign < 0
+                for stream, name in ((port, port_name), (starboard, starboard_name)):
+                    confidence, why = self.judged(stream, evidence, agrees=0.6)
+                    quantity = name
+                    if swap and stream.stated_by == "":
+                        quantity = starboard_name if name == port_name else port_name
+                        confidence, why = 0.9, f"{evidence.text} with the sides exchanged"
+                    elif swap:
+                        confidence, why = _CONTRADICTED, f"{why}: the turn contradicts its side"
+                        self.fault(stream, why)
+                    self.add(stream, confidence, why, quantity=quantity, unit=_share_unit(stream, quantity))
+            for stream in ports[len(starboards) :] + starboards[len(ports) :]:
+                self.add(stream, 0.6, "the other side is missing", unit=_share_unit(stream, stream.quantity))
+
+    def others(self) -> None:
+        done = {channel.stream for channel in self.found}
+        for stream in self.streams:
+            if stream.name in done or not stream.quantity:
+                continue
+            unit = stream.unit
+            if stream.quantity in ("rpm", "rpm_order") and unit not in QUANTITIES[stream.quantity].units:
+                unit = _share_unit(stream, stream.quantity)
+            if stream.quantity in ("wind_rel_direction", "wind_direction", "wind_theoretical_direction") and not unit:
+                unit = angle_unit(stream.values, "")
+            confidence, why = self.judged(stream, UNTESTED)
+            self.add(stream, confidence, why, unit=unit)
+        self._engine_shares()
+
+    def _engine_shares(self) -> None:
+        for place, channel in enumerate(self.found):
+            if channel.quantity != "rpm_order" or channel.unit not in ("1", "%"):
+                continue
+            measured = next((c for c in self.found if c.quantity == "rpm" and c.unit), None)
+            ratio = None if measured is None else self._ratio(measured, channel)
+            if ratio is None:
+                why = f"{channel.why}; the revolutions at full order are not known"
+                self.found[place] = replace(channel, confidence=min(channel.confidence, 0.6), why=why)
+                continue
+            share = QUANTITIES["rpm_order"].units[channel.unit]
+            rpm = ratio * 60 / (2 * math.pi)
+            why = f"{channel.why}; full order is {rpm:.4g} rpm by the measured revolutions"
+            confidence = max(channel.confidence, 0.9)
+            self.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
+
+    # The result -------------------------------------------------------------------------------------------------
+
+    def result(self) -> ChannelSet:
+        used = {best.stream + best.quantity for name in QUANTITIES if (best := self._best(name)) is not None}
+        channels = []
+        for channel in self.found:
+            use = channel.stream + channel.quantity in used
+            if use:
+                used.discard(channel.stream + channel.quantity)
+            channels.append(replace(channel, use=use))
+        order = {name: place for place, name in enumerate(QUANTITIES)}
+        channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
+        return ChannelSet(tuple(channels), tuple(self.findings))
+
+
+def _degrees(stream: LogStream) -> Array:
+    """Latitude or longitude (n,) in degrees."""
+    return np.asarray(stream.values * QUANTITIES["latitude"].units.get(stream.unit or "deg", 1.0))
+
+
+def _share_unit(stream: LogStream, quantity: str) -> str:
+    """Unit of an order or of revolutions by size, where nothing states it."""
+    units = QUANTITIES[quantity].units
+    if stream.unit in units:
+        return stream.unit
+    most = float(np.nanpercentile(np.abs(stream.values), 99.9))
+    if "1" in units and most <= 1.05:
+        return "1"
+    if "%" in units and most <= 105:
+        return "%"
+    if "rpm" in units and most > 30:  # slower shafts turn at 60 rpm and more at full ahead; above 30 per second none do
+        return "rpm"
+    return ""

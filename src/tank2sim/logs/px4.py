@@ -1,0 +1,125 @@
+"""PX4: ULog files (``.ulg``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, optional_library
+
+_FIELDS: dict[str, dict[str, tuple[str, str]]] = {
+    "sensor_gps": {
+        "latitude_deg": ("deg", "latitude"),
+        "longitude_deg": ("deg", "longitude"),
+        "lat": ("1e-7 deg", "latitude"),
+        "lon": ("1e-7 deg", "longitude"),
+        "vel_m_s": ("m/s", "sog"),
+        "cog_rad": ("rad", "cog"),
+        "vel_n_m_s": ("m/s", "v_north"),
+        "vel_e_m_s": ("m/s", "v_east"),
+    },
+    "vehicle_local_position": {
+        "x": ("m", "x"),
+        "y": ("m", "y"),
+        "vx": ("m/s", "v_north"),
+        "vy": ("m/s", "v_east"),
+    },
+    "vehicle_angular_velocity": {"xyz[2]": ("rad/s", "yaw_rate")},
+    "vehicle_acceleration": {"xyz[0]": ("m/s2", "a_x"), "xyz[1]": ("m/s2", "a_y")},
+    "rpm": {"rpm_estimate": ("rpm", "rpm"), "indicated_frequency_rpm": ("rpm", "rpm")},
+}
+"""Fields of uORB messages (docs.px4.io, "uORB Message Reference"); frames north, east, down and ahead, starboard,
+down."""
+_FIELDS["vehicle_gps_position"] = _FIELDS["sensor_gps"]
+
+_AIRFRAME_ROVER_DIFFERENTIAL = 6
+"""CA_AIRFRAME of two motors that steer by their difference (docs.px4.io, parameter reference)."""
+
+
+def read_px4_ulog(path: Path) -> VesselLog:
+    """Read a ULog. Times are those of the board, set to UTC by the GPS with the least delay.
+
+    ``actuator_motors`` and ``actuator_servos`` are orders as shares of their range: the one servo is the rudder, one
+    motor the propeller, two motors the right and the left one where CA_AIRFRAME says that the difference of two motors
+    steers, as PX4 numbers them. Which is which is confirmed by what the vessel does.
+
+    Raises
+    ------
+    InputError
+        The file is not a ULog, or holds no UTC of a GPS.
+    """
+    library = optional_library("pyulog", path)
+    try:
+        log = library.ULog(str(path))
+    except Exception as error:  # the library lets errors of struct, and TypeError, through
+        problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
+        raise InputError(path, "", problem, "give a whole ULog") from None
+    topics = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
+    gps = next((data for (name, _), data in topics.items() if name in ("sensor_gps", "vehicle_gps_position")), None)
+    if gps is None or not (gps.get("time_utc_usec", np.zeros(1)) > 0).any():
+        raise InputError(path, "", "holds no UTC of a GPS", "log sensor_gps")
+    boot, findings = _boot(gps)
+    airframe = int(log.initial_parameters.get("CA_AIRFRAME", -1))
+    streams = list(_streams(topics, boot, airframe))
+    if not streams:
+        raise InputError(path, "", "no topic of it is understood", "log sensor_gps, vehicle_attitude, actuator_*")
+    counts = {"messages": sum(len(data["timestamp"]) for data in topics.values()), "dropouts": len(log.dropouts)}
+    if log.file_corruption:
+        findings.append(LogFinding("fault", "parts of the file are corrupted and left out"))
+    if lost := sum(dropout.duration for dropout in log.dropouts):
+        findings.append(LogFinding("note", f"{len(log.dropouts)} dropouts of the logger, {lost / 1000:.3g} s in all"))
+    return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings))
+
+
+def _boot(gps: dict[str, Any]) -> tuple[float, list[LogFinding]]:
+    """Time of the board at UTC 0, s, and what is wrong with the receiver's clock."""
+    known = gps["time_utc_usec"] > 0
+    lag = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6
+    if np.ptp(lag) > 1.0:
+        text = f"the receiver's clock leaps by {np.ptp(lag):.3g} s against that of the board, which is taken"
+        return float(np.median(lag)), [LogFinding("fault", text, "sensor_gps")]
+    return float(lag.min()), []
+
+
+def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airframe: int) -> Iterator[LogStream]:
+    for (name, instance), data in topics.items():
+        time = data["timestamp"] * 1e-6 - boot
+        label = name if instance == 0 and (name, 1) not in topics else f"{name}[{instance}]"
+        if name in ("sensor_gps", "vehicle_gps_position") and (data["time_utc_usec"] > 0).all():
+            utc = data["time_utc_usec"] * 1e-6
+            time = utc if np.ptp(data["timestamp"] * 1e-6 - utc) <= 1.0 else time
+        for field, (unit, quantity) in _FIELDS.get(name, {}).items():
+            if field in data:
+                values = data[field].astype(float)
+                if "fix_type" in data:
+                    values = np.where(data["fix_type"] >= 2, values, np.nan)
+                meaning = (quantity, "format")
+                if name == "rpm" and ("rpm", 1) in topics:  # a guess, which the turn confirms or not
+                    meaning = (("rpm_port", "rpm_starboard")[min(instance, 1)], "")
+                yield LogStream(f"{label}.{field}", time, values, unit, *meaning)
+        if name == "vehicle_attitude":
+            roll, _, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
+            yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
+            yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
+        if name in ("actuator_motors", "actuator_servos"):
+            yield from _orders(name, time, data, airframe)
+
+
+def _orders(name: str, time: Array, data: dict[str, Any], airframe: int) -> Iterator[LogStream]:
+    controls = {key: data[key].astype(float) for key in sorted(data) if key.startswith("control[")}
+    controls = {key: values for key, values in controls.items() if np.isfinite(values).any()}
+    quantities: tuple[str, ...] = ()
+    if name == "actuator_servos":
+        quantities = ("rudder_order",)
+    elif len(controls) == 1 or airframe != _AIRFRAME_ROVER_DIFFERENTIAL:
+        quantities = ("rpm_order",)
+    elif len(controls) == 2:
+        quantities = ("thrust_order_starboard", "thrust_order_port")
+    for place, (key, values) in enumerate(controls.items()):
+        quantity = quantities[place] if place < len(quantities) else ""
+        yield LogStream(f"{name}.{key}", time, values, "1", quantity, "name" if name == "actuator_servos" else "")

@@ -1,0 +1,303 @@
+"""Logs in any CSV: commas, semicolons or tabs; decimal commas; a row of units; dates, local times, epochs."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, split_unit, unit_of_text
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_ZONES_H = {"utc": 0, "gmt": 0, "z": 0, "mez": 1, "cet": 1, "mesz": 2, "cest": 2, "wet": 0, "west": 1, "bst": 1}
+_ZONES_H |= {"eet": 2, "eest": 3, "msk": 3, "sgt": 8, "hkt": 8, "jst": 9, "kst": 9, "aest": 10, "nzst": 12}
+_ZONES_H |= {"est": -5, "edt": -4, "cst": -6, "cdt": -5, "mst": -7, "mdt": -6, "pst": -8, "pdt": -7}
+"""Hours of time zones before UTC, by the abbreviations that names of columns use (IANA time zone database)."""
+
+_TIME_WORDS = re.compile(r"\b(time|times|timestamp|zeit|uhrzeit|utc|datetime|epoch|stamp|heure|hora|t|secs|seconds)\b")
+_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha)\b")
+_EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
+"""Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
+
+_HEAD_LINES = 50
+"""Lines by which separator, decimal sign and units are judged. Project choice: enough to meet values with decimals."""
+
+_DEGREES_MINUTES = re.compile(
+    r"^\s*(?P<front>[NSEW])?\s*(?P<degrees>[+-]?\d{1,3})\s*[°\s]\s*(?P<minutes>\d+(?:[.,]\d+)?)\s*['′]?"
+    r"(?:\s*(?P<seconds>\d+(?:[.,]\d+)?)\s*[\"″])?\s*(?P<back>[NSEW])?\s*$"
+)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """How a table is written."""
+
+    encoding: str
+    separator: str
+    comma: bool
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    skip: int
+
+
+def read_table_log(path: Path) -> VesselLog:
+    """Read a log that is a table of text, one row a sample.
+
+    Separator, decimal sign, encoding (UTF-8 or Windows-1252) and a row of units under the names are found from the
+    first lines; the time is a column of ISO 8601, of date and time of day, or of seconds (ms, us, ns) since 1970, in
+    UTC unless the name of the column has a zone (``MEZ``, ``UTC+2``). Seconds that count from the beginning are taken
+    too; the log then has no date. Columns without names are ``column 1`` and so on. Rows that cannot be read are
+    counted and left out.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or has no rows or no time.
+    """
+    import pandas as pd
+
+    layout = _layout(path)
+    try:
+        frame = pd.read_csv(
+            path,
+            sep=layout.separator,
+            names=list(layout.names),
+            index_col=False,
+            skiprows=layout.skip,
+            comment="#",
+            decimal="," if layout.comma else ".",
+            encoding=layout.encoding,
+            encoding_errors="replace",
+            on_bad_lines="skip",
+            low_memory=False,
+        )
+    except (ValueError, csv.Error) as error:
+        raise InputError(path, "", f"is not a table ({' '.join(str(error).split())})", "give a CSV") from None
+    rows = len(frame)
+    frame = frame.drop_duplicates(ignore_index=True)
+    with path.open("rb") as file:
+        lines = sum(1 for line in file if line.strip() and not line.startswith(b"#"))
+    skipped = max(0, lines - rows - (2 if any(layout.units) else 1))
+    findings = [LogFinding("note", f"{skipped} rows have too many cells and are left out")] if skipped else []
+    time, dated, used = _time(path, frame, findings)
+    streams = [
+        _stream(name, unit, time, values)
+        for name, unit in zip(layout.names, layout.units, strict=True)
+        if name not in used and (values := _numbers(frame[name], layout.comma)) is not None
+    ]
+    if not streams:
+        raise InputError(path, "", "has no column of numbers next to its time", "give a table of measured values")
+    counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
+    counts["without_time"] = int(np.isnan(time).sum())
+    return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
+
+
+def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
+    """A column with the quantity that its name suggests, unless its unit is of another kind."""
+    unit = unit or split_unit(name)[1]
+    quantity = quantity_of_name(name)
+    if quantity and unit and unit not in QUANTITIES[quantity].units:
+        quantity = ""
+    return LogStream(name, time, values, unit, quantity, "name" if quantity else "")
+
+
+def _layout(path: Path) -> _Layout:
+    try:
+        with path.open("rb") as file:
+            head = file.read(1 << 16)
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+    encoding = "utf-8-sig"
+    try:
+        text = head.decode(encoding)
+    except UnicodeDecodeError as error:
+        if error.start > len(head) - 4:
+            text = head[: error.start].decode(encoding)
+        else:
+            encoding, text = "cp1252", head.decode("cp1252", errors="replace")
+    all_lines = text.splitlines()
+    numbered = [(number, line) for number, line in enumerate(all_lines) if line.strip() and not line.startswith("#")]
+    if len(numbered) < 2:
+        raise InputError(path, "", "has no rows", "give a table with a line of names and rows of values")
+    lines = [line for _, line in numbered[:_HEAD_LINES]]
+    separator = max(";\t|,", key=lambda sign: min(line.count(sign) for line in lines[:4]))
+    names = [name.strip() or f"column {place}" for place, name in enumerate(_cells(lines[0], separator), start=1)]
+    header = sum(_is_number(name) for name in names) <= len(names) / 2
+    if not header:
+        names = [f"column {place}" for place in range(1, len(names) + 1)]
+        lines = [lines[0], *lines]
+    names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
+    second = _cells(lines[1], separator)
+    has_units = (
+        header
+        and len(lines) > 2
+        and not any(re.search(r"\d{2}|^-?\d", cell.strip()) and cell not in _UNIT_NUMBERS for cell in second)
+    )
+    units = [unit_of_text(cell) for cell in second] if has_units else []
+    units = [*units, *[""] * len(names)][: len(names)]
+    body = lines[2 if has_units else 1 :]
+    comma = separator != "," and any(re.search(rf"(?:^|{re.escape(separator)})\s*-?\d+,\d+", line) for line in body)
+    skip = numbered[1 if has_units else 0][0] + 1 if header else 0
+    return _Layout(encoding, separator, comma, tuple(names), tuple(units), skip)
+
+
+_UNIT_NUMBERS = ("1/min", "1/s")
+"""Units that begin with a digit."""
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return next(csv.reader([line], delimiter=separator), [])
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[Array, bool, set[str]]:
+    """Times (rows,), whether they are UTC, and the columns that they are made of."""
+    import pandas as pd
+
+    named = [name for name in frame.columns if _TIME_WORDS.search(_plain(name))]
+    dates = [name for name in frame.columns if _DATE_WORDS.search(_plain(name)) and name not in named]
+    for name in [*named, *dates, *frame.columns[:1]]:
+        column = frame[name]
+        if pd.api.types.is_numeric_dtype(column):
+            values = column.to_numpy(dtype=float)
+            size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
+            for least, largest, factor in _EPOCHS:
+                if least <= size <= largest:
+                    return values * factor, True, {name, *dates}
+            continue
+        first = next((str(value) for value in column.dropna()[:1]), "")
+        offset = _zone_s(name, findings)
+        if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
+            return (
+                _seconds(pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce"), offset),
+                True,
+                {name, *dates},
+            )
+        if re.match(r"\d{1,4}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d", first):
+            return _seconds(_dates(path, name, column), offset), True, {name}
+        if dates and re.match(r"\d{1,2}:\d\d", first):
+            days = _seconds(_dates(path, dates[0], frame[dates[0]]), offset)
+            clock = pd.to_timedelta(_clock_text(column), errors="coerce").dt.total_seconds().to_numpy(dtype=float)
+            return days + clock, True, {name, dates[0]}
+    for name in named or list(frame.columns[:1]):
+        if pd.api.types.is_numeric_dtype(frame[name]):
+            values = frame[name].to_numpy(dtype=float)
+            steps = np.diff(values[np.isfinite(values)])
+            if len(steps) and (steps >= 0).mean() > 0.9:
+                text = f"{name} counts from the beginning of the log: the trials have no date"
+                findings.append(LogFinding("note", text, name))
+                return values * _relative_scale(name, values), False, {name}
+    remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
+    raise InputError(path, "header", "there is no column of time", remedy)
+
+
+def _relative_scale(name: str, values: Array) -> float:
+    words = _plain(name)
+    for pattern, factor in (
+        (r"\b(ms|msec|milli\w*)\b", 1e-3),
+        (r"\b(us|usec|micro\w*)\b", 1e-6),
+        (r"\b(ns|nano\w*)\b", 1e-9),
+    ):
+        if re.search(pattern, words):
+            return factor
+    return 1.0
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()).strip()
+
+
+def _clock_text(column: pd.Series[Any]) -> pd.Series[Any]:
+    text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
+    return text.where(text.str.count(":") > 1, text + ":00")
+
+
+def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
+    """Dates with numbers for months; points and a year at the end put the day first, as ISO 8601 the year."""
+    import pandas as pd
+
+    text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
+    parts = text.str.extract(r"^(\d{1,4})[./-](\d{1,2})[./-](\d{2,4})[T ,]*(.*)$")
+    first, second = (pd.to_numeric(parts[place], errors="coerce") for place in (0, 1))
+    sign = next((match[1] for value in text[:1] if (match := re.match(r"\d+([./-])", value))), ".")
+    if (first > 31).any():
+        order = [0, 1, 2]
+    elif sign == "." or (first > 12).any():
+        order = [2, 1, 0]
+    elif (second > 12).any():
+        order = [2, 0, 1]
+    else:
+        example = text.iloc[0]
+        raise InputError(
+            path, f"column {name}", f"{example!r} may be day/month or month/day", "write dates as ISO 8601"
+        )
+    year = parts[order[0]].where(parts[order[0]].str.len() == 4, "20" + parts[order[0]])
+    joined = year + "-" + parts[order[1]].str.zfill(2) + "-" + parts[order[2]].str.zfill(2)
+    clock = parts[3].fillna("")
+    joined = joined.where(clock == "", joined + "T" + clock)
+    return pd.to_datetime(joined, format="ISO8601", utc=True, errors="coerce")
+
+
+def _seconds(moments: pd.Series[Any], offset_s: float) -> Array:
+    import pandas as pd
+
+    values = (moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
+    return np.asarray(values.to_numpy(dtype=float) - offset_s)
+
+
+def _zone_s(name: str, findings: list[LogFinding]) -> float:
+    """Seconds that the clock of a column is before UTC, by its name."""
+    if match := re.search(r"(?:utc|gmt)\s*([+-]\d{1,2})(?::?(\d\d))?", name, re.IGNORECASE):
+        hours = int(match[1]) + (int(match[2] or 0) / 60) * (-1 if match[1][0] == "-" else 1)
+        return 3600.0 * hours
+    for word in _plain(name).split():
+        if word in _ZONES_H:
+            return 3600.0 * _ZONES_H[word]
+    if re.search(r"\b(local|lt|ortszeit|bordzeit)\b", _plain(name)):
+        text = f"{name} is a local time of unknown zone, and is taken as UTC"
+        findings.append(LogFinding("fault", text, name))
+    return 0.0
+
+
+def _numbers(column: pd.Series[Any], comma: bool) -> Array | None:
+    """Values (rows,) of a column, nan where it has none; None of a column of words."""
+    import pandas as pd
+
+    if pd.api.types.is_numeric_dtype(column):
+        values = column.to_numpy(dtype=float)
+    else:
+        text = column.astype(str).str.strip()
+        values = pd.to_numeric(text.str.replace(",", ".", regex=False) if comma else text, errors="coerce").to_numpy(
+            float
+        )
+        if np.isfinite(values).sum() < 0.5 * len(values):
+            values = np.array([_angle(cell) for cell in text])
+    return values if np.isfinite(values).any() else None
+
+
+def _angle(text: str) -> float:
+    """Degrees of an angle in degrees and minutes, with the letter of its hemisphere; nan if it is none."""
+    match = _DEGREES_MINUTES.match(text)
+    if match is None:
+        return float("nan")
+    parts = [float(match[name].replace(",", ".")) if match[name] else 0.0 for name in ("minutes", "seconds")]
+    degrees = float(match["degrees"])
+    size = abs(degrees) + parts[0] / 60 + parts[1] / 3600
+    south = (match["front"] or match["back"] or "") in ("S", "W")
+    return -size if south or match["degrees"].startswith("-") else size

@@ -1,0 +1,281 @@
+"""A voyage: the channels of its logs in SI on one clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.logs.channel_search import find_channels
+from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
+from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
+from tank2sim.logs.content import AGREES
+from tank2sim.logs.quantities import QUANTITIES
+from tank2sim.logs.reference import HEADING_WINDOW_S, differenced, local_metres, rounded_origin
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
+from tank2sim.marks import UNCONFIRMED
+from tank2sim.records.signals.sampling import GAP_STEPS
+
+_GAP_LEAST_S = 3.0
+"""Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds."""
+
+_GAPS_LISTED = 5
+"""Gaps of a channel that are listed one by one. Project choice: more are a rate of loss."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuantitySeries:
+    """A quantity over time: `time_s` (n,), UTC s or from the beginning of the log, rising; `values` (n,), SI."""
+
+    time_s: Array
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Voyage:
+    """What a vessel recorded, in SI.
+
+    Parameters
+    ----------
+    logs : tuple of VesselLog
+    channels : ChannelSet
+    series : mapping
+        Quantity to its values; ``x`` and ``y`` are m to north and east of the origin, the heading is continuous.
+    origin_deg : tuple or None
+        Latitude and longitude of x = y = 0.
+    begin_s, end_s : float
+        Of the voyage, in the time of the series.
+    findings : tuple of LogFinding
+    counts : mapping
+        Log to what was read and lost.
+    """
+
+    logs: tuple[VesselLog, ...]
+    channels: ChannelSet
+    series: Mapping[str, QuantitySeries]
+    origin_deg: tuple[float, float] | None
+    begin_s: float
+    end_s: float
+    findings: tuple[LogFinding, ...]
+    counts: Mapping[str, Mapping[str, int]]
+
+    @property
+    def dated(self) -> bool:
+        """Whether times are UTC."""
+        return all(log.dated for log in self.logs)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What the reader must know, faults first and marked."""
+        faults = [f"{UNCONFIRMED}: {finding.text}" for finding in self.findings if finding.kind == "fault"]
+        return (*faults, *(finding.text for finding in self.findings if finding.kind != "fault"))
+
+
+def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -> Voyage:
+    """Join logs: find or take their channels, convert them to SI, and bring positions to local metres.
+
+    Raises
+    ------
+    InputError
+        A channel names a stream that no log has, or nothing in the logs is understood.
+    """
+    findings = [finding for log in logs for finding in log.findings]
+    counts: dict[str, dict[str, int]] = {log.path.name: dict(log.counts) for log in logs}
+    streams: list[LogStream] = []
+    for log in logs:
+        repeated = 0
+        for stream in log.streams:
+            tidy, doubled, found_in_time = tidied(stream)
+            repeated += doubled
+            findings += found_in_time
+            if len(tidy.values):
+                name = stream.name if len(logs) == 1 else f"{log.path.stem}: {stream.name}"
+                streams.append(replace(tidy, name=name))
+        counts[log.path.name]["repeated_samples"] = repeated
+    findings = _gathered(findings)
+    if len({log.dated for log in logs}) > 1:
+        odd = next(log for log in logs if not log.dated)
+        raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
+    found = channels or find_channels(streams)
+    findings += found.findings
+    if len(logs) > 1 and channels is None:
+        findings += _clock_findings([log.path.stem for log in logs], found, streams)
+    named = {stream.name: stream for stream in streams}
+    series: dict[str, QuantitySeries] = {}
+    for channel in found.channels:
+        if channel.use and channel.quantity != "ignore":
+            if channel.stream not in named:
+                raise InputError(
+                    logs[0].path, f"channel {channel.quantity}", f"no stream is called {channel.stream}", _remedy(named)
+                )
+            stream = named[channel.stream]
+            series[channel.quantity] = QuantitySeries(stream.time_s - channel.delay_s, channel.si(stream.values))
+    if not series:
+        problem = "no channel of it is understood"
+        raise InputError(logs[0].path, "", problem, "name its streams in a channels file (--channels)")
+    findings += _to_confirm(found)
+    series, origin = _derived(series)
+    findings += _gap_findings(series)
+    begin = min(float(entry.time_s[0]) for entry in series.values())
+    end = max(float(entry.time_s[-1]) for entry in series.values())
+    return Voyage(tuple(logs), found, series, origin, begin, end, tuple(findings), counts)
+
+
+def _gathered(findings: list[LogFinding]) -> list[LogFinding]:
+    """Findings that differ by the name of their stream alone as one."""
+    groups: dict[str, list[LogFinding]] = {}
+    for finding in findings:
+        key = finding.text.removeprefix(f"{finding.stream}: ") if finding.stream else finding.text
+        groups.setdefault(key, []).append(finding)
+    return [
+        group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
+        for key, group in groups.items()
+    ]
+
+
+_CLOCKS_AGREE_S = 0.5
+"""Difference of the clocks of two logs that is reported, s. Project choice: a ship turns by a degree at most."""
+
+_LARGEST_SHIFT_S = 120.0
+"""Largest difference that is looked for, s. Project choice: clocks that nobody set are off by years, and then the logs
+do not overlap."""
+
+
+def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream]) -> list[LogFinding]:
+    """Differences of the clocks of several logs, by rates of turn or headings that two of them hold."""
+    named = {stream.name: stream for stream in streams}
+    rates: dict[str, tuple[Array, Array]] = {}
+    for quantity in ("yaw_rate", "heading"):
+        for channel in found.channels:
+            name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
+            if channel.quantity == quantity and channel.confidence >= SURE_FROM and name not in rates:
+                stream = named[channel.stream]
+                values = channel.si(stream.values)
+                rate = (stream.time_s, values) if quantity == "yaw_rate" else None
+                rates[name] = rate or differenced(stream.time_s, np.unwrap(values), HEADING_WINDOW_S)
+    findings = []
+    for name in names[1:]:
+        if names[0] in rates and name in rates:
+            shift = _shift(rates[names[0]], rates[name])
+            if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
+                side = "ahead of" if shift > 0 else "behind"
+                text = f"the clock of {name} is {abs(shift):.3g} s {side} that of {names[0]} by the rate of turn: give "
+                text += f"its channels delay_s = {shift:.3g}"
+                findings.append(LogFinding("fault", text, evidence={"shift_s": shift}))
+    return findings
+
+
+def _shift(first: tuple[Array, Array], second: tuple[Array, Array]) -> float | None:
+    """By how much the second of two rates of turn is late, s, where they correlate well; else None."""
+    step = 0.25
+    begin, end = max(first[0][0], second[0][0]), min(first[0][-1], second[0][-1])
+    if end - begin < 4 * _LARGEST_SHIFT_S:
+        return None
+    grid = np.arange(begin + _LARGEST_SHIFT_S, end - _LARGEST_SHIFT_S, step)
+    reference = np.interp(grid, *first)
+    lags = np.arange(-_LARGEST_SHIFT_S, _LARGEST_SHIFT_S + step, step)
+    if np.ptp(reference) == 0 or np.ptp(second[1]) == 0:
+        return None
+    correlations = [float(np.corrcoef(reference, np.interp(grid + lag, *second))[0, 1]) for lag in lags]
+    best = int(np.nanargmax(correlations))
+    return float(lags[best]) if correlations[best] > AGREES else None
+
+
+def _remedy(named: Mapping[str, LogStream]) -> str:
+    shown = ", ".join(list(named)[:12])
+    return f"streams are {shown}{', ...' if len(named) > 12 else ''}; correct the channels file, or delete it"
+
+
+def _to_confirm(found: ChannelSet) -> list[LogFinding]:
+    """Findings of channels in use that are not sure, and of quantities whose only streams are not used."""
+    findings, others = [], []
+    for channel in found.channels:
+        if channel.use and channel.confidence < SURE_FROM:
+            words = QUANTITIES[channel.quantity].words
+            if channel.confidence < 0.8 and channel.quantity in _ESSENTIAL:
+                text = f"{words} is taken from {channel.stream} ({channel.why}): to be confirmed"
+                findings.append(LogFinding("fault", text, channel.stream))
+            else:
+                others.append(f"{words} ({channel.stream})")
+    if others:
+        findings.append(LogFinding("note", f"to be confirmed in channels.toml: {', '.join(others)}"))
+    for quantity in _ESSENTIAL:
+        candidates = [channel for channel in found.channels if channel.quantity == quantity]
+        if candidates and not any(channel.use for channel in candidates) and candidates[0].confidence >= 0.5:
+            text = f"{QUANTITIES[quantity].words} may be {candidates[0].stream} ({candidates[0].why}), and is not used"
+            findings.append(LogFinding("fault", text, candidates[0].stream))
+    return findings
+
+
+_ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
+"""Quantities without which no manoeuvre is understood."""
+
+
+def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySeries], tuple[float, float] | None]:
+    """Local metres, continuous headings, and speed and course of velocities to north and east."""
+    origin = None
+    out = dict(series)
+    if "latitude" in out and "longitude" in out:
+        latitude, longitude = out.pop("latitude"), out.pop("longitude")
+        at = latitude.time_s
+        origin = rounded_origin(latitude.values, longitude.values)
+        x, y = local_metres(latitude.values, np.interp(at, longitude.time_s, longitude.values), origin)
+        out["x"], out["y"] = QuantitySeries(at, x), QuantitySeries(at, y)
+    if ("x" in out) != ("y" in out):
+        out.pop("x", None)
+        out.pop("y", None)
+    if "v_north" in out and "v_east" in out:
+        north, east = out["v_north"], out["v_east"]
+        at_east = np.interp(north.time_s, east.time_s, east.values)
+        if "sog" not in out:
+            out["sog"] = QuantitySeries(north.time_s, np.hypot(north.values, at_east))
+        if "cog" not in out:
+            out["cog"] = QuantitySeries(north.time_s, np.arctan2(at_east, north.values) % (2 * math.pi))
+    for name in ("heading", "magnetic_heading"):
+        if name in out:
+            out[name] = QuantitySeries(out[name].time_s, np.unwrap(out[name].values))
+    return out, origin
+
+
+def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
+    """A note of the gaps of each set of channels that share them."""
+    groups: dict[tuple[str, ...], list[tuple[str, list[tuple[float, float]]]]] = {}
+    for name, entry in series.items():
+        if name == "y" or len(entry.time_s) < 3:
+            continue
+        gaps = gaps_of(entry.time_s, max(_GAP_LEAST_S, GAP_STEPS * usual_step(entry.time_s)))
+        if gaps:
+            words = "position" if name == "x" else QUANTITIES[name].words
+            groups.setdefault(tuple(utc_text(begin)[:19] for begin, _ in gaps), []).append((words, gaps))
+    findings = []
+    for members in groups.values():
+        gaps = members[0][1]
+        shown = ", ".join(f"{end - begin:.3g} s from {utc_text(begin)[11:19]}" for begin, end in gaps[:_GAPS_LISTED])
+        more = f" and {len(gaps) - _GAPS_LISTED} more" if len(gaps) > _GAPS_LISTED else ""
+        text = f"nothing for {shown}{more}: {'; '.join(words for words, _ in members)}"
+        findings.append(LogFinding("note", text, evidence={"total_s": sum(end - begin for begin, end in gaps)}))
+    return findings
+
+
+def channel_rows(voyage: Voyage) -> list[list[object]]:
+    """Rows of a table of the channels: quantity, stream, unit, sign, confidence, use, why."""
+    return [
+        [
+            channel.quantity,
+            channel.stream,
+            _unit_text(channel),
+            channel.sign,
+            channel.confidence,
+            channel.use,
+            channel.why,
+        ]
+        for channel in voyage.channels.channels
+    ]
+
+
+def _unit_text(channel: LogChannel) -> str:
+    return channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}"

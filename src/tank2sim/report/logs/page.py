@@ -1,0 +1,154 @@
+"""The page of a vessel's log: the map, the time line with its stretches, the channels, and what was found."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.report.kit.chart_parts import vector
+from tank2sim.report.kit.charts import History, Signal, TimeMark, TrackData, history_chart, track_chart
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.page import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Page,
+    PageSection,
+    PageTable,
+    Verdict,
+    notices_section,
+)
+
+_SIGNALS = (
+    Signal(name="rudder_order", title="rudder order", unit="rad"),
+    Signal(name="rudder_angle", title="rudder angle", unit="rad"),
+    Signal(name="thrust_order_port", title="port thruster", unit="1"),
+    Signal(name="thrust_order_starboard", title="starboard thruster", unit="1"),
+    Signal(name="rpm_order", title="ordered revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="rpm", title="revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="rpm_port", title="port revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="rpm_starboard", title="starboard revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="heading", title="heading", unit="rad"),
+    Signal(name="yaw_rate", title="yaw rate", unit="rad/s"),
+    Signal(name="sog", title="speed over ground", unit="m/s"),
+    Signal(name="u_water", title="speed ahead through the water", unit="m/s"),
+    Signal(name="v_water", title="speed to starboard through the water", unit="m/s"),
+)
+_MOST_TRACKS = 8
+"""Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished."""
+
+
+def log_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim log``."""
+    stretches, channels = found["stretches"], found["channels"]
+    exciting = [stretch for stretch in stretches if stretch["excites"]]
+    files = [stretch for stretch in stretches if stretch["file"]]
+    faults = sum(finding["kind"] == "fault" for finding in found["findings"])
+    figures = [
+        KeyFigure(label="Duration", value=found["duration_s"], unit="s"),
+        KeyFigure(label="Channels in use", value=sum(channel["use"] for channel in channels)),
+        KeyFigure(label="Stretches that excite", value=len(exciting), note=f"of {len(stretches)}"),
+        KeyFigure(label="Trials", value=len(files)),
+        KeyFigure(label="Faults", value=faults, verdict=Verdict.CAUTION if faults else Verdict.PASSED),
+    ]
+    sections = [*notices_section(found["notices"]), *_map(found), *_time_line(found)]
+    sections.append(PageSection(heading="Stretches", tables=[_stretch_table(stretches)]))
+    sections.append(PageSection(heading="Channels", tables=[_channel_table(channels)]))
+    sections.append(PageSection(heading="Logs", tables=[_log_table(found["logs"])]))
+    names = ", ".join(PurePath(str(entry["file"])).name for entry in found["logs"])
+    subtitle = f"Voyage from {found['begins_utc']}" if found["begins_utc"] else "Voyage without a date"
+    return Page(title=f"Log: {names}", subtitle=subtitle, figures=figures, sections=sections)
+
+
+def _map(found: Json) -> list[PageSection]:
+    if not found["track"]:
+        return []
+    time, x, y = (vector(found["track"][name]) for name in ("t_s", "x_m", "y_m"))
+    tracks = [TrackData(label="voyage", x_m=x, y_m=y, time_s=time)]
+    exciting = sorted(
+        (stretch for stretch in found["stretches"] if stretch["file"]), key=lambda stretch: -stretch["duration_s"]
+    )[:_MOST_TRACKS]
+    for stretch in sorted(exciting, key=lambda stretch: float(stretch["begins_s"])):
+        inside = _inside(time, stretch)
+        if inside.sum() > 1:
+            label = PurePath(stretch["file"]).stem
+            tracks.append(TrackData(label=label, x_m=x[inside], y_m=y[inside], time_s=time[inside]))
+    origin = found["origin_deg"]
+    caption = f"Origin at {origin[0]:g} deg N, {origin[1]:g} deg E (WGS 84)." if origin else ""
+    chart = Illustration(chart=track_chart(tracks, title="Map"), caption=caption)
+    return [PageSection(heading="Map", charts=[chart])]
+
+
+def _inside(time: Array, stretch: Json) -> np.ndarray:
+    begin = float(stretch["begins_s"])
+    return np.asarray((time >= begin) & (time <= begin + float(stretch["duration_s"])))
+
+
+def _time_line(found: Json) -> list[PageSection]:
+    line = found["time_line"]
+    shown = [signal for signal in _SIGNALS if signal.name in line]
+    if not shown:
+        return []
+    runs = []
+    charts = []
+    for signal in shown:
+        entry = line[signal.name]
+        runs.append(History(label="log", time_s=vector(entry["t_s"]), values={signal.name: vector(entry["value"])}))
+        marks = [
+            TimeMark(
+                signal=signal.name,
+                begin_s=float(stretch["begins_s"]),
+                end_s=float(stretch["begins_s"]) + float(stretch["duration_s"]),
+                text=str(stretch["file"] or stretch["kind"]),
+            )
+            for stretch in found["stretches"]
+            if stretch["excites"]
+        ]
+        title = signal.title[:1].upper() + signal.title[1:]
+        charts.append(Illustration(chart=history_chart(runs[-1:], [signal], title=title, marks=marks)))
+    text = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
+    return [PageSection(heading="Time line", text=text, charts=charts)]
+
+
+def _stretch_table(stretches: Json) -> PageTable:
+    heads = [
+        Column(title="stretch"),
+        Column(title="begins", unit="s", digits=6),
+        Column(title="lasts", unit="s"),
+        Column(title="steering"),
+        Column(title="heading change", unit="deg", digits=3),
+        Column(title="reversals"),
+        Column(title="speed", unit="m/s", digits=3),
+        Column(title="rms yaw rate", unit="deg/s", digits=3),
+        Column(title="file"),
+    ]
+    keys = ("kind", "begins_s", "duration_s", "steering", "heading_change_deg", "reversals", "speed_mps")
+    rows: list[list[Cell]] = [
+        [*(stretch[key] for key in keys), stretch["yaw_rate_rms_degps"], stretch["file"] or "-"]
+        for stretch in stretches
+    ]
+    return PageTable(caption="Stretches", columns=heads, rows=rows)
+
+
+def _channel_table(channels: Json) -> PageTable:
+    heads = [Column(title=title) for title in ("quantity", "stream", "unit", "sign", "confidence", "used", "why")]
+    keys = ("quantity", "stream", "unit", "sign", "confidence", "use", "why")
+    rows: list[list[Cell]] = [[channel[key] for key in keys] for channel in channels]
+    return PageTable(caption="Channels, to be confirmed or corrected in channels.toml", columns=heads, rows=rows)
+
+
+def _log_table(logs: Json) -> PageTable:
+    heads = [Column(title=title) for title in ("file", "format", "streams", "read and lost")]
+    rows: list[list[Cell]] = [
+        [
+            PurePath(str(entry["file"])).name,
+            entry["format"],
+            entry["streams"],
+            ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in entry["counts"].items()),
+        ]
+        for entry in logs
+    ]
+    return PageTable(caption="Logs", columns=heads, rows=rows)
