@@ -332,7 +332,7 @@ def gap_options(
         for name in names:
             if EFFECTS.get(name) is None:
                 raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers)
+    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers=workers)
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lackin
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
+from tank2sim.gap.outcome.combine import combine_passes
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
@@ -63,6 +64,15 @@ DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
 
 
+MOST_EFFECTS = 4
+"""Effects that are named at most: more parameters than these are rarely determined by a day of trials (project
+choice)."""
+
+AGAIN = 1.5
+"""Misfit in noise units of the fitted trials from which more effects are sought (project choice): what remains is then
+as large as the noise."""
+
+
 @dataclass(frozen=True)
 class GapOptions:
     """Options of the search for the missing effect.
@@ -74,7 +84,10 @@ class GapOptions:
     without : tuple of str
         Effects not to try.
     max_effects : int
-        1 or 2.
+        Effects sought at a time, 1 or 2.
+    most_effects : int
+        Effects in all: where the trials are still missed with those that were found, more are sought on the improved
+        card, up to this number.
     workers : int, optional
         Processes; by default as many as there are processors.
     """
@@ -82,6 +95,7 @@ class GapOptions:
     effects: tuple[str, ...] | None = None
     without: tuple[str, ...] = ()
     max_effects: int = 2
+    most_effects: int = MOST_EFFECTS
     workers: int | None = None
 
 
@@ -113,14 +127,45 @@ def run_gap_workflow(
         A trial is too short or measures too little, or a requested effect cannot be tried on this card.
     """
     options = options or GapOptions()
-    names = _names(card, fitted, options)
-    with threadpool_limits(limits=1, user_api="blas"):  # small matrices: threads of the library wait for each other
-        likelihood = likelihood_from_card(card, fitted)
-        with _processes(options, executor) as pool:
-            found = search(likelihood, progress, pool, names, most=options.max_effects)
-        decision = decide(found)
-        progress("proving")
-        return _assemble_gap(card, (fitted, held), found, decision, progress)
+    # Small matrices: threads of the linear algebra library would wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
+        gap = _search_once(card, (fitted, held), options, progress, pool)
+        while _seeks_more(gap, options):
+            named = tuple(effect.name for effect in gap.effects)
+            most = min(options.max_effects, options.most_effects - len(named))
+            wanted = None if options.effects is None else tuple(name for name in options.effects if name not in named)
+            if wanted == () or gap.improved is card:
+                break
+            more = replace(options, effects=wanted, without=(*options.without, *named), max_effects=most)
+            further = _search_once(gap.improved, (fitted, held), more, progress, pool)
+            if further.verdict != MISSING or any(EFFECTS[name.name].acts_on == "sensor" for name in further.effects):
+                break
+            gap = combine_passes(gap, further)
+        return gap
+
+
+def _search_once(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    options: GapOptions,
+    progress: StageReport,
+    pool: Executor | None,
+) -> Gap:
+    """One search, the decision and its proof."""
+    names = _names(card, trials[0], options)
+    found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
+    decision = decide(found)
+    progress("proving")
+    return _assemble_gap(card, trials, found, decision, progress)
+
+
+def _seeks_more(gap: Gap, options: GapOptions) -> bool:
+    """Whether effects of the ship were named, and the fitted trials are still missed."""
+    if gap.verdict != MISSING or len(gap.effects) >= options.most_effects:
+        return False
+    if any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
+        return False  # the trials would have to be corrected first
+    return _misfit_of(gap.passed, "after", held_out=False) > AGAIN
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:

@@ -1,0 +1,70 @@
+"""Two searches as one result: the second was made on the card that the first improved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.result import Gap, Named, Passed, Refitted
+
+
+def combine_passes(first: Gap, further: Gap) -> Gap:
+    """The result with the effects of both searches.
+
+    Parameters
+    ----------
+    first : Gap
+        Of the given card.
+    further : Gap
+        Of the card that `first` improved, with the same trials; its effects are of the ship.
+    """
+    refitted = {coefficient.name: coefficient for coefficient in further.coefficients}
+    of_given = {coefficient.name: coefficient for coefficient in first.coefficients}
+    coefficients = tuple(
+        replace(
+            coefficient,
+            before=of_given[name].before,
+            standard_error_before=of_given[name].standard_error_before,
+        )
+        if name in of_given
+        else coefficient
+        for name, coefficient in refitted.items()
+        if name.partition(".")[0] not in {effect.name for effect in first.effects}
+    )
+    return replace(
+        further,
+        card=first.card,
+        effects=(*(_updated(effect, refitted) for effect in first.effects), *further.effects),
+        coefficients=coefficients or first.coefficients,
+        effect_alone={**further.effect_alone, **first.effect_alone},
+        alternatives=(*first.alternatives, *further.alternatives),
+        rivals=first.rivals,
+        where=first.where,
+        equation=first.equation,
+        passed=tuple(_joined(*pair) for pair in zip(first.passed, further.passed, strict=True)),
+        figures_before=first.figures_before,
+        missing_force=first.missing_force,
+        agreement={**first.agreement, **further.agreement},
+        notices=tuple(dict.fromkeys((*further.notices, *_of_names(first, further)))),
+    )
+
+
+def _of_names(first: Gap, further: Gap) -> list[str]:
+    names = (" and ".join(effect.name for effect in gap.effects) for gap in (first, further))
+    before, after = names
+    return [
+        f"{after}: found on the card improved by {before}, which left more than noise; rivals are those of {before}"
+    ]
+
+
+def _updated(effect: Named, refitted: dict[str, Refitted]) -> Named:
+    """An effect with its parameters as they were fitted again together with those of the second search."""
+    known = {parameter.name: f"{effect.name}.{parameter.stem}" for parameter in EFFECTS[effect.name].parameters}
+    found = {name: refitted[place] for name, place in known.items() if place in refitted and name in effect.parameters}
+    values = {**effect.parameters, **{name: entry.value for name, entry in found.items()}}
+    errors = {**effect.standard_errors, **{name: entry.standard_error for name, entry in found.items()}}
+    return replace(effect, parameters=values, standard_errors=errors)
+
+
+def _joined(first: Passed, further: Passed) -> Passed:
+    return replace(further, before=first.before)
