@@ -272,7 +272,8 @@ def _prove(
     results = _replay_all(card, alone, trials, sensors, sigmas)
     proof = _Proof(alone, results)
     if _misfit_of(results, "after", held_out=False) > BETTER_FROM:
-        refitted, base = refit_coefficients(card, found.likelihood.coefficients_with(best))
+        estimates_with = found.likelihood.coefficients_with(best)
+        refitted, base = refit_coefficients(card, found.likelihood.none.model, estimates_with)
         joint = add_effects_to_card(base, estimated)
         joint_results = _replay_all(card, joint, trials, sensors, sigmas)
         misfits = [_misfit_of(group, "after", held_out=False) for group in (results, joint_results)]

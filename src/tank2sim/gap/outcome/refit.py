@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.result import Refitted
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
@@ -12,7 +13,7 @@ from tank2sim.identification.trials.problem.problem_from_card import card_with_e
 
 
 def refit_coefficients(
-    card: ManoeuvringCard, estimates: CoefficientEstimates
+    card: ManoeuvringCard, model: Model, estimates: CoefficientEstimates
 ) -> tuple[tuple[Refitted, ...], ManoeuvringCard]:
     """The coefficients with their values before and after, and the card with them.
 
@@ -22,6 +23,8 @@ def refit_coefficients(
     Parameters
     ----------
     card : ManoeuvringCard
+    model : Model
+        Of the card; values stay within its bounds.
     estimates : CoefficientEstimates
         Of parameters of the card's model.
     """
@@ -30,7 +33,10 @@ def refit_coefficients(
     names = tuple(estimates.names[row] for row in rows)
     before = np.array([known[name] for name in names])
     covariance = estimates.covariance[np.ix_(rows, rows)]
-    values = before[:, 0] + estimates.change[rows]
+    bounds = [(model[name].minimum, model[name].maximum) for name in names]
+    lowest = np.array([-np.inf if low is None else low for low, _ in bounds])
+    highest = np.array([np.inf if high is None else high for _, high in bounds])
+    values = np.clip(before[:, 0] + estimates.change[rows], lowest, highest)
     estimate = Estimate("gap", names, values, covariance, np.asarray(np.linalg.pinv(covariance), dtype=np.float64))
     short = [name.removeprefix("derivatives.") for name in names]
     columns = zip(short, values.tolist(), estimate.standard_errors.tolist(), *before.T.tolist(), strict=True)
