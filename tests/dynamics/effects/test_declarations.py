@@ -30,6 +30,9 @@ OTHER_MEANINGS = {
     '"trim",': "the same caution",
     'name="current"': "current of a motor",
     '"current": "current_A"': "the same",
+    '"current": None if': "key of the JSON of a log: the current found in it",
+    '"wind" if true else': "part of the name of a quantity of a log",
+    'quantity.startswith("wind")': "the same",
 }
 """Lines, by a part of them, in which the name of an effect is another word, and what it is there."""
 
