@@ -94,7 +94,7 @@ def test_uncertainty_left_out_is_two_percent() -> None:
         ("length_m = 100.0", "length_ft = 328.0", "ship.length_ft", "did you mean length_m?"),
         ("length_m = 100.0", 'length_m = "100"', "ship.length_m", "a number was expected"),
         ("length_m = 100.0", "length_m = 100.0\nlength_m = 101.0", "line", "once"),
-        ('kind = "abkowitz"', 'kind = "mmg"', "model.kind", "abkowitz"),
+        ('kind = "abkowitz"', 'kind = "norrbin"', "model.kind", "abkowitz"),
         ('rudder_sign = "port"', "", "model.rudder_sign", "is missing"),
         ('yaw_rate_terms = "hydrodynamic"', 'yaw_rate_terms = "both"', "model.yaw_rate_terms", "total"),
         ("Yv = -6e5", "Yv = -6e5\nYbeta = 1.0", "derivatives.Ybeta", "not a name of a derivative"),

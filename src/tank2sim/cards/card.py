@@ -14,6 +14,10 @@ from tank2sim.cards.form import (
     FittedTrial,
     Glider,
     GliderModel,
+    MmgModel,
+    MmgPropeller,
+    MmgRudder,
+    MmgShip,
     ProgrammeSection,
     Propulsion,
     RigidBody,
@@ -25,7 +29,8 @@ from tank2sim.cards.form import (
     YawRig,
     YawRigModel,
 )
-from tank2sim.cards.scaling import Scales
+from tank2sim.cards.scaling import Bis, FileScales, PrimeII, Scales, file_factor
+from tank2sim.cards.terms import known_term
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.units import from_si
@@ -94,6 +99,33 @@ class Card:
         return InputError(self.source, place, problem, remedy)
 
 
+OPPOSITE = {"R0": ("X0", -1.0), "mx": ("Xudot", -1.0), "my": ("Yvdot", -1.0), "Jz": ("Nrdot", -1.0)}
+"""Names of the MMG method in ``[derivatives]``: R_0', m_x', m_y', J_z' to the derivative and the factor."""
+
+
+def scales_of_file(ship: ShipSection, environment: Environment, model: ShipModel) -> FileScales | None:
+    """What the numbers of a card's text are in, by its ``scaling``; None for the prime system.
+
+    Raises
+    ------
+    KeyError
+        The card lacks the particular (its key) that the scaling needs.
+    """
+    scales = Scales(environment.water_density_kgpm3, ship.length_m, model.speed_mps)
+    if model.scaling == "dimensional":
+        return scales
+    if model.scaling == "prime_ii":
+        if ship.draught_m is None:
+            raise KeyError("draught_m")
+        return PrimeII(ship.length_m / ship.draught_m)
+    if model.scaling == "bis":
+        if ship.displacement_kg is None:
+            raise KeyError("displacement_kg")
+        froude = model.speed_mps / (environment.gravity_mps2 * ship.length_m) ** 0.5
+        return Bis(froude, ship.displacement_kg / scales.mass)
+    return None
+
+
 @dataclass(frozen=True)
 class ManoeuvringCard(Card):
     """Card of a ship that manoeuvres in the horizontal plane.
@@ -137,6 +169,17 @@ class ManoeuvringCard(Card):
         """What makes this ship's numbers non-dimensional."""
         return Scales(self.environment.water_density_kgpm3, self.ship.length_m, self.model.speed_mps)
 
+    @property
+    def file_scales(self) -> FileScales | None:
+        """What the numbers of the card's text are in; None for the prime system."""
+        return scales_of_file(self.ship, self.environment, self.model)
+
+    def file_factor(self, name: str) -> float:
+        """Factor from a derivative (canonical name; prime, starboard) to the number of the card's text."""
+        to_port = self.model.rudder_sign == "port"
+        sign = OPPOSITE.get(self.places.get(name, name), (name, 1.0))[1]
+        return sign * file_factor(known_term(name), self.file_scales, rudder_to_port=to_port)
+
     def in_file(self, place: str, value: float) -> tuple[str, float]:
         """Place and value as the file has them, from those in SI: for messages about an angle."""
         spelling = self.spelt.get(place, place)
@@ -145,6 +188,50 @@ class ManoeuvringCard(Card):
     def standard_error(self, name: str) -> float:
         """Standard error of a derivative (prime): as stated, or the default share of its value."""
         return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
+
+
+@dataclass(frozen=True)
+class MmgCard(ManoeuvringCard):
+    """Card of a ship by the MMG method: its hull is in ``derivatives`` (prime), X0 = -R_0', Xudot = -m_x' and so on.
+
+    Parameters
+    ----------
+    propeller : MmgPropeller
+        With k_0 to k_2, also where the file has a table.
+    rudder : MmgRudder
+        With f_alpha, also where the file has an aspect ratio.
+    interaction_errors : mapping
+        Standard errors of numbers in ``[propeller]`` and ``[rudder]``, by key.
+    """
+
+    ship: MmgShip
+    model: MmgModel
+    propeller: MmgPropeller = field(kw_only=True)
+    rudder: MmgRudder = field(kw_only=True)
+    interaction_errors: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+
+    def interaction_places(self) -> dict[str, str]:
+        """Key of each number of ``[propeller]`` and ``[rudder]`` that is a coefficient, to its dotted place."""
+        return {
+            **{key: f"propeller.{key}" for key in PROPELLER_COEFFICIENTS},
+            **{key: f"rudder.{key}" for key in RUDDER_COEFFICIENTS},
+        }
+
+    def interaction_error(self, key: str) -> float:
+        """Standard error of a coefficient of propeller or rudder: as stated, or the default share of its value."""
+        return self.interaction_errors.get(key, DEFAULT_RELATIVE_ERROR * abs(self.interaction(key)))
+
+    def interaction(self, key: str) -> float:
+        """A coefficient of propeller or rudder."""
+        section = self.propeller if key in PROPELLER_COEFFICIENTS else self.rudder
+        return float(getattr(section, key))
+
+
+PROPELLER_COEFFICIENTS = ("k_0", "k_1", "k_2", "t_P", "w_P0", "x_P", "C_1", "C_2_plus", "C_2_minus", "astern")
+RUDDER_COEFFICIENTS = (
+    *("f_alpha", "t_R", "a_H", "x_H", "x_R", "eps", "kappa", "l_R", "gamma_R_plus", "gamma_R_minus"),
+)
+"""Keys of the coefficients in ``[propeller]`` and ``[rudder]``, which are parameters ``mmg.*`` of the model."""
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,10 @@ DRIFT_OF_CAPTIVE_TESTS, YAW_RATE_OF_CAPTIVE_TESTS = 0.5235987755982988, 1.0
 taken to hold: captive tests seldom go further. Project choice."""
 
 
+ASTERN_THRUST = 0.765
+"""Thrust at rest of a reversed propeller over that ahead: 0.251/0.328 of the Esso Osaka's (Miyauchi et al. 2022)."""
+
+
 def _rising_pair(value: object) -> object:
     """TOML has lists, the form has pairs.
 
@@ -93,9 +97,9 @@ class Environment(CardSection):
 class ShipModel(CardSection):
     """``[model]`` of a manoeuvring ship: what kind of equations, and in which conventions the numbers are given."""
 
-    kind: Literal["linear", "abkowitz"]
+    kind: Literal["linear", "abkowitz", "mmg"]
     speed_mps: Speed
-    scaling: Literal["prime", "dimensional"]
+    scaling: Literal["prime", "prime_ii", "bis", "dimensional"]
     speed_scale: Literal["instantaneous", "nominal"]
     yaw_rate_terms: Literal["total", "hydrodynamic"]
     rudder_sign: Literal["port", "starboard"]
@@ -114,6 +118,26 @@ class ShipModel(CardSection):
     def low_speed_bound_mps(self) -> float:
         """Speed (m/s) below which the forces at low speed replace the polynomial; by default the lowest of the card."""
         return self.speed_range_mps[0] if self.low_speed_below_mps is None else self.low_speed_below_mps
+
+
+LOWEST_OF_MMG = 0.2
+"""Lowest speed over the speed of approach at which an MMG card that states no other is taken to hold: below that of any
+steady turn (a tanker at full rudder keeps 0.35), for its coefficients do not depend on speed. Project choice."""
+
+
+class MmgModel(ShipModel):
+    """``[model]`` of an MMG card: its conventions are those of the method, but for the scaling."""
+
+    kind: Literal["mmg"]
+    scaling: Literal["prime", "prime_ii", "bis", "dimensional"] = "prime_ii"
+    speed_scale: Literal["instantaneous"] = "instantaneous"
+    yaw_rate_terms: Literal["hydrodynamic"] = "hydrodynamic"
+    rudder_sign: Literal["starboard"] = "starboard"
+
+    @property
+    def speed_range_mps(self) -> tuple[float, float]:
+        """Speeds (m/s) in which the card holds; by default 0.2 to 1.2 times the speed of approach."""
+        return self.valid_speed_mps or (LOWEST_OF_MMG * self.speed_mps, 1.2 * self.speed_mps)
 
 
 class SurgeModel(CardSection):
@@ -158,6 +182,100 @@ class Propulsion(CardSection):
 
     nominal_radps: AngularRate
     Xnn: float
+
+
+class MmgShip(ShipSection):
+    """``[ship]`` of an MMG card, whose propeller and rudder need their sizes."""
+
+    draught_m: Positive
+    propeller_diameter_m: Positive
+    rudder_area_m2: Positive
+
+
+class MmgPropulsion(CardSection):
+    """``[propulsion]`` of an MMG card: revolutions of the approach; absent, those that hold ``model.speed_mps``."""
+
+    nominal_radps: AngularRate | None = None
+
+
+Share = Annotated[float, Field(gt=-1, lt=1)]
+Place = Annotated[float, Field(ge=-2, le=2)]
+Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
+NotNegative = Annotated[float, Field(ge=0, le=1e3)]
+
+
+class MmgPropeller(CardSection):
+    """``[propeller]`` of an MMG card.
+
+    Parameters
+    ----------
+    number : int
+        1, or 2 side by side at ``y_P`` to either side.
+    k_0, k_1, k_2 : float, optional
+        K_T = k_0 + k_1 J + k_2 J^2.
+    J, K_T : list of float, optional
+        Points of the open-water curve in their place.
+    t_P : float
+        Thrust deduction, constant.
+    w_P0 : float
+        Wake fraction straight ahead.
+    x_P, y_P : float
+        Place of the propeller over L, positive forward and (of the right one) to starboard.
+    C_1, C_2_plus, C_2_minus : float, optional
+        Change of the wake by drift; without them it is constant.
+    astern : float
+        Thrust at rest with reversed revolutions over that with the same ahead.
+    """
+
+    number: Literal[1, 2] = 1
+    k_0: Coefficient | None = None
+    k_1: Coefficient | None = None
+    k_2: Coefficient | None = None
+    J: list[float] | None = None
+    K_T: list[float] | None = None
+    t_P: Share
+    w_P0: Share
+    x_P: Place = -0.5
+    y_P: Place | None = None
+    C_1: NotNegative | None = None
+    C_2_plus: Positive | None = None
+    C_2_minus: Positive | None = None
+    astern: NotNegative = ASTERN_THRUST
+
+
+class MmgRudder(CardSection):
+    """``[rudder]`` of an MMG card.
+
+    Parameters
+    ----------
+    number : int
+        1, or 2 side by side at ``y_R`` to either side; ``ship.rudder_area_m2`` is that of one.
+    height_m : float
+        H_R.
+    aspect_ratio, f_alpha : float, optional
+        Lambda, or the slope of the normal force at zero angle in its place.
+    t_R, a_H, x_H, x_R : float
+        Interaction with the hull; places over L, positive forward.
+    y_R : float, optional
+        Place of the right one of two, over L.
+    eps, kappa, l_R, gamma_R_plus, gamma_R_minus : float
+        Flow to the rudder; gamma_R for positive and for negative beta_R.
+    """
+
+    number: Literal[1, 2] = 1
+    height_m: Positive
+    aspect_ratio: Positive | None = None
+    f_alpha: Positive | None = None
+    t_R: Share
+    a_H: Coefficient
+    x_H: Place
+    x_R: Place = -0.5
+    y_R: Place | None = None
+    eps: Positive
+    kappa: NotNegative
+    l_R: Place
+    gamma_R_plus: Coefficient | None = None
+    gamma_R_minus: Coefficient | None = None
 
 
 class Surge(CardSection):
@@ -350,6 +468,16 @@ class ShipCard(CardSection):
     fitted_trials: list[FittedTrial] = []
 
 
+class MmgForm(ShipCard):
+    """The card of a ship by the MMG method, as in its file."""
+
+    ship: MmgShip
+    model: MmgModel
+    propulsion: MmgPropulsion | None = None  # type: ignore[assignment]
+    propeller: MmgPropeller
+    rudder: MmgRudder
+
+
 class SurgeCard(CardSection):
     """The card of a body that only surges, as in its file."""
 
@@ -386,6 +514,7 @@ class YawRigForm(CardSection):
 CARD_FORMS: dict[str, type[ShipCard] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
     "linear": ShipCard,
     "abkowitz": ShipCard,
+    "mmg": MmgForm,
     "surge": SurgeCard,
     "glider": GliderForm,
     "yaw_rig": YawRigForm,

@@ -14,11 +14,21 @@ from pydantic import ValidationError
 from tomlkit.exceptions import TOMLKitError
 
 from tank2sim.bundled import bundled_cards
-from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
+from tank2sim.cards.card import (
+    OPPOSITE,
+    Card,
+    GliderCard,
+    ManoeuvringCard,
+    MmgCard,
+    SurgeBodyCard,
+    YawRigCard,
+    scales_of_file,
+)
 from tank2sim.cards.form import (
     CARD_FORMS,
     EffectEntry,
     GliderForm,
+    MmgForm,
     Propulsion,
     RigidBody,
     ShipCard,
@@ -26,8 +36,9 @@ from tank2sim.cards.form import (
     YawRigForm,
 )
 from tank2sim.cards.form_faults import form_fault, short, suggestion
-from tank2sim.cards.scaling import Scales, file_factor
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.mmg import mmg_fields, nominal_revolutions
+from tank2sim.cards.scaling import FileScales, file_factor
+from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.units import to_si
@@ -100,6 +111,12 @@ def parse_card(text: str, source: str) -> Card:
         form = CARD_FORMS[kind].model_validate(content)
     except ValidationError as error:
         raise form_fault(error, source, spelt, form=CARD_FORMS[kind], what="a card") from None
+    if isinstance(form, MmgForm):
+        own, others = mmg_fields(form, source)
+        card = MmgCard(**vars(replace(_manoeuvring_card(others, text, source), spelt=spelt)), **own)
+        nominal = nominal_revolutions(card, form.propulsion.nominal_radps if form.propulsion else None)
+        # X_nn, the effect of revolutions on surge, is that of the propeller's own equations.
+        return replace(card, propulsion=Propulsion(nominal_radps=nominal, Xnn=0.0))
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
     return _si_card(form, kind, text, source)
@@ -147,13 +164,9 @@ def revised(
     They are written in the conventions of the card's own text; `others` are further values at dotted keys of the text;
     `comment` takes the place of the comments of all that is changed.
     """
-    scales = card.scales if card.model.scaling == "dimensional" else None
     changes: dict[str, object] = dict(others or {})
     for name, (value, error) in derivatives.items():
-        term = parse_term(name)
-        if term is None:
-            raise ValueError(f"{name} is not a derivative")
-        factor = file_factor(term, scales, rudder_to_port=card.model.rudder_sign == "port")
+        factor = card.file_factor(name)
         key = card.places.get(name, name)
         changes[f"derivatives.{key}"] = value * factor
         changes[f"uncertainty.{key}"] = error * abs(factor)
@@ -226,21 +239,19 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
 
 
 def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard:
-    dimensional = form.model.scaling == "dimensional"
-    ship_scales = Scales(form.environment.water_density_kgpm3, form.ship.length_m, form.model.speed_mps)
-    scales = ship_scales if dimensional else None
+    scales = _file_scales(form, source)
     to_port = form.model.rudder_sign == "port"
     body = _prime_rigid_body(form.rigid_body, scales, source)
-    places = _canonical_names(form.derivatives, "derivatives", source)
-    stated = _canonical_names(form.uncertainty, "uncertainty", source)
+    aliases = OPPOSITE if form.model.kind == "mmg" else {}
+    places = _canonical_names(form.derivatives, "derivatives", source, aliases)
+    stated = _canonical_names(form.uncertainty, "uncertainty", source, aliases)
 
-    def inside(name: str, value: float) -> float:
-        term = parse_term(name)
-        assert term is not None
-        return value / file_factor(term, scales, rudder_to_port=to_port)
+    def inside(name: str, key: str, value: float) -> float:
+        sign = aliases.get(key, (name, 1.0))[1]
+        return sign * value / file_factor(known_term(name), scales, rudder_to_port=to_port)
 
     def bounded(section: str, keys: Mapping[str, str], given: Mapping[str, float]) -> dict[str, float]:
-        prime = {name: inside(name, given[key]) for name, key in keys.items()}
+        prime = {name: inside(name, key, given[key]) for name, key in keys.items()}
         for name, value in prime.items():
             if abs(value) > LARGEST_PRIME:
                 problem = f"is {value:.4g} in the prime system"
@@ -277,7 +288,16 @@ def _si_card(form: SurgeCard | GliderForm | YawRigForm, section: str, text: str,
     return _SI_CARDS[section](source=source, text=text, **fields)
 
 
-def _prime_rigid_body(body: RigidBody, scales: Scales | None, source: str) -> RigidBody:
+def _file_scales(form: ShipCard, source: str) -> FileScales | None:
+    try:
+        return scales_of_file(form.ship, form.environment, form.model)
+    except KeyError as error:
+        key = error.args[0]
+        problem = f'is missing, and scaling = "{form.model.scaling}" needs it'
+        raise InputError(source, f"ship.{key}", problem, "add it") from None
+
+
+def _prime_rigid_body(body: RigidBody, scales: FileScales | None, source: str) -> RigidBody:
     if scales is not None:
         body = RigidBody(
             mass=body.mass / scales.mass, yaw_inertia=body.yaw_inertia / scales.inertia, x_G=body.x_G / scales.length
@@ -292,17 +312,19 @@ def _prime_rigid_body(body: RigidBody, scales: Scales | None, source: str) -> Ri
     return body
 
 
-def _prime_propulsion(propulsion: Propulsion | None, scales: Scales | None) -> Propulsion | None:
+def _prime_propulsion(propulsion: Propulsion | None, scales: FileScales | None) -> Propulsion | None:
     if propulsion is None or scales is None:
         return propulsion
     return propulsion.model_copy(update={"Xnn": propulsion.Xnn / scales.force})
 
 
-def _canonical_names(values: Mapping[str, float], section: str, source: str) -> dict[str, str]:
-    """Canonical name to the key in the file."""
+def _canonical_names(
+    values: Mapping[str, float], section: str, source: str, aliases: Mapping[str, tuple[str, float]]
+) -> dict[str, str]:
+    """Canonical name to the key in the file; `aliases` are further keys, to the name that they mean."""
     places: dict[str, str] = {}
     for key in values:
-        term = parse_term(key)
+        term = parse_term(aliases.get(key, (key, 1.0))[0])
         if term is None:
             remedy = "a name is X, Y or N and then v, r, d, u as often as they occur (Yvvr), 0 or udot, vdot, rdot"
             raise InputError(source, f"{section}.{key}", "is not a name of a derivative", remedy)

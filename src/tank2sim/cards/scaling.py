@@ -52,15 +52,100 @@ class Scales:
         return 0.5 * self.density * self.length**2 * self.speed**2
 
 
-def file_factor(term: Term, scales: Scales | None, *, rudder_to_port: bool) -> float:
+@dataclass(frozen=True)
+class PrimeII:
+    """Prime system of the MMG method, in which L d takes the place of L^2: everything is L/d times as large.
+
+    Parameters
+    ----------
+    ratio : float
+        L/d.
+    """
+
+    ratio: float
+
+    def derivative(self, term: Term) -> float:
+        """Value of any derivative whose prime value is 1."""
+        return self.ratio
+
+    @property
+    def mass(self) -> float:
+        """Value of m' = 1."""
+        return self.ratio
+
+    @property
+    def inertia(self) -> float:
+        """Value of J_z' = 1: by rho L^4 d/2."""
+        return self.ratio
+
+    @property
+    def length(self) -> float:
+        """Value of x_G' = 1: lengths are in L in both systems."""
+        return 1.0
+
+    @property
+    def force(self) -> float:
+        """Value of X' = 1."""
+        return self.ratio
+
+
+@dataclass(frozen=True)
+class Bis:
+    """Norrbin's bis system: lengths in L, times in sqrt(L/g), masses in the ship's own; finite at rest.
+
+    Norrbin (1971), SSPA publication 68.
+
+    Parameters
+    ----------
+    froude : float
+        u0/sqrt(g L).
+    ship_mass : float
+        m' of the ship in the prime system.
+    """
+
+    froude: float
+    ship_mass: float
+
+    def derivative(self, term: Term) -> float:
+        """Value of a derivative whose prime value is 1: each velocity in it takes one power of Fn from the force's two."""
+        if term.acceleration:
+            return 1 / self.ship_mass
+        return self.froude ** (2 - term.v - term.r - term.u) / self.ship_mass
+
+    @property
+    def mass(self) -> float:
+        """Value of m' = 1."""
+        return 1 / self.ship_mass
+
+    @property
+    def inertia(self) -> float:
+        """Value of J_z' = 1."""
+        return 1 / self.ship_mass
+
+    @property
+    def length(self) -> float:
+        """Value of x_G' = 1."""
+        return 1.0
+
+    @property
+    def force(self) -> float:
+        """Value of X' = 1."""
+        return self.froude**2 / self.ship_mass
+
+
+FileScales = Scales | PrimeII | Bis
+"""What the numbers of a file are in, other than the prime system."""
+
+
+def file_factor(term: Term, scales: FileScales | None, *, rudder_to_port: bool) -> float:
     """What a derivative inside (prime, starboard) is multiplied by before it is written to a file.
 
     Parameters
     ----------
     term : Term
         The derivative.
-    scales : Scales or None
-        The ship's scales if the file is dimensional (SI), None if it is in the prime system.
+    scales : FileScales or None
+        What the file's numbers are in: the ship's scales if it is dimensional (SI), None if in the prime system.
     rudder_to_port : bool
         The file counts rudder angles positive to port: odd powers of the rudder change sign.
     """

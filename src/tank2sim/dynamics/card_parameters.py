@@ -13,10 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import read_covariance
-from tank2sim.cards.scaling import file_factor
-from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
@@ -58,7 +56,7 @@ class CardParameter:
     @property
     def short(self) -> str:
         """The name in the card: ``Yv``, ``mass``, ``current.speed``."""
-        return self.name.removeprefix("derivatives.").removeprefix("ship.")
+        return self.name.removeprefix("derivatives.").removeprefix("ship.").removeprefix("mmg.")
 
 
 def study_model(card: ManoeuvringCard) -> Model:
@@ -70,7 +68,14 @@ def study_model(card: ManoeuvringCard) -> Model:
 
 def card_parameters(card: ManoeuvringCard, model: Model) -> tuple[CardParameter, ...]:
     """Parameters of a card that are in its model, except for those that are zero without a standard error."""
-    found = (*_derivatives(card, model), *_rigid_body(card), *_gear(card), *_propulsion(card), *_effects(card, model))
+    found = (
+        *_derivatives(card, model),
+        *_interaction(card),
+        *_rigid_body(card),
+        *_gear(card),
+        *_propulsion(card),
+        *_effects(card, model),
+    )
     known = set(model.parameter_names)
     return tuple(
         parameter
@@ -98,8 +103,6 @@ def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) 
 
 
 def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
-    scales = card.scales if card.model.scaling == "dimensional" else None
-    to_port = card.model.rudder_sign == "port"
     stated = {*card.derivatives, *card.uncertainty}
     return [
         CardParameter(
@@ -108,24 +111,40 @@ def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
             standard_error=card.standard_error(name),
             assumed=name not in card.uncertainty,
             key=f"derivatives.{card.places.get(name, name)}",
-            factor=file_factor(known_term(name), scales, rudder_to_port=to_port),
+            factor=card.file_factor(name),
         )
         for name in (name.removeprefix("derivatives.") for name in model.parameter_names)
         if name in stated
     ]
 
 
+def _interaction(card: ManoeuvringCard) -> list[CardParameter]:
+    """Coefficients ``mmg.*`` of propeller and rudder."""
+    if not isinstance(card, MmgCard):
+        return []
+    return [
+        CardParameter(
+            name=f"mmg.{key}",
+            value=card.interaction(key),
+            standard_error=card.interaction_error(key),
+            assumed=key not in card.interaction_errors,
+            key=place,
+            factor=1.0,
+        )
+        for key, place in card.interaction_places().items()
+    ]
+
+
 def _rigid_body(card: ManoeuvringCard) -> list[CardParameter]:
-    scales, body = card.scales, card.rigid_body
-    dimensional = card.model.scaling == "dimensional"
+    scales, in_file, body = card.scales, card.file_scales, card.rigid_body
     described = (
-        ("ship.mass", "mass", body.mass, scales.mass),
-        ("ship.yaw_inertia", "yaw_inertia", body.yaw_inertia, scales.inertia),
-        ("ship.x_G", "x_G", body.x_G, scales.length),
+        ("ship.mass", "mass", body.mass, scales.mass, in_file.mass if in_file else 1.0),
+        ("ship.yaw_inertia", "yaw_inertia", body.yaw_inertia, scales.inertia, in_file.inertia if in_file else 1.0),
+        ("ship.x_G", "x_G", body.x_G, scales.length, in_file.length if in_file else 1.0),
     )
     return [
-        CardParameter(name, value * scale, 0.0, False, f"rigid_body.{key}", 1.0 if dimensional else 1 / scale)
-        for name, key, value, scale in described
+        CardParameter(name, value * scale, 0.0, False, f"rigid_body.{key}", file_scale / scale)
+        for name, key, value, scale, file_scale in described
     ]
 
 
@@ -150,7 +169,7 @@ def _propulsion(card: ManoeuvringCard) -> list[CardParameter]:
     """Xnn; the nominal revolutions are also those of the order, and have no influence."""
     if card.propulsion is None:
         return []
-    factor = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
+    factor = float(card.file_scales.force) if card.file_scales else 1.0
     value = card.propulsion.Xnn
     error = DEFAULT_RELATIVE_ERROR * abs(value)
     return [CardParameter("propulsion.Xnn", value, error, True, "propulsion.Xnn", factor)]

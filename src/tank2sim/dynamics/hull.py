@@ -84,9 +84,16 @@ class Hull:
         return Scales(self["ship.water_density"], self["ship.length"], speed)
 
 
-def motion_quantities(hull: Hull) -> tuple[Quantity, ...]:
-    """Forces ``rudder.*`` and ``force.*``, ``inertia.*``, accelerations, speed and drift, and ``validity``."""
-    forces = _force_quantities(hull)
+def motion_quantities(hull: Hull, forces: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
+    """The `forces`, ``inertia.*``, accelerations, speed and drift, and ``validity``.
+
+    Parameters
+    ----------
+    hull : Hull
+        The ship.
+    forces : tuple of Quantity
+        Whatever the forces are made of; the last three are ``force.X``, ``force.Y``, ``force.N``.
+    """
     X, Y, N = forces[-3:]
     masses = _inertia_quantities(hull)
     matrix = Inertia(*(mass.symbol for mass in masses))
@@ -112,15 +119,21 @@ def _polynomials(hull: Hull, with_rudder: bool) -> Forces:
     They fade out below the lowest speed of the polynomial.
     """
     speed, scales = _scales_of_forces(hull)
-    u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
-    slowness = speed / speed**2  # one division in the code that CasADi makes of it, where 1/V would be three
-    primes = (v * slowness, r * scales.length * slowness, hull["rudder.effective"], (u - hull["ship.speed"]) * slowness)
+    v, r, du = prime_motion(hull, speed)
+    primes = v, r, hull["rudder.effective"], du
     sums = []
     for force in "XYN":
         names = _terms(hull, force, with_rudder)
         sums.append(polynomial(names, {name: hull.coefficient(name) for name in names}, *primes))
     force = (1 - hull.low_share) * scales.force
     return force * sums[0], force * sums[1], force * scales.length * sums[2]
+
+
+def prime_motion(hull: Hull, speed: ca.SX) -> Forces:
+    """v', r' and Du' by a speed of the scaling (m/s)."""
+    u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
+    slowness = speed / speed**2  # one division in the code that CasADi makes of it, where 1/V would be three
+    return v * slowness, r * hull["ship.length"] * slowness, (u - hull["ship.speed"]) * slowness
 
 
 def _ahead(hull: Hull, force: str, u: ca.SX, rudder: int = 0) -> ca.SX:
@@ -134,7 +147,7 @@ def _ahead(hull: Hull, force: str, u: ca.SX, rudder: int = 0) -> ca.SX:
     return value
 
 
-def _with_share(share: Forces, forces: Forces, others: Forces) -> Forces:
+def with_share(share: Forces, forces: Forces, others: Forces) -> Forces:
     """`others` and a share of `forces`; where the share is none, a compiler leaves out what they alone need."""
     every = zip(share, forces, others, strict=True)
     X, Y, N = (other + ca.if_else(part, part * force, 0) for part, force, other in every)
@@ -165,11 +178,12 @@ def _rudder_forces(hull: Hull) -> Forces:
         low.append(at_u0.force * (straight * by_angle + by_swing))
     share = hull.low_share
     slow = low[0], low[1], at_u0.length * low[2]
-    return _with_share((share, share, share), slow, _polynomials(hull, with_rudder=True))
+    return with_share((share, share, share), slow, _polynomials(hull, with_rudder=True))
 
 
-def _rudder_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
-    X, Y, N = _rudder_forces(hull)
+def rudder_quantities(forces: Forces) -> tuple[Quantity, Quantity, Quantity]:
+    """``rudder.X``, ``rudder.Y``, ``rudder.N``, by the rudder alone: N, N and N m."""
+    X, Y, N = forces
     return (
         Quantity(name="rudder.X", unit="N", description="Surge force by the rudder, positive forward", value=X),
         Quantity(name="rudder.Y", unit="N", description="Sway force by the rudder, positive to starboard", value=Y),
@@ -177,7 +191,7 @@ def _rudder_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
     )
 
 
-def _hydrodynamic_linear(hull: Hull) -> dict[str, ca.SX]:
+def hydrodynamic_linear(hull: Hull) -> dict[str, ca.SX]:
     """Yv, Yr, Nv, Nr without the inertia that "total" cards put into them; SI at a speed of 1 m/s."""
     unit_scales = hull.scales(ca.SX(1))
     names = ("Yv", "Yr", "Nv", "Nr")
@@ -200,9 +214,9 @@ def _hull_forces(hull: Hull) -> Forces:
         # (3.5a) has no m v r: a product of two small quantities.
         X, Y, N = X + (0 if hull.linear else kept * surge), Y + kept * sway, N + kept * yaw
     X_u0 = _ahead(hull, "X", hull["ship.speed"])
-    slow = hull_forces(hull.symbols, hull.speed, hull.X_bound, X_u0, _hydrodynamic_linear(hull))
+    slow = hull_forces(hull.symbols, hull.speed, hull.X_bound, X_u0, hydrodynamic_linear(hull))
     # In surge sooner, by the cube: the polynomial of a slow ship soon gives thrust for resistance.
-    return _with_share((1 - kept**3, low, low), slow, (X * kept**2, Y, N))
+    return with_share((1 - kept**3, low, low), slow, (X * kept**2, Y, N))
 
 
 def _right_hand_sides(hull: Hull, rudder: tuple[Quantity, Quantity, Quantity]) -> Forces:
@@ -215,12 +229,17 @@ def _right_hand_sides(hull: Hull, rudder: tuple[Quantity, Quantity, Quantity]) -
     return X, Y, N
 
 
-def _force_quantities(hull: Hull) -> tuple[Quantity, ...]:
-    by_rudder = _rudder_quantities(hull)
-    f1, f2, f3 = _right_hand_sides(hull, by_rudder)
+def polynomial_forces(hull: Hull) -> tuple[Quantity, ...]:
+    """``rudder.*`` and ``force.*`` of (3.5) or (3.8)."""
+    by_rudder = rudder_quantities(_rudder_forces(hull))
     equations = "right-hand side of (3.5)" if hull.linear else "right-hand side of (3.8)"
+    return (*by_rudder, *force_quantities(_right_hand_sides(hull, by_rudder), equations))
+
+
+def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity, Quantity]:
+    """``force.X``, ``force.Y``, ``force.N``: the right-hand sides f1, f2, f3 (N, N, N m) of the `equations` named."""
+    f1, f2, f3 = forces
     return (
-        *by_rudder,
         Quantity(
             name="force.X",
             unit="N",

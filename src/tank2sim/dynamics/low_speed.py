@@ -232,12 +232,28 @@ def hull_forces(s: Symbols, V: ca.SX, X_bound: ca.SX, X_u0: ca.SX, linear: Mappi
     least = LEAST_SHARE * (bound / s["ship.speed"]) ** 2 * (thrust - X_u0)
     least = ca.fmax(least, LEAST_RESISTANCE * 0.5 * s["ship.water_density"] * (s["ship.length"] * bound) ** 2)
     resistance = ca.fmax(thrust - X_bound, least) / (bound * (bound + damping))
-    Y_drag, N_drag = _cross_flow_drag(s)
-    V, turning = V + damping, u * r
+    Y, N = slow_sway_and_yaw(s, V, linear)
     return (
-        thrust - resistance * u * V + (mass * v + moment * r) * r,
-        linear["Yv"] * v * V + (linear["Yr"] - mass) * turning + Y_drag,
-        linear["Nv"] * v * u + linear["Nr"] * r * V - moment * turning + N_drag,
+        thrust + slow_resistance(s, V, resistance) + (mass * v + moment * r) * r,
+        Y - mass * u * r,
+        N - moment * u * r,
+    )
+
+
+def slow_resistance(s: Symbols, V: ca.SX, resistance: Any) -> ca.SX:
+    """X (N) of a resistance (kg/m) that goes with the square of speed and opposes motion ahead and astern."""
+    force: ca.SX = -resistance * s["motion.u"] * (V + LINEAR_DAMPING * s["ship.speed"])
+    return force
+
+
+def slow_sway_and_yaw(s: Symbols, V: ca.SX, linear: Mapping[str, Any]) -> tuple[ca.SX, ca.SX]:
+    """Y and N (N, N m) of the hull at low speed without inertial terms; arguments as in :func:`hull_forces`."""
+    u, v, r = s["motion.u"], s["motion.v"], s["motion.r"]
+    Y_drag, N_drag = _cross_flow_drag(s)
+    V = V + LINEAR_DAMPING * s["ship.speed"]
+    return (
+        linear["Yv"] * v * V + linear["Yr"] * u * r + Y_drag,
+        linear["Nv"] * v * u + linear["Nr"] * r * V + N_drag,
     )
 
 

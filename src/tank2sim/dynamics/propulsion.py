@@ -12,8 +12,8 @@ LARGEST_REVOLUTIONS = 3.0
 lies beyond it. Project choice."""
 
 
-def propulsion(section: Propulsion) -> tuple[Variable, ...]:
-    """Input ``propeller.speed`` (rad/s), quantity ``propeller.speed_actual``, parameters ``propulsion.*``."""
+def revolutions(section: Propulsion) -> tuple[Variable, Variable]:
+    """Input ``propeller.speed`` (rad/s) and quantity ``propeller.speed_actual``."""
     order = Input(
         name="propeller.speed",
         unit="rad/s",
@@ -34,6 +34,13 @@ def propulsion(section: Propulsion) -> tuple[Variable, ...]:
             nominal=section.nominal_radps,
             value=order.symbol,
         ),
+    )
+
+
+def propulsion(section: Propulsion) -> tuple[Variable, ...]:
+    """The :func:`revolutions`, and parameters ``propulsion.*``."""
+    return (
+        *revolutions(section),
         Parameter(
             name="propulsion.nominal_speed",
             unit="rad/s",

@@ -6,16 +6,18 @@ import difflib
 import math
 from collections.abc import Mapping
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import OPPOSITE, ManoeuvringCard, MmgCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
-from tank2sim.dynamics.hull import Hull, motion_quantities
+from tank2sim.dynamics.hull import Hull, motion_quantities, polynomial_forces
 from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
 from tank2sim.dynamics.low_speed import low_speed_parameters
+from tank2sim.dynamics.mmg.hull import MMG_TERMS
+from tank2sim.dynamics.mmg.ship import MmgShip, mmg_forces, mmg_parameters, sides
 from tank2sim.dynamics.model import Model, Parameter, State, Variable
-from tank2sim.dynamics.propulsion import propulsion
+from tank2sim.dynamics.propulsion import propulsion, revolutions
 from tank2sim.dynamics.rigid_body import Inertia, inertia
 from tank2sim.dynamics.steering_gear import steering_gear
 
@@ -45,7 +47,12 @@ def ship_model(card: ManoeuvringCard) -> Model:
     _refuse_singular_mass(card)
     body = _body_states(card)
     gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
-    engine = propulsion(card.propulsion) if card.propulsion else ()
+    engine: tuple[Variable, ...] = ()
+    if isinstance(card, MmgCard):
+        assert card.propulsion is not None
+        engine = (*revolutions(card.propulsion), *mmg_parameters(card))
+    elif card.propulsion:
+        engine = propulsion(card.propulsion)
     constants = (*_ship_parameters(card), *low_speed_parameters(card), *_derivative_parameters(card, names))
     position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
     symbols = {variable.name: variable.symbol for variable in position}
@@ -66,10 +73,11 @@ def ship_model(card: ManoeuvringCard) -> Model:
         quantities=(),
         outputs=(),
         step_s=_step(card),
-        notices=(*notices, *gear_notices, *_without_yaw(card)),
+        notices=(*notices, *gear_notices, *_without_yaw(card), *_one_sided(card)),
     )
     outputs = (*_OUTPUTS, *(["propeller.speed_actual"] if engine else []))
-    return empty.extend(*given, *motion_quantities(hull), outputs=outputs)
+    forces = mmg_forces(MmgShip(hull, sides(card))) if isinstance(card, MmgCard) else polynomial_forces(hull)
+    return empty.extend(*given, *motion_quantities(hull, forces), outputs=outputs)
 
 
 def _without_yaw(card: ManoeuvringCard) -> list[str]:
@@ -81,21 +89,38 @@ def _without_yaw(card: ManoeuvringCard) -> list[str]:
     ]
 
 
+def _one_sided(card: ManoeuvringCard) -> list[str]:
+    if not isinstance(card, MmgCard) or card.rudder.gamma_R_plus == card.rudder.gamma_R_minus:
+        return []
+    return [
+        "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
+        "rudder) has gamma_R_minus"
+    ]
+
+
+KINDS = {"abkowitz": "third-order (Abkowitz)", "linear": "linear", "mmg": "MMG"}
+"""Kind of model to what it is called."""
+
+
 def _description(card: ManoeuvringCard) -> str:
-    kind = "third-order (Abkowitz)" if card.model.kind == "abkowitz" else "linear"
-    return f"{card.ship.name}: {kind} manoeuvring model in surge, sway and yaw with steering gear"
+    return f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in surge, sway and yaw with steering gear"
 
 
 def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
+    mmg = card.model.kind == "mmg"
+    every, equations = (MMG_TERMS, "the MMG hull") if mmg else (ALL_TERMS, "(3.8)")
+    spelt = [*OPPOSITE, *(term for term in MMG_TERMS[: -len(ACCELERATION_TERMS)])] if mmg else list(ALL_TERMS)
     for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
         for name in given:
-            if name not in ALL_TERMS:
+            if name not in every or (mmg and name in ("Yrdot", "Nvdot")):
                 key = card.places.get(name, name)
-                close = difflib.get_close_matches(name, ALL_TERMS, n=1)
+                close = difflib.get_close_matches(name, spelt, n=1)
                 hint = f"did you mean {close[0]}? " if close else ""
-                remedy = f"{hint}the third-order model has {' '.join(ALL_TERMS)}"
-                raise card.fault(f"{section}.{key}", "is not a term of (3.8)", remedy)
+                remedy = f"{hint}{'an MMG hull' if mmg else 'the third-order model'} has {' '.join(spelt)}"
+                raise card.fault(f"{section}.{key}", f"is not a term of {equations}", remedy)
+    if mmg:
+        return list(MMG_TERMS), []
     if card.model.kind == "abkowitz":
         return list(ALL_TERMS), []
     names = [*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]

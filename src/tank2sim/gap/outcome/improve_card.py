@@ -14,9 +14,8 @@ import numpy as np
 import tomlkit
 from numpy.typing import NDArray
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import OPPOSITE, ManoeuvringCard
 from tank2sim.cards.reading import changed_text, parse_card
-from tank2sim.cards.scaling import file_factor
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
@@ -165,11 +164,12 @@ def _derivatives(
     card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> dict[str, Change]:
     """Keys of ``[derivatives]`` and ``[uncertainty]`` that an effect changes."""
-    scales = card.scales if card.model.scaling == "dimensional" else None
     document, changes = _document(card), dict[str, Change]()
-    spelt = {known_term(key).name: key for key in document.get("uncertainty", {})}  # it may differ from [derivatives]
+    spelt = {
+        known_term(OPPOSITE.get(key, (key, 1.0))[0]).name: key for key in document.get("uncertainty", {})
+    }  # it may differ from [derivatives]
     for derivative, value, effect_error, total in changed_derivatives(card, name, values, errors):
-        factor = file_factor(known_term(derivative), scales, rudder_to_port=card.model.rudder_sign == "port")
+        factor = card.file_factor(derivative)
         stated = card.places.get(derivative, derivative)
         key, error = f"derivatives.{stated}", f"uncertainty.{spelt.get(derivative, stated)}"
         # Rounded to a thousandth of the effect's standard error; the card's error would remove digits that it states.

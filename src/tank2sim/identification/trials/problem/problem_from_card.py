@@ -218,7 +218,7 @@ def card_with_estimate(
                     key, shown = card.in_file(f"effects.{number}.{section}.{parameter.name}", figure)
                     changes[key] = shown
     if REVOLUTIONS in found:
-        scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
+        scale = float(card.file_scales.force) if card.file_scales else 1.0
         changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
     return revised(card, derivatives, changes, comment=comment)
 

@@ -1,0 +1,179 @@
+"""What an MMG card states, checked and completed: revolutions that hold the speed, K_T, f_alpha, both sides' values."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS, MmgCard
+from tank2sim.cards.form import MmgForm, MmgPropeller, MmgRudder, ShipCard
+from tank2sim.errors import InputError
+
+WITH_BOTH_SIDES = {
+    "propeller": (("C_2_plus", "C_2_minus"),),
+    "rudder": (("gamma_R_plus", "gamma_R_minus"),),
+}
+"""Section to pairs of keys for the two sides."""
+
+
+def fujii(aspect_ratio: float) -> float:
+    """f_alpha = 6.13 Lambda/(2.25 + Lambda), the slope of a rudder's normal force: Fujii and Tsuda (1961)."""
+    return 6.13 * aspect_ratio / (2.25 + aspect_ratio)
+
+
+def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
+    """The fields that only an MMG card has, and the form without them.
+
+    Raises
+    ------
+    InputError
+        A value is given for one side alone, K_T or the slope of the rudder is given twice or not at all, or eta > 1.
+    """
+    for section, pairs in WITH_BOTH_SIDES.items():
+        for pair in pairs:
+            _check_pair(getattr(form, section), section, pair, source)
+    propeller = _propeller(form.propeller, source)
+    rudder = _rudder(form.rudder, source)
+    if rudder.number != propeller.number:
+        problem = f"is {rudder.number} behind {propeller.number} propeller{'s' * (propeller.number > 1)}"
+        raise InputError(source, "rudder.number", problem, "give as many rudders as propellers")
+    if form.ship.propeller_diameter_m / rudder.height_m > 1:
+        ratio = form.ship.propeller_diameter_m / rudder.height_m
+        problem = f"is less than the propeller's diameter (eta = D_P/H_R = {ratio:.3g})"
+        raise InputError(source, "rudder.height_m", problem, "check both: the race covers a share eta of the rudder")
+    errors = {
+        key: error for key, error in form.uncertainty.items() if key in (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
+    }
+    remaining = {key: error for key, error in form.uncertainty.items() if key not in errors}
+    own = {"propeller": propeller, "rudder": rudder, "interaction_errors": errors}
+    return own, form.model_copy(update={"propulsion": None, "uncertainty": remaining})
+
+
+def _check_pair(section: MmgPropeller | MmgRudder, name: str, pair: tuple[str, str], source: str) -> None:
+    given = [key for key in pair if getattr(section, key) is not None]
+    if len(given) == 1:
+        absent = next(key for key in pair if key not in given)
+        remedy = f"{given[0]} is of one side: give both"
+        raise InputError(source, f"{name}.{absent}", "is missing", remedy)
+
+
+def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
+    polynomial = [key for key in ("k_0", "k_1", "k_2") if getattr(section, key) is not None]
+    table = [key for key in ("J", "K_T") if getattr(section, key) is not None]
+    if polynomial and table:
+        raise InputError(source, f"propeller.{table[0]}", f"is given, and {polynomial[0]} too", "give one of the two")
+    for keys, given in ((("k_0", "k_1", "k_2"), polynomial), (("J", "K_T"), table)):
+        for key in keys:
+            if given and key not in given:
+                raise InputError(source, f"propeller.{key}", "is missing", f"{given[0]} is given: give all of {keys}")
+    update: dict[str, float] = {}
+    if section.J is not None and section.K_T is not None:
+        fit = open_water_fit(section.J, section.K_T, source)
+        update |= dict(zip(("k_0", "k_1", "k_2"), fit.coefficients.tolist(), strict=True))
+    elif not polynomial:
+        raise InputError(source, "propeller.k_0", "is missing", "give k_0, k_1, k_2 or points J, K_T of the curve")
+    if (section.C_1 is None) != (section.C_2_plus is None):
+        absent, there = ("C_1", "C_2_plus") if section.C_1 is None else ("C_2_plus", "C_1")
+        raise InputError(
+            source, f"propeller.{absent}", "is missing", f"{there} is given: give C_1, C_2_plus, C_2_minus"
+        )
+    if section.C_1 is None:
+        update |= {"C_1": 0.0, "C_2_plus": 1.0, "C_2_minus": 1.0}
+    if section.number == 2 and section.y_P is None:
+        raise InputError(
+            source, "propeller.y_P", "is missing", "two propellers need their distance to midships, over L"
+        )
+    return section.model_copy(update=update)
+
+
+class OpenWaterFit(NamedTuple):
+    """k_0, k_1, k_2 of an open-water curve, and the largest error of K_T."""
+
+    coefficients: Array
+    largest_error: float
+
+
+def open_water_fit(J: list[float], K_T: list[float], source: str) -> OpenWaterFit:
+    """Least squares of K_T on 1, J, J^2.
+
+    Raises
+    ------
+    InputError
+        The lists differ in length, or have fewer than three different J.
+    """
+    if len(J) != len(K_T):
+        problem = f"has {len(K_T)} values and J {len(J)}"
+        raise InputError(source, "propeller.K_T", problem, "give a K_T for each J")
+    if len(set(J)) < 3:
+        raise InputError(source, "propeller.J", f"has {len(set(J))} different values", "a quadratic needs three")
+    powers = np.vander(J, 3, increasing=True)
+    coefficients = np.linalg.lstsq(powers, np.array(K_T), rcond=None)[0]
+    return OpenWaterFit(coefficients, float(np.abs(powers @ coefficients - K_T).max()))
+
+
+def _rudder(section: MmgRudder, source: str) -> MmgRudder:
+    if section.gamma_R_plus is None:
+        raise InputError(source, "rudder.gamma_R_plus", "is missing", "give gamma_R_plus and gamma_R_minus")
+    if (section.f_alpha is None) == (section.aspect_ratio is None):
+        problem = "is missing" if section.f_alpha is None else "is given, and aspect_ratio too"
+        raise InputError(source, "rudder.f_alpha", problem, "give f_alpha or aspect_ratio")
+    if section.number == 2 and section.y_R is None:
+        raise InputError(source, "rudder.y_R", "is missing", "two rudders need their distance to midships, over L")
+    if section.aspect_ratio is None:
+        return section
+    return section.model_copy(update={"f_alpha": fujii(section.aspect_ratio)})
+
+
+def equilibrium_revolutions(
+    resistance: float, inflow: float, diameter: float, coefficients: tuple[float, float, float]
+) -> float | None:
+    """n (1/s) at which K_T rho n^2 D^4 is a resistance over rho, at an inflow u_P; None if there is none.
+
+    Parameters
+    ----------
+    resistance : float
+        T/rho of one propeller, m4/s2.
+    inflow : float
+        (1 - w_P0) u, m/s.
+    diameter : float
+        D_P, m.
+    coefficients : tuple
+        k_0, k_1, k_2.
+    """
+    k_0, k_1, k_2 = coefficients
+    # k_0 D^4 n^2 + k_1 D^3 u_P n + k_2 D^2 u_P^2 - T/rho = 0
+    quadratic, linear, constant = (
+        k_0 * diameter**4,
+        k_1 * diameter**3 * inflow,
+        k_2 * (diameter * inflow) ** 2 - resistance,
+    )
+    root = linear**2 - 4 * quadratic * constant
+    if quadratic <= 0 or root < 0:
+        return None
+    n = (-linear + math.sqrt(root)) / (2 * quadratic)
+    return n if n > 0 else None
+
+
+def nominal_revolutions(card: MmgCard, stated: float | None) -> float:
+    """Revolutions (rad/s) of the approach: those stated, or those that hold ``model.speed_mps`` straight ahead.
+
+    Raises
+    ------
+    InputError
+        None do.
+    """
+    if stated is not None:
+        return stated
+    propeller, speed = card.propeller, card.model.speed_mps
+    over_density = -0.5 * (card.ship.length_m * speed) ** 2 * card.derivatives.get("X0", 0.0)
+    thrust = over_density / ((1 - propeller.t_P) * propeller.number)
+    curve = propeller.k_0 or 0.0, propeller.k_1 or 0.0, propeller.k_2 or 0.0
+    n = equilibrium_revolutions(thrust, (1 - propeller.w_P0) * speed, card.ship.propeller_diameter_m, curve)
+    if n is None:
+        problem = f"no revolutions hold {speed:g} m/s against the resistance"
+        remedy = "check R0, k_0 to k_2, t_P and w_P0, or give propulsion.nominal_rpm"
+        raise card.fault(f"derivatives.{card.places.get('X0', 'R0')}", problem, remedy)
+    return 2 * math.pi * n
