@@ -176,7 +176,15 @@ def revised(
 
 
 def linear_card(card: Card) -> ManoeuvringCard:
-    """The same ship with the linear equations (3.5); derivatives that these have not stay in the text."""
+    """The same ship with the linear equations (3.5); derivatives that these have not stay in the text.
+
+    Raises
+    ------
+    InputError
+        It is an MMG card, whose rudder is no polynomial.
+    """
+    if isinstance(card, MmgCard):
+        raise card.fault("model.kind", "is mmg, which has no linear form of its own", "convert it to abkowitz first")
     new = parse_card(changed_text(card.text, card.source, {"model.kind": "linear"}), card.source)
     assert isinstance(new, ManoeuvringCard)
     return new

@@ -107,7 +107,7 @@ class Bis:
     ship_mass: float
 
     def derivative(self, term: Term) -> float:
-        """Value of a derivative whose prime value is 1: each velocity in it takes one power of Fn from the force's two."""
+        """Value of a derivative whose prime value is 1: each velocity takes one of the two powers of Fn."""
         if term.acceleration:
             return 1 / self.ship_mass
         return self.froude ** (2 - term.v - term.r - term.u) / self.ship_mass

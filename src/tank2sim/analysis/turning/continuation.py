@@ -26,6 +26,10 @@ LEAST_STEP = 1e-7
 LARGEST_BEND = 0.1
 """Largest angle between neighbouring tangents, rad: small enough for a smooth chart. Project choice."""
 
+CORNER = 1e-6
+"""How far from the start, in the scaled unknowns, a slope to that side is taken where the curve has a corner there: an
+equation with a kink on the straight course. Project choice."""
+
 _ACCURACY = 1e-11
 _ITERATIONS = 8
 
@@ -101,7 +105,18 @@ def follow_branch(equations: ContinuationEquations, start: Array, direction: Arr
     start, direction : array (n + 1,)
     bounds : Bounds
     """
-    found = tangent(equations(start)[1], direction)
+    curve = _follow(equations, start, tangent(equations(start)[1], direction), direction, bounds)
+    if curve.ended == STALLED and len(curve.points) == 1:
+        # A corner: the Jacobian at the point itself may be that of the other side.
+        beyond = start + CORNER * direction / np.linalg.norm(direction)
+        curve = _follow(equations, start, tangent(equations(beyond)[1], direction), direction, bounds)
+    return curve
+
+
+def _follow(
+    equations: ContinuationEquations, start: Array, found: Array | None, direction: Array, bounds: Bounds
+) -> Curve:
+    """The curve from a point with the tangent that was found there."""
     if found is None:
         return Curve(start[None, :], direction[None, :] / np.linalg.norm(direction), STALLED)
     points, tangents, ended = [start], [found], LONG

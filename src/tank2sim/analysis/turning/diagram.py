@@ -309,13 +309,15 @@ def _with_folds(
     equations: TurningEquations, y: Array, tangents: Array, straight: int
 ) -> tuple[Array, Array, int, list[int]]:
     """The curve with its folds inserted, the row of the straight course, and the rows of the folds."""
-    turns = np.flatnonzero(np.diff(np.sign(tangents[:, -1])) != 0)
+    turns, count = np.flatnonzero(np.diff(np.sign(tangents[:, -1])) != 0), len(y)
     places: list[int] = []
     for turn in turns.tolist():
-        row = int(turn) + len(places)
+        row = int(turn) + len(y) - count
         nearer = row if abs(tangents[row, -1]) < abs(tangents[row + 1, -1]) else row + 1
         fold = equations.fold(y[nearer], tangents[nearer])
         if fold is None or np.linalg.norm(fold - y[nearer]) > 2 * continuation.LARGEST_STEP:
+            if straight in (row, row + 1):  # a corner on the straight course, stable to one side of it
+                places.append(straight)
             continue
         direction = continuation.tangent(equations(fold)[1], tangents[nearer])
         if direction is None:
@@ -332,8 +334,12 @@ def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
     before = [fold for fold in found.folds if fold.place <= found.straight]
     after = [fold for fold in found.folds if fold.place > found.straight]
     loop = None
+    if corner := [fold for fold in before if fold.place == found.straight]:  # it ends the loop in place of a fold
+        before = [fold for fold in before if fold.place < found.straight] or corner
+        after = after or corner
     # rudder to port for more yaw to starboard: unstable in yaw, not in surge alone
-    if not found.stable[found.straight] and found.slope[found.straight, 0] < 0 and before and after:
+    backwards = bool(corner) or found.slope[found.straight, 0] < 0
+    if not found.stable[found.straight] and backwards and before and after:
         rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
         height = max(rates) - min(rates) if len(rates) > 1 else None
         loop = HysteresisLoop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
 
@@ -181,6 +182,8 @@ class Effect:
         What it looks like in trials, ``force`` or ``actuator``, where that is not what it acts on.
     measured_as : mapping
         Parameter to the signal of a trial that measures it (``wind_speed_mps``).
+    in_mmg : bool
+        True if the equations of the MMG method have it already: it is not for such a card.
     terminal : str
         What its inputs are together, a few words for the FMI terminal that joins them.
     """
@@ -201,6 +204,7 @@ class Effect:
     mistaken_for: str = ""
     measured_as: Mapping[str, str] = field(default_factory=dict)
     terminal: str = ""
+    in_mmg: bool = False
 
     @property
     def looks_like(self) -> str:
@@ -226,9 +230,16 @@ class Effect:
         )
 
     def tried(self, card: ManoeuvringCard) -> bool:
-        """True if a search can begin: every required parameter has typical values on this ship."""
+        """True if a search can begin on this ship: its model can have it, and required parameters have typical values."""
+        if self.in_mmg and card.model.kind == "mmg":
+            return False
         required = self.required()
         return all(parameter.typical_values(card) for parameter in self.parameters if parameter.name in required)
+
+    def changes_on(self, card: ManoeuvringCard) -> tuple[str, ...]:
+        """Derivatives as in `changes`; none where they are the rudder's and the card has an MMG rudder instead."""
+        by_rudder = all(known_term(name).d for name in self.changes)
+        return () if by_rudder and card.model.kind == "mmg" else self.changes
 
     def model_names(self) -> dict[str, str]:
         """Name of each parameter (in SI) to the name of the model's variable that holds it."""
@@ -255,6 +266,8 @@ class Effect:
         KeyError
             A required value is missing.
         """
+        if self.in_mmg and card.model.kind == "mmg":
+            raise card.fault("effects", f"{self.name} is part of the MMG method's own rudder", "leave it out")
         variables = {
             parameter.stem: parameter.variable(self.name, parameter.value(values, card), card)
             for parameter in self.parameters

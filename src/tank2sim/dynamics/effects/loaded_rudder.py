@@ -72,5 +72,6 @@ LOADED_RUDDER = Effect(
         ),
     ),
     equations=_in_loaded_slipstream,
+    in_mmg=True,
     reads_derivatives=True,
 )

@@ -101,6 +101,7 @@ RUDDER_SLIPSTREAM = Effect(
         ),
     ),
     equations=_in_slipstream,
+    in_mmg=True,
 )
 
 

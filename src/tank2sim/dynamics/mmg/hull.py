@@ -54,7 +54,7 @@ def bare_hull_forces(hull: Hull) -> Forces:
 
 
 def inertial_forces_with_water(hull: Hull) -> Forces:
-    """(m + m_y) v r + x_G m r^2, -(m + m_x) u r, -x_G m u r: what the left side of the equations leaves on the right."""
+    """(m + m_y) v r + x_G m r^2, -(m + m_x) u r, -x_G m u r: inertia of ship and water on the right."""
     u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
     X, Y, N = inertial_forces(hull["ship.mass"], hull["ship.x_G"], u, v, r)
     mass = hull.scales(ca.SX(1)).mass

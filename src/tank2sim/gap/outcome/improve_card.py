@@ -65,7 +65,7 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
         read_later = any(EFFECTS[later].reads_derivatives for later, *_ in ship[place + 1 :])
         if EFFECTS[name].in_place_of:
             card = _changed(card, _stated(card, name, values, errors))
-        elif EFFECTS[name].changes and not read_later:
+        elif EFFECTS[name].changes_on(card) and not read_later:
             card = _changed(card, _derivatives(card, name, values, errors))
         else:
             card = _with_entry(_with_particulars(card, name, values), name, values, errors)
@@ -87,7 +87,7 @@ def card_with_effects_text(
     text = changed_text(card.text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     messages = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
     lines = [how, *messages]
-    if any(EFFECTS[name].in_place_of or EFFECTS[name].changes for name in names):
+    if any(EFFECTS[name].in_place_of or EFFECTS[name].changes_on(card) for name in names):
         lines.append("Keys that were changed for this have their old values in comments.")
     if rivals:
         lines.append(f"These trials cannot distinguish this from: {'; '.join(rivals)}.")

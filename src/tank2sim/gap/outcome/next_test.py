@@ -9,9 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND
+from tank2sim.dynamics.mmg.equivalent import linear_equivalent
 from tank2sim.dynamics.model import Input, Parameter
 from tank2sim.gap.outcome.next_test_candidates import (
     REVOLUTIONS,
@@ -373,7 +375,8 @@ _STEERED = ("motion.psi", "motion.r")
 
 def _disturbances(card: ManoeuvringCard) -> dict[str, float]:
     """Standard deviations (prime) of constant forces in a window: the forces of :data:`GUSTS` of rudder."""
-    sway, yaw = (GUSTS * abs(card.derivatives.get(name, 0.0)) for name in ("Yd", "Nd"))
+    known = linear_equivalent(card, build(card), "plus") if isinstance(card, MmgCard) else card.derivatives
+    sway, yaw = (GUSTS * abs(known.get(name, 0.0)) for name in ("Yd", "Nd"))
     sizes = {"derivatives.X0": sway, "derivatives.Y0": sway, "derivatives.N0": yaw}
     return {name: size for name, size in sizes.items() if size > 0}
 

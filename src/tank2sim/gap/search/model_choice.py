@@ -168,7 +168,7 @@ def is_significant(fit: ExplanationFit) -> bool:
         ]
         if sizes and max(sizes) < STANDARD_ERRORS:
             return False
-        if EFFECTS[name].changes and _change(fit, name) < STANDARD_ERRORS:
+        if EFFECTS[name].changes_on(fit.hypothesis.card) and _change(fit, name) < STANDARD_ERRORS:
             return False
         if EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS:
             return False

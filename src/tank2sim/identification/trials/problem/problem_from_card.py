@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import read_covariance
 from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
@@ -18,6 +18,7 @@ from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TER
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.model import Model, Quantity
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
@@ -89,7 +90,7 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
 
     Every derivative that the card has (with a value or an uncertainty) except for accelerations, unless `inertia`
     requests them: motion alone does not determine a mass and a force. Every parameter of the card's effects that is
-    not an input.
+    not an input. Every coefficient of an MMG propeller or rudder whose standard error the card states.
     """
     free = {}
     for name in {**card.derivatives, **card.uncertainty}:
@@ -98,6 +99,10 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
         error = card.standard_error(name)
         if error > 0 and name in _used(card):
             free[f"derivatives.{name}"] = card.derivatives.get(name, 0.0), error
+    if isinstance(card, MmgCard):
+        for key, error in card.interaction_errors.items():
+            if error > 0:
+                free[f"mmg.{key}"] = card.interaction(key), error
     for entry in card.effects:
         effect = EFFECTS[entry.name]
         for parameter in effect.parameters:
@@ -136,7 +141,7 @@ def problem_from_card(
     if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
         free[REVOLUTIONS] = card.propulsion.Xnn, REVOLUTIONS_ERROR * abs(card.propulsion.Xnn)
     for name in hold:
-        known = name if name in free else f"derivatives.{name}"
+        known = next((known for known in (name, f"mmg.{name}") if known in free), f"derivatives.{name}")
         if known not in free:
             text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
             raise InputError("--hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
@@ -217,6 +222,11 @@ def card_with_estimate(
                 for section, figure in (("parameters", rounded(value, error)), ("uncertainty", float(f"{error:.3g}"))):
                     key, shown = card.in_file(f"effects.{number}.{section}.{parameter.name}", figure)
                     changes[key] = shown
+    if isinstance(card, MmgCard):
+        for key, place in card.interaction_places().items():
+            if f"mmg.{key}" in found:
+                value, error = found[f"mmg.{key}"]
+                changes |= {place: rounded(value, error), f"uncertainty.{key}": float(f"{error:.3g}")}
     if REVOLUTIONS in found:
         scale = float(card.file_scales.force) if card.file_scales else 1.0
         changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
@@ -274,4 +284,6 @@ def rounded(value: float, error: float) -> float:
 def _used(card: ManoeuvringCard) -> set[str]:
     if card.model.kind == "abkowitz":
         return set(ALL_TERMS)
+    if card.model.kind == "mmg":
+        return set(MMG_TERMS)
     return {*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS}

@@ -1,0 +1,57 @@
+"""The linear polynomial that an MMG ship is equal to on a straight course, on one side of it.
+
+In the prime system, with k = A_R/L^2 f_alpha (u_R/U)^2 and the flow u_R to the rudder at the revolutions of the
+approach, for each rudder:
+
+    Y_d = -(1 + a_H) k,   N_d = -(x_R' + a_H x_H') k
+    Y_v + Y_d gamma_R U/u_R,   Y_r - m_x' + Y_d gamma_R l_R' U/u_R,   N likewise without m_x'
+
+The two sides differ by their gamma_R: there is no single linear ship at beta_R = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import casadi as ca
+
+from tank2sim.cards.card import MmgCard
+from tank2sim.dynamics.model import Model
+
+
+def straight_inflow(model: Model, name: str = "rudder.inflow") -> float:
+    """A flow (m/s) straight ahead at ``ship.speed`` and nominal revolutions; of the right side of two."""
+    known = name if name in model else f"{name}_right"
+    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    states = ca.DM(model.initial(model.parameter_values()))
+    for state, value in (("motion.u", values["ship.speed"]), ("motion.v", 0.0), ("motion.r", 0.0)):
+        states[model.state_names.index(state)] = value
+    inflow = ca.Function("inflow", [model.x, model.u, model.p], [model.expand(model.symbol(known))])
+    return float(inflow(states, model.input_values(), model.parameter_values()))
+
+
+def linear_equivalent(card: MmgCard, model: Model, side: Literal["plus", "minus"]) -> dict[str, float]:
+    """Yd, Nd, Yv, Yr, Nv, Nr (prime, rudder to starboard) with the gamma_R of one side; Yr with -m_x'.
+
+    Parameters
+    ----------
+    card : MmgCard
+    model : Model
+        Of the card.
+    side : str
+        ``plus`` for beta_R > 0, ``minus`` for beta_R < 0.
+    """
+    rudder, known = card.rudder, card.derivatives
+    ratio = straight_inflow(model) / card.model.speed_mps
+    k = rudder.number * card.ship.rudder_area_m2 / card.ship.length_m**2 * (rudder.f_alpha or 0.0) * ratio**2
+    both = [card.interaction(f"gamma_R_{name}") for name in ("plus", "minus")]
+    # Of two rudders one always has the other side's.
+    gamma = (sum(both) / 2 if rudder.number == 2 else card.interaction(f"gamma_R_{side}")) / ratio
+    slopes = {"Yd": -(1 + rudder.a_H) * k, "Nd": -(rudder.x_R + rudder.a_H * rudder.x_H) * k}
+    found = dict(slopes)
+    for force in "YN":
+        slope = slopes[f"{force}d"]
+        found[f"{force}v"] = known.get(f"{force}v", 0.0) + slope * gamma
+        found[f"{force}r"] = known.get(f"{force}r", 0.0) + slope * gamma * rudder.l_R
+    found["Yr"] += known.get("Xudot", 0.0)
+    return found
