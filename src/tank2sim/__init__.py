@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tank2sim.api.bridge import PilotCardResult, PosterResult
     from tank2sim.api.bundled_ships import ShipsResult
     from tank2sim.api.comparison import ComparisonResult, compare
+    from tank2sim.api.conversion import ConversionResult, convert
     from tank2sim.api.demo import DemoResult, run_demo
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
     from tank2sim.api.gap import GapResult, find_gap
@@ -45,6 +46,7 @@ _HOMES = {
     "AutopilotResult": "api.autopilot",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
+    "ConversionResult": "api.conversion",
     "DemoResult": "api.demo",
     "ExportResult": "api.fmu",
     "GapResult": "api.gap",
@@ -75,6 +77,7 @@ _HOMES = {
     "audit": "api.audit",
     "check_fmu": "api.fmu",
     "compare": "api.comparison",
+    "convert": "api.conversion",
     "find_gap": "api.gap",
     "identify": "api.identification",
     "json_schema": "api.schemas",
@@ -98,6 +101,7 @@ __all__ = [
     "AutopilotResult",
     "CheckResult",
     "ComparisonResult",
+    "ConversionResult",
     "DemoResult",
     "ExportResult",
     "GapResult",
@@ -128,6 +132,7 @@ __all__ = [
     "audit",
     "check_fmu",
     "compare",
+    "convert",
     "find_gap",
     "identify",
     "json_schema",

@@ -586,6 +586,27 @@ class BridgeKeys(_Keys):
     ballast: dict[str, Any] | None
 
 
+class ConvertedFigureKeys(_Part):
+    """A figure of a manoeuvre before and after a conversion."""
+
+    manoeuvre: str
+    figure: str
+    before: Number
+    after: Number
+    error_percent: Number
+
+
+class ConvertKeys(_Keys):
+    """A card in another language."""
+
+    ship: str
+    from_kind: str
+    to: str
+    fit: dict[str, Any] | None
+    figures: list[ConvertedFigureKeys]
+    notices: list[str]
+
+
 class ShipsKeys(_Keys):
     """The bundled ships."""
 
@@ -695,6 +716,7 @@ KEYS: dict[str, Any] = {
     "autopilot": AutopilotKeys,
     "check": CheckKeys,
     "compare": CompareKeys,
+    "convert": ConvertKeys,
     "demo": DemoKeys,
     "export": ExportKeys,
     "gap": GapKeys,

@@ -47,6 +47,7 @@ GROUPS = {
         "glide": "an underwater glider: glides, paths, range",
     },
     "Export": {
+        "convert": "a card in another language: MMG as a polynomial, other conventions, other programs",
         "export": "the FMU, Model Exchange and Co-Simulation",
         "check": "an FMU validated, and compared with its reference",
     },

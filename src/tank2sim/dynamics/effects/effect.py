@@ -230,7 +230,7 @@ class Effect:
         )
 
     def tried(self, card: ManoeuvringCard) -> bool:
-        """True if a search can begin on this ship: its model can have it, and required parameters have typical values."""
+        """True if a search can begin: this ship's model can have it, and required parameters have typical values."""
         if self.in_mmg and card.model.kind == "mmg":
             return False
         required = self.required()

@@ -93,6 +93,16 @@ def mmg_parameters(card: MmgCard) -> tuple[Parameter, ...]:
     )
 
 
+def is_symmetric(card: MmgCard) -> bool:
+    """True if the ship is alike to both sides: neither wake nor rudder flow depend on the side, and no Y0, N0."""
+    if card.derivatives.get("Y0") or card.derivatives.get("N0"):
+        return False
+    if card.propeller.number == 2:
+        return True
+    propeller, rudder = card.propeller, card.rudder
+    return propeller.C_2_plus == propeller.C_2_minus and rudder.gamma_R_plus == rudder.gamma_R_minus
+
+
 @dataclass(frozen=True)
 class Side:
     """One propeller with its rudder.

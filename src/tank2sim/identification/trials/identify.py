@@ -255,7 +255,9 @@ def _identified(
             raise InputError("--posterior", "", f"{options.method} has no density to sample", "leave --method out")
     if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
         problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
-        raise InputError("--structure", "", problem_text, "leave it out, or fit what tank2sim convert makes of the card")
+        raise InputError(
+            "--structure", "", problem_text, "leave it out, or fit what tank2sim convert makes of the card"
+        )
     structures: Mapping[str, CrossValidation] = {}
     weights: dict[str, float] = {}
     chosen: tuple[str, ...] = ()

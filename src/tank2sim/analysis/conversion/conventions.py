@@ -1,0 +1,149 @@
+"""A polynomial card, or the hull of an MMG card, written in another scaling, rudder sign or about another origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.analysis.conversion.origin import shift_matrix, shifted_body
+from tank2sim.cards.card import OPPOSITE, ManoeuvringCard, scales_of_file
+from tank2sim.cards.covariance import Covariance, not_referring, read_covariance
+from tank2sim.cards.reading import changed_text, parse_card
+from tank2sim.cards.scaling import FileScales, file_factor
+from tank2sim.cards.terms import known_term
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """Conventions of a card's text; None for those that it has.
+
+    Parameters
+    ----------
+    scaling : str, optional
+        ``prime``, ``prime_ii``, ``bis`` or ``dimensional``.
+    rudder_sign : str, optional
+        ``port`` or ``starboard``.
+    origin_m : float
+        The new origin forward of the old one, m.
+    """
+
+    scaling: str | None = None
+    rudder_sign: str | None = None
+    origin_m: float = 0.0
+
+    @property
+    def unchanged(self) -> bool:
+        """True if nothing is asked for."""
+        return self.scaling is None and self.rudder_sign is None and not self.origin_m
+
+
+def in_conventions(card: ManoeuvringCard, wanted: Conventions) -> ManoeuvringCard:
+    """The same ship with its numbers in other conventions; the covariance of the card is carried along.
+
+    Raises
+    ------
+    InputError
+        The scaling needs a particular that the card lacks, an MMG card cannot have what is asked for, or effects are
+        about midships and the origin is to be moved.
+    """
+    if wanted.unchanged:
+        return card
+    mmg = card.model.kind == "mmg"
+    if mmg and (wanted.origin_m or wanted.rudder_sign == "port"):
+        remedy = "convert it --to abkowitz, with the same options"
+        raise card.fault("model.kind", "is mmg, which is about midships with the rudder to starboard", remedy)
+    if wanted.origin_m and card.effects:
+        names = ", ".join(entry.name for entry in card.effects)
+        raise card.fault("effects", f"are about midships ({names})", "leave the origin, or the effects out")
+    model = card.model.model_copy(
+        update={
+            "scaling": wanted.scaling or card.model.scaling,
+            "rudder_sign": wanted.rudder_sign or card.model.rudder_sign,
+        }
+    )
+    try:
+        scales = scales_of_file(card.ship, card.environment, model)
+    except KeyError as error:
+        remedy = f'scaling "{model.scaling}" needs it: add it to the card'
+        raise card.fault(f"ship.{error.args[0]}", "is missing", remedy) from None
+    return _rewritten(card, wanted, scales, to_port=model.rudder_sign == "port")
+
+
+def _rewritten(
+    card: ManoeuvringCard, wanted: Conventions, scales: FileScales | None, *, to_port: bool
+) -> ManoeuvringCard:
+    ahead = wanted.origin_m / card.ship.length_m
+    stated = tuple(dict.fromkeys([*card.derivatives, *card.uncertainty]))
+    names, matrix = shift_matrix(stated, ahead)
+    values = matrix @ np.array([card.derivatives.get(name, 0.0) for name in stated])
+    known = read_covariance(card)
+    covariance = np.diag([card.uncertainty.get(name, 0.0) ** 2 for name in stated])
+    places = {name: f"derivatives.{card.places.get(name, name)}" for name in names}
+    if known is not None:
+        rows = [row for row, name in enumerate(stated) if places[name] in known.names]
+        columns = [known.names.index(places[stated[row]]) for row in rows]
+        old = np.array([card.file_factor(stated[row]) for row in rows])
+        covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(columns, columns)] / np.outer(old, old)
+    covariance = matrix @ covariance @ matrix.T
+
+    def factor(name: str) -> float:
+        sign = OPPOSITE.get(card.places.get(name, name), (name, 1.0))[1]
+        return sign * file_factor(known_term(name), scales, rudder_to_port=to_port)
+
+    changes: dict[str, object] = {}
+    if wanted.scaling:
+        changes["model.scaling"] = wanted.scaling
+    if wanted.rudder_sign:
+        changes["model.rudder_sign"] = wanted.rudder_sign
+    body = shifted_body(card.rigid_body, ahead)
+    of_mass, of_inertia, of_length = (scales.mass, scales.inertia, scales.length) if scales else (1.0, 1.0, 1.0)
+    changes |= {
+        "rigid_body.mass": _written(body.mass * of_mass),
+        "rigid_body.yaw_inertia": _written(body.yaw_inertia * of_inertia),
+        "rigid_body.x_G": _written(body.x_G * of_length),
+    }
+    if card.propulsion is not None and card.model.kind != "mmg":
+        changes["propulsion.Xnn"] = _written(card.propulsion.Xnn * (scales.force if scales else 1.0))
+    errors = np.sqrt(np.diag(covariance))
+    for name, value, error in zip(names, values, errors, strict=True):
+        if name in card.derivatives or value:
+            changes[places[name]] = _written(value * factor(name))
+        # Where no standard error is stated, that of the sum is not known either: 2 % is taken, as before.
+        if error > 0:
+            changes[places[name].replace("derivatives", "uncertainty", 1)] = _written(error * abs(factor(name)))
+    text = _without_other_spellings(card, changed_text(not_referring(card.text), card.source, changes))
+    new = parse_card(text, card.source)
+    assert isinstance(new, ManoeuvringCard)
+    if known is None:
+        return new
+    kept = [row for row, name in enumerate(names) if errors[row] > 0 and places[name] in changes]
+    sizes = np.array([factor(names[row]) for row in kept])
+    matrix_in_file = covariance[np.ix_(kept, kept)] * np.outer(sizes, sizes)
+    return replace(new, covariance=Covariance(tuple(places[names[row]] for row in kept), matrix_in_file))
+
+
+def _without_other_spellings(card: ManoeuvringCard, text: str) -> str:
+    """The text without a key of ``[uncertainty]`` that spells a term otherwise than ``[derivatives]`` does."""
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    section = document.get("uncertainty", {})
+    spelt = set(card.places.values())
+    for key in list(section):
+        name = OPPOSITE.get(key, (key, 1.0))[0]
+        if key not in spelt and name.isalnum() and _canonical(name) in card.places:
+            del section[key]
+    return tomlkit.dumps(document)
+
+
+def _canonical(name: str) -> str:
+    try:
+        return known_term(name).name
+    except ValueError:
+        return name
+
+
+def _written(value: float) -> float:
+    """Fourteen figures: more than any table prints, and without the noise of the last bits."""
+    return float(f"{value:.14g}")

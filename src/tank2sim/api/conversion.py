@@ -1,0 +1,264 @@
+"""A ship's card in another language: a polynomial for an MMG ship, other conventions, other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from tank2sim.analysis.conversion.conventions import Conventions, in_conventions
+from tank2sim.analysis.conversion.polynomial_fit import (
+    SCATTER,
+    FigureChange,
+    PolynomialFit,
+    figure_changes,
+    fit_polynomial,
+    manoeuvre_motions,
+    polynomial_card,
+    scattered_motions,
+)
+from tank2sim.analysis.conversion.program_code import mss_function, pvs_class
+from tank2sim.analysis.conversion.shipmmg_parameters import shipmmg_text
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.ship import Ship, as_ship
+from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards.card import MmgCard
+from tank2sim.cards.reading import changed_text, parse_card
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError, close_name
+from tank2sim.files import write_together
+
+LANGUAGES = {
+    "abkowitz": "a card with a third-order polynomial",
+    "mmg": "a card of the MMG method, in another scaling",
+    "shipmmg": "a Python file with the parameters of shipmmg",
+    "mss": "a function for MATLAB or Octave, as the ships of MSS are",
+    "pvs": "a Python file with a vehicle for the Python Vehicle Simulator",
+}
+"""What a card can be converted to."""
+
+_SCALINGS = ("prime", "prime_ii", "bis", "dimensional")
+
+
+@dataclass(frozen=True)
+class ConvertedText:
+    """What was made: the text, and the card if it is one."""
+
+    text: str
+    card: ManoeuvringCard | None = None
+    fit: PolynomialFit | None = None
+    changes: tuple[FigureChange, ...] = ()
+
+
+class ConversionResult(Result):
+    """A ship in another language.
+
+    Parameters
+    ----------
+    ship : Ship
+        As it was given.
+    language : str
+        One of :data:`LANGUAGES`.
+    made : ConvertedText
+    notices : tuple of str
+    """
+
+    command = "convert"
+
+    def __init__(self, ship: Ship, language: str, made: ConvertedText, notices: tuple[str, ...]) -> None:
+        self.ship, self.language, self.made, self.notices = ship, language, made, notices
+
+    @property
+    def text(self) -> str:
+        """The file."""
+        return self.made.text
+
+    @property
+    def converted(self) -> Ship:
+        """The ship of the card that was made.
+
+        Raises
+        ------
+        LookupError
+            No card was made, but a file of another program.
+        """
+        if self.made.card is None:
+            raise LookupError(f"{self.language} is no card")
+        return Ship(self.made.card)
+
+    def files(self, path: str | Path) -> dict[Path, str | bytes]:
+        """The file at `path`, with the covariance of a card next to it."""
+        return {Path(path): self.text} if self.made.card is None else self.made.card.files(Path(path))
+
+    def save(self, path: str | Path) -> None:
+        """Write :meth:`files`, all or none.
+
+        Raises
+        ------
+        InputError
+            A file cannot be written.
+        """
+        write_together(self.files(path), inputs=[Path(self.ship.card.source)])
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        fit = self.made.fit
+        return {
+            "ship": self.ship.name,
+            "from_kind": self.ship.card.model.kind,
+            "to": self.language,
+            "fit": fit
+            and {
+                "residuals_percent": {name: 100 * value for name, value in fit.residuals.items()},
+                "ranges": {name: list(value) for name, value in fit.ranges.items()},
+            },
+            "figures": [asdict(change) | {"error_percent": _percent(change)} for change in self.made.changes],
+            "notices": list(self.notices),
+        }
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """What was made of what, and how well a fit follows."""
+        line = f"{self.ship.name} ({self.ship.card.model.kind}): {LANGUAGES[self.language]}"
+        fit = self.made.fit
+        if fit is None:
+            return (line,)
+        residuals = ", ".join(f"{name} {100 * value:.1f} %" for name, value in fit.residuals.items())
+        low, high = fit.ranges["u"]
+        widest = {name: max(map(abs, fit.ranges[name])) for name in ("drift_deg", "yaw_rate_prime", "rudder_deg")}
+        envelope = (
+            f"u {low:.2g} to {high:.2g} u0, drift to {widest['drift_deg']:.3g} deg, r' to "
+            f"{widest['yaw_rate_prime']:.2g}, rudder to {widest['rudder_deg']:.3g} deg"
+        )
+        return line, f"fitted over {envelope} at nominal revolutions; residuals of the forces: {residuals}"
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Figures of standard manoeuvres before and after."""
+        if not self.made.changes:
+            return ()
+        rows = [
+            [change.manoeuvre, change.figure, change.before, change.after, _percent(change)]
+            for change in self.made.changes
+        ]
+        return (ResultTable("Standard manoeuvres", ("manoeuvre", "figure", "card", "polynomial", "error (%)"), rows),)
+
+
+def _percent(change: FigureChange) -> float | None:
+    if change.before is None or change.after is None or not change.before:
+        return None
+    return 100 * (change.after / change.before - 1)
+
+
+def convert(
+    card: str | Path | Ship,
+    to: str = "abkowitz",
+    *,
+    scaling: str | None = None,
+    rudder_sign: str | None = None,
+    origin_m: float = 0.0,
+    scatter: float = SCATTER,
+) -> ConversionResult:
+    """Write a ship's card in another language.
+
+    An MMG ship becomes a polynomial by least squares over the motions of standard manoeuvres; between polynomial cards
+    the conversions of scaling, rudder sign and origin are exact. Files of other programs are written from the equations
+    themselves.
+
+    Parameters
+    ----------
+    card : str, path or Ship
+    to : str
+        One of :data:`LANGUAGES`.
+    scaling : str, optional
+        Of a card: ``prime``, ``prime_ii``, ``bis`` or ``dimensional``; by default as it is, ``prime`` for a fit.
+    rudder_sign : str, optional
+        Of a card: side to which a positive rudder turns the ship, ``port`` or ``starboard``.
+    origin_m : float
+        Of a card: the new origin forward of the old one, m.
+    scatter : float
+        Of a fit: how far motions are scattered about those of standard manoeuvres, over
+        :data:`tank2sim.analysis.conversion.polynomial_fit.SPREADS`.
+
+    Raises
+    ------
+    InputError
+        The card is at fault or cannot be had in that language.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> made = t2s.convert("mariner", scaling="dimensional")
+    >>> round(made.converted.turn(35).figures["tactical_diameter_lengths"], 1)
+    6.4
+    """
+    if to not in LANGUAGES:
+        raise InputError("--to", to, "is not a language of cards", close_name(to, LANGUAGES))
+    for option, value, known in (
+        ("--scaling", scaling, _SCALINGS),
+        ("--rudder-sign", rudder_sign, ("port", "starboard")),
+    ):
+        if value is not None and value not in known:
+            raise InputError(option, value, "is not known", close_name(value, known))
+    if not 0 < scatter <= 10:
+        raise InputError("--scatter", f"{scatter:g}", "is out of bounds", "give a number above 0, to 10")
+    ship = as_ship(card)
+    given = ship.manoeuvring()
+    if abs(origin_m) > given.ship.length_m:
+        raise InputError("--origin", f"{origin_m:g}", "is more than a length from midships", "give it in m")
+    wanted = Conventions(scaling, rudder_sign, origin_m)
+    if to in ("shipmmg", "mss", "pvs"):
+        if not wanted.unchanged:
+            raise InputError("--to", to, "has conventions of its own", "leave --scaling, --rudder-sign, --origin out")
+        return _program(ship, given, to)
+    if to == "mmg" and not isinstance(given, MmgCard):
+        problem = f"is {given.model.kind}: without thrust and rudder force its terms cannot be split into MMG's"
+        raise given.fault("model.kind", problem, "convert an MMG card to abkowitz, not the other way")
+    notices: tuple[str, ...] = ()
+    if origin_m:
+        notices = (
+            "U of the new origin scales the numbers now: a difference of second order in the distance and r'",
+            "figures, positions and speeds of the new card are those of its own origin",
+        )
+    if to == "abkowitz" and isinstance(given, MmgCard):
+        return _fitted(ship, given, wanted, scatter, notices)
+    if to == "abkowitz" and given.model.kind == "linear":
+        changed = parse_card(changed_text(given.text, given.source, {"model.kind": "abkowitz"}), given.source)
+        assert isinstance(changed, ManoeuvringCard)
+        given, notices = changed, (*notices, "third-order terms that the card does not have are zero")
+    made = in_conventions(given, wanted)
+    build(made)
+    return ConversionResult(ship, to, ConvertedText(made.text, made), notices)
+
+
+def _fitted(
+    ship: Ship, card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[str, ...]
+) -> ConversionResult:
+    bare = build(card)
+    model = build(replace(card, effects=())) if card.effects else bare
+    fit = fit_polynomial(card, model, scattered_motions(model, manoeuvre_motions(model), scatter))
+    polynomial = polynomial_card(card, fit)
+    changes = figure_changes(bare, build(polynomial))
+    made = in_conventions(polynomial, wanted)
+    if card.uncertainty or card.interaction_errors:
+        notices = (*notices, "standard errors of the MMG card are not carried over: 2 % of each derivative is assumed")
+    return ConversionResult(ship, "abkowitz", ConvertedText(made.text, made, fit, changes), notices)
+
+
+def _program(ship: Ship, card: ManoeuvringCard, to: str) -> ConversionResult:
+    if to == "shipmmg":
+        if not isinstance(card, MmgCard):
+            raise card.fault(
+                "model.kind", f"is {card.model.kind}, and shipmmg is a program of the MMG method", "use mss"
+            )
+        notices = [
+            "shipmmg has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
+            "more tightly than the card"
+        ]
+        if card.effects:
+            notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+        if card.ship.beam_m is None:
+            notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
+        return ConversionResult(ship, to, ConvertedText(shipmmg_text(card)), tuple(notices))
+    write = mss_function if to == "mss" else pvs_class
+    return ConversionResult(ship, to, ConvertedText(write(card, build(card))), ())
