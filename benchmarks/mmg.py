@@ -1,8 +1,8 @@
 """The KVLCC2 in the MMG standard method: figures next to the same equations integrated elsewhere, shipmmg, and MARIN.
 
-The references are trajectories of an own integration of the method's equations (SciPy DOP853, rtol 1e-10) and of shipmmg
-0.0.11, which has another wake law; measured figures are those of MARIN's free-running model (1:45.714). Then what the
-third-order polynomial that ``tank2sim convert`` fits to the ship makes of the same manoeuvres.
+The references are trajectories of an integration of the method's equations elsewhere (SciPy DOP853, rtol 1e-10) and of
+shipmmg 0.0.11, which has another wake law; measured figures are those of MARIN's free-running model (1:45.714). Next to
+them are the third-order polynomial that ``tank2sim convert`` fits to the ship, and the ship at full scale.
 """
 
 from __future__ import annotations

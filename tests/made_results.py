@@ -66,6 +66,8 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "autopilot along a track": lambda _: t2s.load("mariner").autopilot(track=[[0, 0], [3000, 0], [6000, 1500]]),
     "check": _check,
     "compare": lambda _: t2s.compare(["mariner", "kvlcc2-captive"], members=2),
+    "convert": lambda _: t2s.convert("kvlcc2-l7-mmg"),
+    "convert to another scaling": lambda _: t2s.convert("mariner", scaling="dimensional"),
     "export": lambda folder: t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2),
     "gap": lambda _: _gap(made_up.missing),
     "gap with an unnamed effect": lambda _: _gap(made_up.outside),

@@ -226,7 +226,8 @@ def test_an_mss_function_has_the_rates_of_the_model(name: str, tmp_path: Path) -
     function = program_name(t2s.load(name).manoeuvring())
     made.save(tmp_path / f"{function}.m")
     call = f"[xd, U] = {function}([{' '.join(map(str, STATE))}]'); printf('%.17g ', xd, U)"
-    done = subprocess.run(["octave", "--no-gui", "-q", "--eval", call], cwd=tmp_path, capture_output=True, text=True)
+    command = ["octave", "--no-gui", "-q", "--eval", call]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     found = [float(word) for word in done.stdout.split()]
     expected = np.array(model.rhs(STATE, model.input_values(), model.parameter_values())).ravel()
     assert found[:-1] == pytest.approx(expected, rel=1e-12) and found[-1] == pytest.approx(math.hypot(0.8, 0.2))

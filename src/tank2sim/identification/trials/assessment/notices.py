@@ -41,6 +41,8 @@ def _recognised(result: Identification) -> list[str]:
 
 
 def _chosen(result: Identification) -> list[str]:
+    if result.card.model.kind == "mmg":
+        return []  # it has one structure
     if not result.structures and result.structure == "card":
         return [
             "other structures were not tried: --structure auto cross-validates them, cross_flow extrapolates to turns"
