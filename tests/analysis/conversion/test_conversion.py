@@ -129,7 +129,7 @@ def test_an_mmg_card_in_other_scalings_is_the_same_ship() -> None:
 
 
 def test_in_small_motions_the_fit_is_the_linear_map_of_the_method() -> None:
-    """Of a ship alike to both sides, in Prime II: Yv, Nv, Yr - m_x', Nr with the rudder's share, Yd, Nd, X_vr + m_y'."""
+    """Of a ship alike to both sides, in Prime II: hull with the rudder's share, Yr - m_x', X_vr + m_y', Yd, Nd."""
     card = mmg_ship(ALIKE.replace("C_1 = 2.0", "C_1 = 0.0")).card
     assert isinstance(card, MmgCard)
     model, size, U = build(card), 1e-2, 1.179
