@@ -96,7 +96,6 @@ def test_stated_revolutions_are_taken() -> None:
         ("k_0 = 0.2931\nk_1 = -0.2753\nk_2 = -0.1385", "J = [0.0, 0.3, 0.6]\nK_T = [0.3]", "propeller.K_T"),
         ("k_0 = 0.2931\nk_1 = -0.2753\nk_2 = -0.1385", "", "propeller.k_0"),
         ("f_alpha = 2.747\n", "", "rudder.f_alpha"),
-        ("f_alpha = 2.747", "f_alpha = 2.747\naspect_ratio = 1.8", "rudder.f_alpha"),
         ("height_m = 0.345", "height_m = 0.2", "rudder.height_m"),
         ("height_m = 0.345", "height_m = 0.345\nnumber = 2\ny_R = 0.1", "rudder.number"),
         ("t_P = 0.220", "t_P = 0.220\nnumber = 2", "propeller.y_P"),
@@ -128,3 +127,13 @@ def test_a_faulty_mmg_card_is_refused_in_one_line_with_its_key(old: str, new: st
 def test_a_ship_without_resistance_that_thrust_can_balance_has_no_revolutions() -> None:
     with pytest.raises(InputError, match=r"R0.*no revolutions"):
         mmg_of(TEXT.replace("k_0 = 0.2931", "k_0 = -0.2931"))
+
+
+def test_an_error_of_a_polynomial_that_the_card_does_not_state_is_refused() -> None:
+    table = TEXT.replace("k_0 = 0.2931\nk_1 = -0.2753\nk_2 = -0.1385", "J = [0, 0.3, 0.6]\nK_T = [0.3, 0.2, 0.1]")
+    with pytest.raises(InputError, match=r"uncertainty\.k_0"):
+        mmg_of(table.replace("J = [0, ", "J = [0.0, ") + "\n[uncertainty]\nk_0 = 0.01\n")
+
+
+def test_a_stated_slope_of_the_rudder_goes_before_its_aspect_ratio() -> None:
+    assert mmg_of(TEXT.replace("f_alpha = 2.747", "f_alpha = 2.9\naspect_ratio = 1.8")).rudder.f_alpha == 2.9

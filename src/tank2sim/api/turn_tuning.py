@@ -12,6 +12,7 @@ from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTur
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
+from tank2sim.cards.card import MmgCard
 from tank2sim.cards.derived import derived_card
 from tank2sim.cards.reading import revised
 from tank2sim.errors import InputError
@@ -98,7 +99,11 @@ class TurnTuningResult(Result):
         """The card with the scaled derivatives, whose standard errors keep their share."""
         card, tuning = self.ship.manoeuvring(), self.tuning
         changed: dict[str, tuple[float, float]] = {}
+        others: dict[str, object] = {}
         for place, value in tuning.parameters.items():
+            if isinstance(card, MmgCard) and (key := place.removeprefix("mmg.")) in card.interaction_places():
+                others[card.interaction_places()[key]] = value
+                continue
             name = place.removeprefix("derivatives.")
             if old := card.derivatives.get(name, 0.0):
                 changed[name] = (value, abs(value / old) * card.standard_error(name))
@@ -106,7 +111,7 @@ class TurnTuningResult(Result):
             f"hull and rudder scaled by {tuning.hull:.5g} and {tuning.rudder:.5g} to turn through "
             f"{' '.join(self.points)}"
         )
-        source = {"ship.source": f"{card.ship.source}; {how}"}
+        source = {"ship.source": f"{card.ship.source}; {how}", **others}
         text = revised(card, changed, source, comment="scaled to two turns").text
         return derived_card(card, text, "the tuned card")
 

@@ -241,7 +241,7 @@ def _coefficients(card: ManoeuvringCard) -> dict[str, dict[str, float | bool | N
             "standard_error": card.standard_error(name),
             "stated": name in card.uncertainty,
         }
-        for name in ALL_TERMS
+        for name in (*ALL_TERMS, *(name for name in card.derivatives if name not in ALL_TERMS))
         if card.derivatives.get(name)
     }
 

@@ -47,6 +47,9 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     errors = {
         key: error for key, error in form.uncertainty.items() if key in (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
     }
+    if form.propeller.J is not None and (key := next((key for key in ("k_0", "k_1", "k_2") if key in errors), "")):
+        remedy = "give k_0, k_1, k_2 in place of J and K_T, or leave it out"
+        raise InputError(source, f"uncertainty.{key}", "is of a polynomial, and [propeller] has a table", remedy)
     remaining = {key: error for key, error in form.uncertainty.items() if key not in errors}
     own = {"propeller": propeller, "rudder": rudder, "interaction_errors": errors}
     return own, form.model_copy(update={"propulsion": None, "uncertainty": remaining})
@@ -117,12 +120,11 @@ def open_water_fit(J: list[float], K_T: list[float], source: str) -> OpenWaterFi
 def _rudder(section: MmgRudder, source: str) -> MmgRudder:
     if section.gamma_R_plus is None:
         raise InputError(source, "rudder.gamma_R_plus", "is missing", "give gamma_R_plus and gamma_R_minus")
-    if (section.f_alpha is None) == (section.aspect_ratio is None):
-        problem = "is missing" if section.f_alpha is None else "is given, and aspect_ratio too"
-        raise InputError(source, "rudder.f_alpha", problem, "give f_alpha or aspect_ratio")
+    if section.f_alpha is None and section.aspect_ratio is None:
+        raise InputError(source, "rudder.f_alpha", "is missing", "give f_alpha or aspect_ratio")
     if section.number == 2 and section.y_R is None:
         raise InputError(source, "rudder.y_R", "is missing", "two rudders need their distance to midships, over L")
-    if section.aspect_ratio is None:
+    if section.f_alpha is not None or section.aspect_ratio is None:
         return section
     return section.model_copy(update={"f_alpha": fujii(section.aspect_ratio)})
 

@@ -75,12 +75,17 @@ class Levers:
 
 
 def levers_of_ship(card: ManoeuvringCard, model: Model) -> Levers:
-    """The levers of a ship in the derivatives of (3.5) or (3.8): Nv, Nvu, ..; Nr, Nru, ..; all terms with a rudder."""
+    """The levers of a ship in the derivatives of (3.5) or (3.8): Nv, Nvu, ..; Nr, Nru, ..; all terms with a rudder.
+
+    Of an MMG ship f_alpha takes the place of the rudder's terms.
+    """
     static: list[str] = []
     damping: dict[str, float] = {}
     rudder: list[str] = []
     body = card.rigid_body
     total = card.model.yaw_rate_terms == "total"
+    if "mmg.f_alpha" in model:
+        rudder.append("mmg.f_alpha")
     for name in model.parameter_names:
         term = parse_term(name.removeprefix("derivatives.")) if name.startswith("derivatives.") else None
         if term is None or term.acceleration:

@@ -36,6 +36,7 @@ BEYOND_STANDARD_ERRORS = 2.0
 """Standard errors from which a difference is reported: chance alone exceeds it in 5 % of the cases."""
 
 _ABSENT = 1e-12
+_OF_MMG_ALONE = ("Xvvvv",)
 _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
 
 
@@ -107,7 +108,7 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
     reference = cards[0]
     expansions = [expanded_as(card, reference) for card in cards]
     rows = []
-    for name in (*_RIGID_BODY, *ALL_TERMS):
+    for name in (*_RIGID_BODY, *ALL_TERMS, *_OF_MMG_ALONE):
         if not any(name in expansion.coefficients for expansion in expansions):
             continue
         found = tuple(_in_sign_of(reference, name, expansion.coefficients.get(name)) for expansion in expansions)
@@ -168,10 +169,11 @@ def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -
 
 
 def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficient]:
+    """Parameters of effects, and of the propeller and rudder of an MMG card."""
     return {
         parameter.name: CardCoefficient(parameter.value, parameter.standard_error, not parameter.assumed)
         for parameter in card_parameters(card, model)
-        if parameter.key.startswith("effects.")
+        if parameter.key.startswith("effects.") or parameter.name.startswith("mmg.")
     }
 
 
@@ -184,7 +186,8 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     """The coefficients of a card in the speed, scaling and inertial convention of another."""
     ratio = _froude(reference) / _froude(card)
     linear = "linear" in (card.model.kind, reference.model.kind)
-    if abs(ratio - 1) < _SAME_SPEED or linear:
+    mmg = "mmg" in (card.model.kind, reference.model.kind)  # whose hull has no terms in the speed
+    if abs(ratio - 1) < _SAME_SPEED or linear or mmg:
         ratio = 1.0
     names, matrix, constant = _conversion(card, reference, ratio)
     sources = [name for name in card.derivatives if name in names]
@@ -207,7 +210,7 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
         if outside and (known != {name} or abs(value - card.derivatives[name]) > _ABSENT):
             refused.setdefault(name, "the reference's speed is outside the range in which this card holds")
         found[name] = CardCoefficient(value, error if known else None, bool(known) and known <= stated)
-    for name in ACCELERATION_TERMS:
+    for name in (*ACCELERATION_TERMS, *_OF_MMG_ALONE):
         if name in card.derivatives:
             stated_error = name in card.uncertainty
             found[name] = CardCoefficient(card.derivatives[name], card.standard_error(name), stated_error)
@@ -229,6 +232,9 @@ def _linear_names() -> tuple[str, ...]:
 
 def _refused(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float, linear: bool) -> dict[str, str]:
     found = {}
+    if (card.model.kind == "mmg") != (reference.model.kind == "mmg"):
+        # Without propeller and rudder in one of them, and X_vr, Y_r without added mass.
+        return {name: "of the bare hull in the MMG card alone" for name in ALL_TERMS if name not in ACCELERATION_TERMS}
     if linear:
         found = {name: "not in the linear model" for name in ALL_TERMS if name not in _linear_names()}
     if ratio != 1 and not (card.propulsion and reference.propulsion):
