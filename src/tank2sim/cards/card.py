@@ -17,7 +17,7 @@ from tank2sim.cards.form import (
     MmgModel,
     MmgPropeller,
     MmgRudder,
-    MmgShip,
+    MmgShipSection,
     ProgrammeSection,
     Propulsion,
     RigidBody,
@@ -95,7 +95,7 @@ class Card:
         write_together(self.files(Path(path)))
 
     def fault(self, place: str, problem: str, remedy: str) -> InputError:
-        """An error about this card, to be raised."""
+        """An error about this card, to be raised: its place, the problem, and the remedy."""
         return InputError(self.source, place, problem, remedy)
 
 
@@ -204,7 +204,7 @@ class MmgCard(ManoeuvringCard):
         Standard errors of numbers in ``[propeller]`` and ``[rudder]``, by key.
     """
 
-    ship: MmgShip
+    ship: MmgShipSection
     model: MmgModel
     propeller: MmgPropeller = field(kw_only=True)
     rudder: MmgRudder = field(kw_only=True)

@@ -126,7 +126,7 @@ steady turn (a tanker at full rudder keeps 0.35), for its coefficients do not de
 
 
 class MmgModel(ShipModel):
-    """``[model]`` of an MMG card: its conventions are those of the method, but for the scaling."""
+    """``[model]`` of an MMG card: its conventions are those of the method, except for the scaling."""
 
     kind: Literal["mmg"]
     scaling: Literal["prime", "prime_ii", "bis", "dimensional"] = "prime_ii"
@@ -184,7 +184,7 @@ class Propulsion(CardSection):
     Xnn: float
 
 
-class MmgShip(ShipSection):
+class MmgShipSection(ShipSection):
     """``[ship]`` of an MMG card, whose propeller and rudder need their sizes."""
 
     draught_m: Positive
@@ -201,7 +201,7 @@ class MmgPropulsion(CardSection):
 Share = Annotated[float, Field(gt=-1, lt=1)]
 Place = Annotated[float, Field(ge=-2, le=2)]
 Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
-NotNegative = Annotated[float, Field(ge=0, le=1e3)]
+CardNotNegative = Annotated[float, Field(ge=0, le=1e3)]
 
 
 class MmgPropeller(CardSection):
@@ -237,10 +237,10 @@ class MmgPropeller(CardSection):
     w_P0: Share
     x_P: Place = -0.5
     y_P: Place | None = None
-    C_1: NotNegative | None = None
+    C_1: CardNotNegative | None = None
     C_2_plus: Positive | None = None
     C_2_minus: Positive | None = None
-    astern: NotNegative = ASTERN_THRUST
+    astern: CardNotNegative = ASTERN_THRUST
 
 
 class MmgRudder(CardSection):
@@ -272,7 +272,7 @@ class MmgRudder(CardSection):
     x_R: Place = -0.5
     y_R: Place | None = None
     eps: Positive
-    kappa: NotNegative
+    kappa: CardNotNegative
     l_R: Place
     gamma_R_plus: Coefficient | None = None
     gamma_R_minus: Coefficient | None = None
@@ -471,7 +471,7 @@ class ShipCard(CardSection):
 class MmgForm(ShipCard):
     """The card of a ship by the MMG method, as in its file."""
 
-    ship: MmgShip
+    ship: MmgShipSection
     model: MmgModel
     propulsion: MmgPropulsion | None = None  # type: ignore[assignment]
     propeller: MmgPropeller

@@ -182,7 +182,7 @@ def _rudder_forces(hull: Hull) -> Forces:
 
 
 def rudder_quantities(forces: Forces) -> tuple[Quantity, Quantity, Quantity]:
-    """``rudder.X``, ``rudder.Y``, ``rudder.N``, by the rudder alone: N, N and N m."""
+    """``rudder.X``, ``rudder.Y``, ``rudder.N`` of the `forces` by the rudder alone: N, N and N m."""
     X, Y, N = forces
     return (
         Quantity(name="rudder.X", unit="N", description="Surge force by the rudder, positive forward", value=X),
@@ -237,7 +237,15 @@ def polynomial_forces(hull: Hull) -> tuple[Quantity, ...]:
 
 
 def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity, Quantity]:
-    """``force.X``, ``force.Y``, ``force.N``: the right-hand sides f1, f2, f3 (N, N, N m) of the `equations` named."""
+    """``force.X``, ``force.Y``, ``force.N``: the right-hand sides f1, f2, f3 of the `equations` named.
+
+    Parameters
+    ----------
+    forces : tuple of casadi.SX
+        Their values: N, N, N m.
+    equations : str
+        What they are called, for the descriptions.
+    """
     f1, f2, f3 = forces
     return (
         Quantity(

@@ -241,13 +241,13 @@ def hull_forces(s: Symbols, V: ca.SX, X_bound: ca.SX, X_u0: ca.SX, linear: Mappi
 
 
 def slow_resistance(s: Symbols, V: ca.SX, resistance: Any) -> ca.SX:
-    """X (N) of a resistance (kg/m) that goes with the square of speed and opposes motion ahead and astern."""
+    """X (N) of a resistance (kg/m) that goes with the square of speed V (m/s) and opposes motion ahead and astern."""
     force: ca.SX = -resistance * s["motion.u"] * (V + LINEAR_DAMPING * s["ship.speed"])
     return force
 
 
 def slow_sway_and_yaw(s: Symbols, V: ca.SX, linear: Mapping[str, Any]) -> tuple[ca.SX, ca.SX]:
-    """Y and N (N, N m) of the hull at low speed without inertial terms; arguments as in :func:`hull_forces`."""
+    """Y and N (N, N m) of the hull at low speed without inertial terms; V, `linear` as in :func:`hull_forces`."""
     u, v, r = s["motion.u"], s["motion.v"], s["motion.r"]
     Y_drag, N_drag = _cross_flow_drag(s)
     V = V + LINEAR_DAMPING * s["ship.speed"]

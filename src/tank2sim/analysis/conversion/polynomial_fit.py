@@ -86,7 +86,22 @@ def manoeuvre_motions(model: Model) -> Array:
 
 
 def scattered_motions(model: Model, motions: Array, scatter: float = SCATTER, samples: int = SAMPLES) -> Array:
-    """Motions (`samples`, 4) about the given ones, within the rudder's limits and ahead of rest."""
+    """Motions about those of manoeuvres, within the rudder's limits and ahead of rest.
+
+    Parameters
+    ----------
+    model : Model
+    motions : array (n, 4)
+        u, v, r, rudder, SI.
+    scatter : float
+        Over :data:`SPREADS`.
+    samples : int
+        Number of motions to return.
+
+    Returns
+    -------
+    array (`samples`, 4)
+    """
     values = {parameter.name: parameter.start for parameter in model.parameters}
     u0, length = values["ship.speed"], values["ship.length"]
     largest = values.get("steering.max_angle", math.pi / 2)
