@@ -91,7 +91,7 @@ def test_wishes_that_contradict_each_other_are_a_finding_unless_a_card_was_asked
             ["mariner", "--through", "35@35", "20@-3"],
             ["35 deg/min to starboard", "20 deg/min to port at 3 deg to port"],
         ),
-        (["wilinski-zellman", "--figure", "criterion_C"], ["linear or abkowitz"]),
+        (["wilinski-zellman", "--figure", "criterion_C"], ["linear, abkowitz or mmg"]),
         (["mariner", "--set", "derivatives.Nd=0", "--set", "derivatives.Yd=0", "--figure", "T_s"], ["straight course"]),
     ],
 )

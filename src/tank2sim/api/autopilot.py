@@ -254,7 +254,9 @@ def pilot_ship(
     """
     card = ship.card
     if not isinstance(card, ManoeuvringCard):
-        raise InputError(card.source, "model.kind", "has no rudder", "an autopilot needs a linear or abkowitz card")
+        raise InputError(
+            card.source, "model.kind", "has no rudder", "an autopilot needs a linear, abkowitz or mmg card"
+        )
     check_settings(settings)
     try:
         found = study_autopilot(card, ship.model, replace(settings, waypoints=_waypoints(track)))

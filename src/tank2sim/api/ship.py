@@ -120,7 +120,7 @@ class Ship:
             It is not: a towed body, a yaw rig or a glider.
         """
         if not isinstance(self.card, ManoeuvringCard):
-            remedy = "give a linear or abkowitz card"
+            remedy = "give a linear, abkowitz or mmg card"
             raise InputError(self.card.source, "model.kind", "is not that of a ship that manoeuvres", remedy)
         return self.card
 
@@ -650,7 +650,7 @@ def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
         if find_steering_card(str(card)) is None:
             raise
         problem = "is a steering card (equations of drift and turning), not a ship card"
-        remedy = "give a ship card (kind linear or abkowitz); tank2sim influence shows a steering card"
+        remedy = "give a ship card (kind linear, abkowitz or mmg); tank2sim influence shows a steering card"
         raise InputError(card, "", problem, remedy) from None
 
 

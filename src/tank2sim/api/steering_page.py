@@ -100,7 +100,7 @@ def make_steering_page(
 
     card, model = ship.card, ship.model
     if not isinstance(card, ManoeuvringCard):
-        raise InputError(card.source, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
+        raise InputError(card.source, "", "has no rudder", "only a ship (kind linear, abkowitz or mmg) can be steered")
     trial = measured([Path(ghost)], card) if ghost else None
     shown = ghost_of(trial.trials[0], model) if trial else None
     if shown and shown.by_angle:

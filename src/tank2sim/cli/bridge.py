@@ -86,5 +86,7 @@ def manoeuvring(card: Card, what: str) -> ManoeuvringCard:
         It is not.
     """
     if not isinstance(card, ManoeuvringCard):
-        raise card.fault("model.kind", f"is not that of a ship that {what}", "give a card of kind linear or abkowitz")
+        raise card.fault(
+            "model.kind", f"is not that of a ship that {what}", "give a card of kind linear, abkowitz or mmg"
+        )
     return card

@@ -72,7 +72,7 @@ def simulate(
     """
     if "rudder.command" not in model:
         raise InputError(
-            model.origin, "", "has no rudder", "manoeuvres need the card of a ship (kind linear or abkowitz)"
+            model.origin, "", "has no rudder", "manoeuvres need the card of a ship (kind linear, abkowitz or mmg)"
         )
     if duration_s is not None and not 0 < duration_s < LONGEST_RUN_S:
         raise InputError(

@@ -50,7 +50,9 @@ def straight_course(
         The model is not a ship, or the course does not exist.
     """
     if "rudder.angle" not in model:
-        raise InputError(model.origin, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)")
+        raise InputError(
+            model.origin, "", "has no rudder", "this needs the card of a ship (kind linear, abkowitz or mmg)"
+        )
     p = model.parameter_values() if parameters is None else parameters
     u = model.input_values() if inputs is None else inputs.copy()
     x = np.array(model.initial(p)).ravel()

@@ -141,7 +141,9 @@ def design_heading(
 def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant:
     """The ship with its gear at a speed, for design. Raises as :func:`design_heading`."""
     if "rudder.angle" not in ship:
-        raise InputError(ship.origin, "", "has no rudder", "an autopilot needs the card of a ship (linear or abkowitz)")
+        raise InputError(
+            ship.origin, "", "has no rudder", "an autopilot needs the card of a ship (linear, abkowitz or mmg)"
+        )
     values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     if speed_mps is not None and not slowest <= speed_mps <= fastest:

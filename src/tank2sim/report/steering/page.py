@@ -70,7 +70,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         The model has no rudder.
     """
     if "rudder.command" not in model.input_names:
-        raise InputError(model.origin, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
+        raise InputError(model.origin, "", "has no rudder", "only a ship (kind linear, abkowitz or mmg) can be steered")
     if library is None:
         notices = [NO_WASM_COMPILER, *notices]
     environment = jinja2.Environment(
