@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
+from tank2sim.gap.outcome.improve_card import add_effects_to_card
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
 SIZES = {"time_constant_s": 2.0, "depth_m": 1.5}
@@ -121,6 +123,27 @@ def test_coefficients_of_hull_and_rudder_are_found_in_trials(tmp_path: Path) -> 
             t2s.identify(start, paths, structure=structure)
 
 
+def test_effects_are_written_into_the_keys_of_the_method() -> None:
+    card = ship_of(TEXT).card
+    assert isinstance(card, MmgCard)
+    found = [
+        ("linear_yaw_damping", {"factor": 0.2}, {"factor": 0.02}),
+        ("added_sway_mass", {"factor": 0.1}, {"factor": 0.02}),
+        ("rudder_effectiveness", {"factor": 0.15}, {"factor": 0.02}),
+    ]
+    new = add_effects_to_card(card, found)
+    in_file = tomllib.loads(new.text)["derivatives"]
+    assert in_file["Nr"] == pytest.approx(-0.049 * 1.2, rel=1e-3) and in_file["Yr"] == pytest.approx(0.0996, rel=1e-3)
+    assert in_file["my"] == pytest.approx(0.2453, rel=1e-3)
+    # Its rudder has no derivatives: the effect stays one, and is what f_alpha would be.
+    assert [entry.name for entry in new.effects] == ["rudder_effectiveness"]
+    same = ship_of(TEXT.replace("f_alpha = 2.747", f"f_alpha = {2.747 * 1.15}").replace("my = 0.223", "my = 0.2453"))
+    same = same.replace(
+        {"derivatives.Nr": in_file["Nr"], "derivatives.Yr": in_file["Yr"], "derivatives.my": in_file["my"]}
+    )
+    assert t2s.Ship(new).turn(35).figures == pytest.approx(same.turn(35).figures, rel=1e-9)
+
+
 @pytest.mark.slow
 def test_a_missing_effect_is_found_on_an_mmg_card(tmp_path: Path) -> None:
     more = '\n[[effects]]\nname = "linear_yaw_damping"\n[effects.parameters]\nfactor = 0.2\n'
@@ -129,3 +152,27 @@ def test_a_missing_effect_is_found_on_an_mmg_card(tmp_path: Path) -> None:
     assert content["verdict"] == "missing effect"
     (effect,) = content["effects"]  # type: ignore[misc]
     assert effect["name"] == "linear_yaw_damping"
+
+
+def test_reports_describe_the_method_and_keep_bare_hull_and_polynomial_apart(tmp_path: Path) -> None:
+    paths = written(ship_of(TEXT), tmp_path)
+    page = t2s.validate("kvlcc2-l7-mmg", paths[:1], members=0).page()
+    assert "MMG standard method" in page
+    rows = t2s.compare(["kvlcc2-l7-mmg", "kvlcc2-l7"], members=0).to_dict()["coefficients"]
+    apart = {row["name"]: row["differences"][0] for row in rows}  # type: ignore[attr-defined]
+    for name in ("Yv", "Nr", "Xvr"):
+        assert apart[name]["standard_errors"] is None and "bare hull" in str(apart[name]), name
+    assert apart["Nrdot"]["percent"] is not None
+
+
+def test_hull_and_rudder_are_scaled_to_turn_through_two_points(tmp_path: Path) -> None:
+    wanted = ship_of(TEXT.replace("f_alpha = 2.747", "f_alpha = 2.6")).stability().study.turning
+    points = []
+    for rudder in (35.0, 10.0):
+        rates = [rate for rate, stable in wanted.turns_at(np.radians(rudder) * (1 - 1e-9)) if stable]
+        points.append(f"{60 * np.degrees(max(rates)):.6g}@{rudder:g}")
+    tuned = t2s.load("kvlcc2-l7-mmg").tune_through(*points)
+    card = tuned.card
+    assert isinstance(card, MmgCard)
+    assert card.rudder.f_alpha == pytest.approx(2.6, rel=2e-3)
+    assert card.derivatives["Nv"] == pytest.approx(-0.137 * 0.46 / 7, rel=2e-3)

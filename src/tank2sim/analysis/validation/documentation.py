@@ -7,15 +7,23 @@ import math
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model
 
+_KINDS = {
+    "abkowitz": "third-order polynomial (Abkowitz), whole ship",
+    "linear": "linear",
+    "mmg": "MMG standard method: hull, propeller, rudder and their interactions",
+}
+"""Kind of model to what a report calls it."""
+
 
 def model_documentation(card: ManoeuvringCard, system: Model) -> dict[str, str]:
     """Return what a card and its model state about each item, in words."""
     ship, model, environment, gear = card.ship, card.model, card.environment, card.steering_gear
-    kind = {"abkowitz": "third-order polynomial (Abkowitz), whole ship", "linear": "linear"}[model.kind]
+    kind = _KINDS[model.kind]
     froude = model.speed_mps / math.sqrt(environment.gravity_mps2 * ship.length_m)
     reynolds = model.speed_mps * ship.length_m / environment.kinematic_viscosity_m2ps
     slowest, fastest = model.speed_range_mps
-    stated = "" if model.valid_speed_mps else " (not stated: half to 1.2 times the speed of expansion)"
+    least = slowest / model.speed_mps
+    stated = "" if model.valid_speed_mps else f" (not stated: {least:.2g} to 1.2 times the speed of expansion)"
     steering = "not stated: a short lag is taken, without limits"
     if gear:
         lag = "lag not stated" if gear.time_constant_s is None else f"lag {gear.time_constant_s:.3g} s"
@@ -70,6 +78,9 @@ def _propulsion(card: ManoeuvringCard) -> str:
     if card.propulsion is None:
         return "none: revolutions constant, no stopping"
     rpm = card.propulsion.nominal_radps * 30 / math.pi
+    if card.model.kind == "mmg":
+        delay = "reached at once unless an effect delays them"
+        return f"open-water thrust, wake and thrust deduction; about {rpm:.4g} rpm, {delay}"
     return f"surge force with n|n| about {rpm:.4g} rpm, reached at once unless an effect delays them"
 
 
