@@ -109,6 +109,8 @@ def test_numbers_of_the_file_have_the_factors_of_their_system() -> None:
     assert values["derivatives"]["Yvdot"] == pytest.approx(old.derivatives["Yvdot"] / mass)
     assert values["derivatives"]["Nr"] == pytest.approx(old.derivatives["Nr"] * froude / mass)
     assert values["derivatives"]["Yd"] == pytest.approx(old.derivatives["Yd"] * froude**2 / mass)
+    assert values["derivatives"]["N0u"] == pytest.approx(old.derivatives["N0u"] * froude / mass)
+    assert values["derivatives"]["Xuu"] == pytest.approx(old.derivatives["Xuu"] / mass)
     assert values["derivatives"]["Nvvr"] == pytest.approx(old.derivatives["Nvvr"] / (mass * froude))
 
 
