@@ -76,6 +76,7 @@ def missing() -> Gap:
     return Gap(
         card=card(),
         improved=card(),
+        base=card(),
         verdict=MISSING,
         effects=(current,),
         coefficients=(),

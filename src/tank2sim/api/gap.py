@@ -15,7 +15,7 @@ from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
-from tank2sim.cards import Card, parse_card
+from tank2sim.cards import Card, ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import not_referring
 from tank2sim.cards.derived import derived_card
 from tank2sim.dynamics.effects import EFFECTS
@@ -38,7 +38,7 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.identification.trials.problem.signatures import fitted_as, with_fitted_trials
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -112,8 +112,9 @@ class GapResult(Result):
     def improved(self) -> Card:
         """The card with the effects; the given card where none of the ship was named."""
         text = self._improved_text("the improved card")
-        card = parse_card(text, self.gap.card.source)
-        return replace(card, covariance=self.gap.card.covariance) if text == self.gap.card.text else card
+        if text == self.gap.card.text:
+            return replace(parse_card(text, self.gap.card.source), covariance=self.gap.card.covariance)
+        return derived_card(self.gap.base, text, self.gap.card.source)[0]
 
     @property
     def ship(self) -> Ship:
@@ -187,7 +188,7 @@ class GapResult(Result):
         """
         gap, trials = self.gap, (*self.fitted.trials, *self.held.trials)
         text = self._improved_text(str(folder / IMPROVED))
-        improved, notices = improved_files(gap.card, text, folder / IMPROVED)
+        improved, notices = improved_files(gap.base, text, folder / IMPROVED)
         files: GapFiles = {**improved, folder / REPORT: self.page()}
         if gap.next_test:
             files[folder / NEXT_TEST_FILE] = gap.next_test.orders
@@ -226,7 +227,7 @@ class GapResult(Result):
         if gap.improved.text != text:
             rivals = [joined(names) for names in gap.alternatives]
             names = [trial.name for trial in self.fitted.trials]
-            text = card_with_effects_text(gap.improved, self._found, names, rivals)
+            text = card_with_effects_text(gap.improved, self._found, names, rivals, len(gap.coefficients))
             text = with_fitted_trials(text, source, self.fitted.trials)
         parse_card(text, source)
         return text
@@ -314,8 +315,27 @@ def find_gap(
     ship = nonlinear_card(as_ship(card).card)
     options = gap_options(effects, without, max_effects, workers)
     fitted, held = fitted_and_held(trials, holdout, ship)
+    fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
     with _cluster(executor) as pool:
         return GapResult(run_workflow(ship, fitted, held, options, progress, pool), fitted, held)
+
+
+def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
+    """A notice if the card was identified from some of these trials: its coefficients may hold what is missing.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    fitted : Measured
+        Trials that name the effect.
+    """
+    names = [trial.name for trial in fitted.trials if fitted_as(card, trial) is not None]
+    if not names:
+        return []
+    return [
+        f"{card.source} was fitted to {', '.join(names)}: its coefficients may hold a part of what is missing. "
+        "Give gap the card as it was before these trials, and identify on the improved card afterwards"
+    ]
 
 
 def gap_options(

@@ -273,6 +273,9 @@ class Gap:
     improved : ManoeuvringCard
         With the effect, and with the coefficients fitted together with it where the trials are then followed better;
         the given card where no effect of the ship was named (nothing, or a sensor's fault) and none was refitted.
+    base : ManoeuvringCard
+        The card with the refitted coefficients and their covariance, before the effects were added; the given card
+        where none was refitted.
     verdict : str
         One of :data:`GAP_VERDICTS`.
     effects : tuple of Named
@@ -306,6 +309,7 @@ class Gap:
 
     card: ManoeuvringCard
     improved: ManoeuvringCard
+    base: ManoeuvringCard
     verdict: str
     effects: tuple[Named, ...]
     coefficients: tuple[Refitted, ...]

@@ -227,6 +227,7 @@ def _assemble_gap(
     return Gap(
         card=card,
         improved=improved,
+        base=proof.base,
         verdict=decision.verdict,
         effects=tuple(Named(*effect, decision.confidence(effect[0])) for effect in estimated),
         coefficients=proof.coefficients,
@@ -251,6 +252,7 @@ def _assemble_gap(
 class _Proof:
     """An improved card, all trials replayed by both cards, and what was fitted together with the effects."""
 
+    base: ManoeuvringCard
     improved: ManoeuvringCard
     results: list[Passed]
     coefficients: tuple[Refitted, ...] = ()
@@ -270,7 +272,7 @@ def _prove(
     alone = add_effects_to_card(card, estimated)
     sensors = _sensor_faults(estimated)
     results = _replay_all(card, alone, trials, sensors, sigmas)
-    proof = _Proof(alone, results)
+    proof = _Proof(card, alone, results)
     if _misfit_of(results, "after", held_out=False) > BETTER_FROM:
         estimates_with = found.likelihood.coefficients_with(best)
         refitted, base = refit_coefficients(card, found.likelihood.none.model, estimates_with)
@@ -280,7 +282,7 @@ def _prove(
         if misfits[1] < (1 - BETTER) * misfits[0]:
             keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
             of_effect = {key: _misfit_of(results, "after", held_out=held) for key, held in keys.items()}
-            proof = _Proof(joint, joint_results, refitted, of_effect if estimated else {})
+            proof = _Proof(base, joint, joint_results, refitted, of_effect if estimated else {})
     if not estimated:
         return proof
     box = black_box(card, trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))

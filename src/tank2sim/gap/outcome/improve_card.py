@@ -74,21 +74,23 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
 
 
 def card_with_effects_text(
-    card: ManoeuvringCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = ()
+    card: ManoeuvringCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = (), refitted: int = 0
 ) -> str:
     """Text of a card with effects added by :func:`add_effects_to_card`, headed by their names and the trials used.
 
-    A card to which no effect was added is returned unchanged. `rivals` are the explanations that these trials cannot
-    distinguish from them.
+    A card to which nothing was added is returned unchanged. `rivals` are the explanations that these trials cannot
+    distinguish from the effects; `refitted` is the number of coefficients that were fitted to the trials.
     """
     names = [name for name, *_ in found if EFFECTS[name].acts_on != "sensor"]
-    if not names:
+    changes = [f"{' and '.join(names)} added"] if names else []
+    changes += [f"{refitted} coefficients refitted"] if refitted else []
+    if not changes:
         return card.text
-    how = f"{' and '.join(names)} added by tank2sim gap from {', '.join(trials)}"
+    how = f"{', '.join(changes)} by tank2sim gap from {', '.join(trials)}"
     text = changed_text(card.text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     messages = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
     lines = [how, *messages]
-    if any(EFFECTS[name].in_place_of or EFFECTS[name].changes for name in names):
+    if refitted or any(EFFECTS[name].in_place_of or EFFECTS[name].changes for name in names):
         lines.append("Keys that were changed for this have their old values in comments.")
     if rivals:
         lines.append(f"These trials cannot distinguish this from: {'; '.join(rivals)}.")

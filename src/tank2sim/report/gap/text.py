@@ -146,8 +146,10 @@ def _refitted(found: Json) -> list[str]:
     }
     most = sorted(sizes, key=sizes.__getitem__, reverse=True)[:MOVED]
     moved = ", ".join(f"{name} by {sizes[name]:.1f}" for name in most)
+    company = " with it" if found["effects"] else ""
     words = (
-        f"{len(coefficients)} coefficients of the card were fitted with it: most moved {moved} of their standard errors"
+        f"{len(coefficients)} coefficients of the card were fitted{company}: "
+        f"most moved {moved} of their standard errors"
     )
     alone = found["misfit"].get("effect_alone")
     if alone:
