@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles, folder_made, put
+from tank2sim.api.gap_files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
@@ -34,11 +34,13 @@ from tank2sim.gap.outcome.export import (
     signal_display_name,
 )
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
+from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import fitted_as, with_fitted_trials
+from tank2sim.records.signals.writing import trial_text
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -84,6 +86,34 @@ class GapResult(Result):
         ]
         numbers = ["value", "standard_error", "probability"]
         return pd.DataFrame(rows, columns=["effect", "parameter", *numbers]).astype(dict.fromkeys(numbers, float))
+
+    @property
+    def surroundings(self) -> pd.DataFrame:
+        """Winds and currents that differ from trial to trial: effect, trial, speed (m/s), direction (deg), errors.
+
+        Directions count clockwise from north: from which a wind comes, towards which a current sets. Of a trial held
+        out they were fitted to that trial itself.
+        """
+        import pandas as pd
+
+        columns = [
+            "effect",
+            "trial",
+            "held_out",
+            "speed_mps",
+            "direction_deg",
+            "speed_error_mps",
+            "direction_error_deg",
+        ]
+        rows = [
+            [
+                *(effect["name"], row["trial"], row["held_out"], row["speed_mps"], row["direction_deg"]),
+                *row["standard_errors"].values(),
+            ]
+            for effect in self._results["effects"]
+            for row in effect["by_trial"]
+        ]
+        return pd.DataFrame(rows, columns=columns)
 
     @property
     def coefficients(self) -> pd.DataFrame:
@@ -184,7 +214,8 @@ class GapResult(Result):
         """Path to content of the files that belong into a folder, and messages about them.
 
         ``gap.json``, ``improved.toml`` with its covariance, ``report.html``, ``next_test.csv`` where a test would
-        decide, and ``corrected/`` where a sensor is at fault.
+        decide, ``corrected/`` where a sensor is at fault, and ``surroundings/`` with the winds and currents of single
+        trials as columns, with which the improved card follows them.
         """
         gap, trials = self.gap, (*self.fitted.trials, *self.held.trials)
         text = self._improved_text(str(folder / IMPROVED))
@@ -199,6 +230,7 @@ class GapResult(Result):
                     files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
                 new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
                 notices += [f"{trial.path.name}: {text}" for text in new if text.startswith(REMAINING_FAULTS)]
+        files |= {folder / SURROUNDED / f"{name}.csv": text for name, text in self._surrounded().items()}
         names = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
         files[folder / GAP] = self.to_json(files=names)
         return files, notices
@@ -215,6 +247,15 @@ class GapResult(Result):
         with folder_made(Path(folder)):
             files, notices = self.files(Path(folder))
             return *notices, *put(files, Path(folder), inputs)
+
+    def _surrounded(self) -> dict[str, str]:
+        """Name of each trial to its text with the winds and currents that were found for it."""
+        found = {effect.name: effect.by_trial for effect in self.gap.effects if effect.by_trial}
+        if not found:
+            return {}
+        remark = f"{' and '.join(found)} of this trial estimated by tank2sim gap; at the size of {self.gap.card.source}"
+        trials = (trial for group in (self.fitted, self.held) for trial in with_surroundings(group, found).trials)
+        return {trial.name: trial_text(replace(trial, scale=None), [remark]) for trial in trials}
 
     @property
     def _found(self) -> list[Found]:

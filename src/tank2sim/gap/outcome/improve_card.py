@@ -62,7 +62,8 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
     ship = [effect for effect in found if EFFECTS[effect[0]].acts_on != "sensor"]
     for name in {entry.name for entry in card.effects} & {name for name, *_ in ship}:
         raise ValueError(f"the card has {name} already")
-    for place, (name, values, errors) in enumerate(ship):
+    for place, (name, found_values, errors) in enumerate(ship):
+        values = {**at_rest(name), **found_values}
         read_later = any(EFFECTS[later].reads_derivatives for later, *_ in ship[place + 1 :])
         if EFFECTS[name].in_place_of:
             card = _changed(card, _stated(card, name, values, errors))
@@ -71,6 +72,14 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
         else:
             card = _with_entry(_with_particulars(card, name, values), name, values, errors)
     return card
+
+
+def at_rest(name: str) -> dict[str, float]:
+    """Speed and direction of a wind or current, zero: what a card states where that is a matter of each trial.
+
+    Empty for other effects.
+    """
+    return dict.fromkeys(EFFECTS[name].measured_as, 0.0) if EFFECTS[name].surroundings else {}
 
 
 def card_with_effects_text(

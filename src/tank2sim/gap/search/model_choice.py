@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
-from scipy.stats import chi2, gamma
+from scipy.stats import chi2, gamma, norm
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
@@ -164,15 +164,29 @@ def is_significant(fit: ExplanationFit) -> bool:
         sizes = [
             abs(value - estimate.parameter.absent) / error if error > 0 else np.inf
             for estimate, value, error in zip(fit.hypothesis.estimated, fit.theta, errors, strict=True)
-            if estimate.effect == name and estimate.is_amplitude
+            if estimate.effect == name and estimate.is_amplitude and estimate.run is None
         ]
         if sizes and max(sizes) < STANDARD_ERRORS:
+            return False
+        if name in fit.hypothesis.each and not _differs_from_zero(fit, name):
             return False
         if EFFECTS[name].changes and _change(fit, name) < STANDARD_ERRORS:
             return False
         if EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS:
             return False
     return True
+
+
+def _differs_from_zero(fit: ExplanationFit, name: str) -> bool:
+    """Whether winds or currents of the single trials are together beyond :data:`STANDARD_ERRORS` (Wald's test)."""
+    places = [
+        place
+        for place, estimate in enumerate(fit.hypothesis.estimated)
+        if estimate.effect == name and estimate.run is not None
+    ]
+    sizes = fit.theta[places]
+    statistic = float(sizes @ np.linalg.solve(fit.covariance[np.ix_(places, places)], sizes))
+    return bool(chi2.logsf(statistic, len(places)) < norm.logsf(STANDARD_ERRORS) + np.log(2))
 
 
 def _change(fit: ExplanationFit, name: str) -> float:

@@ -165,6 +165,9 @@ def _with_values(effect: Json) -> str:
         words, value, unit, _ = parameter_cells(effect, name)
         values.append(f"{words} {value}{'' if unit == '-' else f' {unit}'}")
     words = effect_in_words(effect["name"])
+    if effect.get("by_trial"):
+        speeds = [or_nan(row["speed_mps"]) for row in effect["by_trial"]]
+        values.insert(0, f"of each trial its own, {min(speeds):.2g} to {max(speeds):.2g} m/s")
     return f"{words} ({', '.join(values)})" if values else words
 
 
