@@ -335,6 +335,8 @@ class Gap:
     figures_before, figures_after : tuple of FigureComparison
         Of turns and zigzags.
     missing_force : MissingForce or None
+    at_work : tuple of Acting
+        Intervals in which the forces of the named effects act, the most significant first.
     could_hide : mapping
         Effect to {parameter: size (SI)} below which these data could not show it.
     agreement : mapping
@@ -359,6 +361,7 @@ class Gap:
     figures_before: tuple[FigureComparison, ...]
     figures_after: tuple[FigureComparison, ...]
     missing_force: MissingForce | None
+    at_work: tuple[Acting, ...]
     could_hide: Mapping[str, Mapping[str, float]]
     agreement: Mapping[str, Mapping[str, tuple[float, float]]]
     next_test: NextTest | None

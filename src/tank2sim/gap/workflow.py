@@ -16,7 +16,13 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
-from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lacking, surroundings_by_trial
+from tank2sim.gap.diagnosis.residuals import (
+    each_trial,
+    effects_at_work,
+    estimates,
+    force_lacking,
+    surroundings_by_trial,
+)
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
@@ -255,6 +261,7 @@ def _assemble_gap(
         figures_before=figures(card, every, results, "before"),
         figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
         missing_force=force,
+        at_work=effects_at_work(found.likelihood, decision.best) if estimated else (),
         could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
         agreement=agreement,
         next_test=_next(card, found, decision, sigmas),
@@ -310,7 +317,7 @@ def _prove(
         trials, by_trial = _in_surroundings(joint, given, by_trial, sigmas)
         joint_results = _replay_all(card, joint, trials, sensors, sigmas)
         misfits = [_misfit_of(group, "after", held_out=False) for group in (results, joint_results)]
-        if misfits[1] < (1 - BETTER) * misfits[0]:
+        if misfits[1] < (1 - BETTER) * misfits[0] and _most_are_closer(results, joint_results):
             keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
             of_effect = {key: _misfit_of(results, "after", held_out=held) for key, held in keys.items()}
             proof = _Proof(trials, by_trial, base, joint, joint_results, refitted, of_effect if estimated else {})
@@ -349,6 +356,13 @@ def _replay_all(
             corrected = _corrected(group, sensors)
             results += replay_trials(card, improved, group, sigmas, held_out, corrected)
     return results
+
+
+def _most_are_closer(before: Sequence[Passed], after: Sequence[Passed]) -> bool:
+    """Whether at least half of the fitted trials are followed no worse: coefficients hold in all of them, and must not
+    follow what happened in one."""
+    pairs = [pair for pair in zip(before, after, strict=True) if not pair[0].held_out]
+    return bool(np.median([new.misfit("after") / old.misfit("after") for old, new in pairs]) <= 1.0)
 
 
 def _misfit_of(results: Sequence[Passed], version: str, *, held_out: bool | None = None) -> float:

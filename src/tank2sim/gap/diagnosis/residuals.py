@@ -10,13 +10,13 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.model import Parameter
-from tank2sim.gap.diagnosis.misfit_location import missing_force_by_state
+from tank2sim.gap.diagnosis.misfit_location import effect_passages, missing_force_by_state
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.outcome.improve_card import Found
-from tank2sim.gap.result import MissingForce, Surroundings
+from tank2sim.gap.result import Acting, MissingForce, Surroundings
 
 
 def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce | None:
@@ -46,6 +46,19 @@ def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce |
         errors[:, :-1][part],
         {name: values[part] for name, values in columns.items()},
     )
+
+
+def effects_at_work(likelihood: Likelihood, fit: ExplanationFit) -> tuple[Acting, ...]:
+    """Intervals in which the forces of an explanation's effects act (:func:`.misfit_location.effect_passages`)."""
+    motion, hypothesis = likelihood.motion, fit.hypothesis
+    spread = likelihood.smooth(fit)[1]
+    inertia = _inertia(likelihood.none)
+    driving, _ = likelihood.added(hypothesis, fit.theta)
+    force = np.einsum("ij,rtj->rti", inertia, driving[..., :FORCE_STATES] / motion.block_s)
+    errors = np.sqrt(np.einsum("ij,rtjk,ik->rti", inertia, spread, inertia))[:, :-1]
+    part = motion.inside[:, 1:]
+    names = np.repeat(np.array(motion.names)[:, None], part.shape[1], axis=1)[part]
+    return effect_passages(list(names), motion.times[:, :-1][part], force[part], errors[part])
 
 
 def _inertia(hypothesis: Hypothesis) -> Array:

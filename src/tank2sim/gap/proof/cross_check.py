@@ -31,6 +31,10 @@ MUCH = 3.0
 CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
+UNCHANGED = 0.02
+"""Share of a misfit by which a simulation without the effect differs from one with it where it does not act (project
+choice): a stall shows in hard turns alone."""
+
 REACH = 1e-3
 """Differences by a coefficient are taken over this share of the largest linear one (project choice: rounding and
 curvature are both far below the noise)."""
@@ -159,8 +163,8 @@ class _Fit:
 def closes_gap(passed: Sequence[Passed]) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
-    By the median ratio of misfits after and before, over all signals of all trials, for one diverging simulation
-    would dominate a mean.
+    By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
+    signals of all trials whose misfit changes by more than :data:`UNCHANGED`, for an effect may act in few of them.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
     if min(np.sqrt(np.mean(values**2)) for values in rms) < MUCH:
@@ -168,7 +172,8 @@ def closes_gap(passed: Sequence[Passed]) -> bool:
     shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
     pairs = [(replay.misfit("before", name), replay.misfit("after", name)) for replay, name in shown]
     ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
-    return bool(np.median(ratios) < CLOSES)
+    changed = [ratio for ratio in ratios if abs(ratio - 1.0) > UNCHANGED]
+    return bool(changed and np.median(changed) < CLOSES)
 
 
 def worse_trials(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
