@@ -31,9 +31,9 @@ MUCH = 3.0
 CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
-UNCHANGED = 0.02
-"""Share of a misfit by which a simulation without the effect differs from one with it where it does not act (project
-choice): a stall shows in hard turns alone."""
+DIFFERS = 0.3
+"""Root mean square difference of two simulations, in noise units, from which an effect acts in a trial (project choice:
+far less than shows): a stall shows in hard turns alone."""
 
 REACH = 1e-3
 """Differences by a coefficient are taken over this share of the largest linear one (project choice: rounding and
@@ -164,7 +164,7 @@ def closes_gap(passed: Sequence[Passed]) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
     By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
-    signals of all trials whose misfit changes by more than :data:`UNCHANGED`, for an effect may act in few of them.
+    signals of all trials in which the two simulations differ by :data:`DIFFERS`, for an effect may act in few of them.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
     if min(np.sqrt(np.mean(values**2)) for values in rms) < MUCH:
@@ -172,8 +172,17 @@ def closes_gap(passed: Sequence[Passed]) -> bool:
     shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
     pairs = [(replay.misfit("before", name), replay.misfit("after", name)) for replay, name in shown]
     ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
-    changed = [ratio for ratio in ratios if abs(ratio - 1.0) > UNCHANGED]
+    changed = [ratio for ratio, (replay, name) in zip(ratios, shown, strict=True) if _differs(replay, name)]
     return bool(changed and np.median(changed) < CLOSES)
+
+
+def _differs(replay: Passed, name: str) -> bool:
+    """Whether simulations before and after differ in a signal where it was measured."""
+    known = np.isfinite(replay.measured[name])
+    before, after = replay.before[name][known], replay.after[name][known]
+    if not (np.isfinite(before).all() and np.isfinite(after).all()):
+        return True
+    return bool(np.sqrt(np.mean(np.square((after - before) / replay.noise[name]))) > DIFFERS)
 
 
 def worse_trials(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
