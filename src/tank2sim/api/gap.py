@@ -36,6 +36,7 @@ from tank2sim.gap.outcome.export import (
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
+from tank2sim.gap.search.model_choice import SUREST
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -46,6 +47,10 @@ from tank2sim.units import in_words
 if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
+
+
+SUREST_WRONG = round(1 - SUREST, 9)
+"""Probability with which even the surest name may be wrong."""
 
 
 class GapResult(Result):
@@ -325,6 +330,7 @@ def find_gap(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
     max_effects: int = 2,
+    false_discovery: float = 0.5,
     executor: str = PROCESSES,
     workers: int | None = None,
     progress: StageReport = lambda text: None,
@@ -341,6 +347,9 @@ def find_gap(
         Look for these alone; do not look for these. By default the whole library.
     max_effects : int
         1 or 2 effects at a time.
+    false_discovery : float
+        Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5; what is less sure is one of
+        several candidates.
     executor : str
         ``processes`` or ``dask://host:port``.
     workers : int, optional
@@ -354,7 +363,7 @@ def find_gap(
         A file is at fault, a trial is too short, or an effect is not known or cannot be tried on this card.
     """
     ship = nonlinear_card(as_ship(card).card)
-    options = gap_options(effects, without, max_effects, workers)
+    options = gap_options(effects, without, max_effects, workers, false_discovery)
     fitted, held = fitted_and_held(trials, holdout, ship)
     fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
     with _cluster(executor) as pool:
@@ -380,20 +389,29 @@ def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
 
 
 def gap_options(
-    effects: Sequence[str] = (), without: Sequence[str] = (), max_effects: int = 2, workers: int | None = None
+    effects: Sequence[str] = (),
+    without: Sequence[str] = (),
+    max_effects: int = 2,
+    workers: int | None = None,
+    false_discovery: float = 0.5,
 ) -> GapOptions:
     """Options of the search. Raises InputError for an effect that is not known.
 
     Parameters
     ----------
-    effects, without, max_effects, workers
+    effects, without, max_effects, workers, false_discovery
         As of :func:`find_gap`.
     """
     for option, names in (("--effects", effects), ("--without", without)):
         for name in names:
             if EFFECTS.get(name) is None:
                 raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers=workers)
+    if not SUREST_WRONG <= false_discovery <= 0.5:
+        problem = f"is {false_discovery:g}: no name is surer than {1 - SUREST_WRONG:g}, and half is a guess"
+        raise InputError("--false-discovery", "", problem, f"give {SUREST_WRONG:g} to 0.5")
+    return GapOptions(
+        tuple(effects) or None, tuple(without), max_effects, workers=workers, false_discovery=false_discovery
+    )
 
 
 @contextmanager

@@ -97,6 +97,8 @@ class GapOptions:
         card, up to this number.
     workers : int, optional
         Processes; by default as many as there are processors.
+    false_discovery : float
+        Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5.
     """
 
     effects: tuple[str, ...] | None = None
@@ -104,6 +106,7 @@ class GapOptions:
     max_effects: int = 2
     most_effects: int = MOST_EFFECTS
     workers: int | None = None
+    false_discovery: float = 1 - LIKELY
 
 
 def run_gap_workflow(
@@ -145,7 +148,7 @@ def run_gap_workflow(
                 break
             more = replace(options, effects=wanted, without=(*options.without, *named), max_effects=most)
             further, found_trials = _search_once(gap.improved, trials, more, progress, pool)
-            if not _adds(gap, further):
+            if not _adds(gap, further, 1 - options.false_discovery):
                 break
             gap, trials = combine_passes(gap, further), found_trials
         return gap
@@ -161,7 +164,7 @@ def _search_once(
     """One search, the decision and its proof; and the trials with the winds and currents that were found."""
     names = _names(card, trials[0], options)
     found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
-    decision = decide(found)
+    decision = decide(found, options.false_discovery)
     progress("proving")
     return _assemble_gap(card, trials, found, decision, progress)
 
@@ -175,12 +178,13 @@ def _seeks_more(gap: Gap, options: GapOptions) -> bool:
     return _misfit_of(gap.passed, "after", held_out=False) > AGAIN
 
 
-def _adds(gap: Gap, further: Gap) -> bool:
-    """Whether a search on the improved card named effects of the ship that are likely, and that bring it closer."""
+def _adds(gap: Gap, further: Gap, likely: float) -> bool:
+    """Whether a search on the improved card named effects of the ship, each with a probability of `likely` at least,
+    that bring it closer."""
     if further.verdict != MISSING or any(EFFECTS[effect.name].acts_on == "sensor" for effect in further.effects):
         return False
     before, after = (_misfit_of(result.passed, "after", held_out=False) for result in (gap, further))
-    return min(effect.confidence for effect in further.effects) >= LIKELY and after < (1 - BETTER) * before
+    return min(effect.confidence for effect in further.effects) >= likely and after < (1 - BETTER) * before
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:

@@ -111,8 +111,17 @@ class Strange:
     excess: float
 
 
-def decide(search: Search) -> Decision:
-    """Return the verdict that the scores of a search support."""
+def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
+    """Return the verdict that the scores of a search support.
+
+    Parameters
+    ----------
+    search : Search
+    false_discovery : float
+        Largest probability with which a single name may be wrong, 1 - :data:`SUREST` to 1 - :data:`LIKELY`. An effect
+        whose own is larger is one of several candidates, so that of all names that are given alone no larger share is
+        wrong on average.
+    """
     none = search.none
     best = none
     single = next((fit for fit in search.fits if len(fit.hypothesis.effects) == 1 and is_significant(fit)), None)
@@ -126,7 +135,8 @@ def decide(search: Search) -> Decision:
     weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
     probabilities = {fit.hypothesis.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
     behind = ALIKE
-    if any(_confidence(probabilities, name) < LIKELY for name in best.hypothesis.effects):
+    unsure = {name for name in best.hypothesis.effects if _confidence(probabilities, name) < 1 - false_discovery}
+    if unsure:
         behind = max(ALIKE, -2 * TEMPER * np.log(RIVAL))
     alike = tuple(
         fit
@@ -138,6 +148,8 @@ def decide(search: Search) -> Decision:
         and len(fit.hypothesis.effects) <= max(len(best.hypothesis.effects), 1)
         and best is not none
     )
+    if unsure and not alike and false_discovery < 1 - LIKELY:
+        alike = tuple(fit for fit in search.fits if not unsure & set(fit.hypothesis.effects))[:1]
     strange = find_strangeness(search.likelihood, best)
     verdict = NO_EFFECT_MISSING if best is none else AMBIGUOUS if alike else MISSING
     return Decision(OUTSIDE_LIBRARY if strange else verdict, best, alike, probabilities, strange)

@@ -95,7 +95,7 @@ def _sure(found: Json, name: str) -> float:
 
 
 def _joined(names: Sequence[str]) -> str:
-    return " with ".join(map(effect_in_words, names))
+    return " with ".join(map(effect_in_words, names)) or "nothing"
 
 
 def as_percent(probability: float | None) -> str:
@@ -122,7 +122,8 @@ def _found(found: Json) -> str:
         named = [[effect["name"] for effect in effects]] if effects else []
         candidates = [*named, *map(effects_of, found["alternatives"])]
         names = ", or ".join(dict.fromkeys(map(_joined, candidates)))
-        return f"Something is missing, but these data do not distinguish several effects: {names}."
+        missing = "Something is" if all(candidates) else "Something may be"
+        return f"{missing} missing, but these data do not distinguish several explanations: {names}."
     if verdict == COEFFICIENTS:
         return " ".join(["The coefficients of the card explain the gap: no effect is missing.", *_refitted(found)])
     if verdict == NO_EFFECT_MISSING:
