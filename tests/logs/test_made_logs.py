@@ -12,10 +12,11 @@ from tank2sim.api.log import log
 from tank2sim.errors import InputError
 from tank2sim.logs.clock import utc_text
 from tank2sim.logs.nmea0183 import read_nmea0183
-from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name, split_unit
+from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.reference import local_metres
 from tank2sim.logs.table import read_table_log
+from tank2sim.records.spelt_units import split_unit
 from tests.logs.made_logs import T0, candump_lines, frame, nmea_lines, rmc, sentence, voyage
 
 
