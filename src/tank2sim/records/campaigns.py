@@ -38,7 +38,8 @@ from tank2sim.records.campaign_form import (
     UncertaintySection,
     campaign_file,
 )
-from tank2sim.records.csv_table import CsvTable, read_table
+from tank2sim.records.csv_table import CsvTable
+from tank2sim.records.run_tables import read_run_table
 
 FORCE_COLUMNS = ("X", "Y", "N")
 _FEWEST_READINGS = 16
@@ -260,7 +261,7 @@ def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
 
 
 def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> CaptiveRun:
-    table = read_table(folder / sheet.file).si()
+    table = read_run_table(folder / sheet.file, {**form.columns, **sheet.columns}, form.files)
     time = table.increasing("t_s") - float(table.column("t_s")[0])
     to_port = form.test.rudder_sign == "port"
     if to_port and sheet.rudder_rad is not None:
