@@ -43,6 +43,7 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         },
         "spread": {force: _spread(result) for force, result in reduction.forces.items()},
         "systematic_errors": [{**asdict(error), "message": error.message} for error in reduction.systematic],
+        "force_delay": _delay(reduction),
         "trends": [asdict(trend) for result in reduction.forces.values() for trend in result.trends],
         "symmetry": {force: asdict(result.asymmetry) for force, result in reduction.forces.items() if result.asymmetry},
         "leave_one_out": {
@@ -63,6 +64,14 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         resistance = reduction.derivatives["X0"]
         found["resistance"] = {"X0": {"value": resistance.value, "standard_error": resistance.standard_error}}
     return found
+
+
+def _delay(reduction: Reduction) -> dict[str, Any] | None:
+    """The delay of the forces behind the motion, s; None if the campaign cannot show it."""
+    if reduction.delay is None:
+        return None
+    corrected = any(error.corrected for error in reduction.systematic)
+    return {**asdict(reduction.delay), "corrected": corrected}
 
 
 def _choice(choice: Choice) -> dict[str, Any]:
