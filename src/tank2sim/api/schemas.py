@@ -264,6 +264,26 @@ class RunKeys(_Keys):
     notices: list[str]
 
 
+class BudgetRowKeys(_Part):
+    """Uncertainty of a derivative (prime) by its causes: standard uncertainties, and shares of the variance."""
+
+    value: float
+    combined: float
+    expanded: float
+    parts: dict[str, float]
+    shares: dict[str, float]
+
+
+class BudgetKeys(_Part):
+    """The uncertainty budget of a campaign after ITTC 7.5-02-06-04."""
+
+    coverage_factor: float
+    sources: dict[str, str]
+    not_stated: list[str]
+    blockage_speed_relative: Number
+    derivatives: dict[str, BudgetRowKeys]
+
+
 class ReduceKeys(_Keys):
     """Captive tests reduced to derivatives."""
 
@@ -273,6 +293,7 @@ class ReduceKeys(_Keys):
     conventions: dict[str, str | float | None]
     rigid_body: dict[str, Number]
     derivatives: dict[str, DerivativeKeys]
+    uncertainty_budget: BudgetKeys
     missing: list[str]
     warnings: list[str]
     methods: dict[str, Any]

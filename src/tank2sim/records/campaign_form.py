@@ -128,7 +128,9 @@ class UncertaintySection(CardSection):
     mass_relative, yaw_inertia_relative
         Of the carried mass and its yaw inertia.
     force_delay_s
-        Of the delay of the forces behind the motion, s.
+        Of the delay of the forces behind the motion, s; stated, it takes the place of what the campaign shows.
+    blockage_relative
+        Of the speed of the water past the model, by the walls of the tank.
     """
 
     calibration_relative: NotNegative = 0.0
@@ -138,6 +140,7 @@ class UncertaintySection(CardSection):
     mass_relative: NotNegative = 0.0
     yaw_inertia_relative: NotNegative = 0.0
     force_delay_s: NotNegative = 0.0
+    blockage_relative: NotNegative = 0.0
 
 
 class FullScaleSection(CardSection):

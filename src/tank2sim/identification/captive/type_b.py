@@ -58,6 +58,7 @@ def _with_altered_data(
         "alignment_rad": lambda motion: replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size)),
         "rudder_rad": lambda motion: replace(motion, delta_rad=motion.delta_rad + size),
         "speed_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
+        "blockage_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
     }
     return campaign, [replace(run, motion=changes[source](run.motion)) for run in runs]
 
