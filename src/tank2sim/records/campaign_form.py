@@ -256,6 +256,13 @@ class CampaignFile(CardSection):
 def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, float]]:
     """The checked form of a campaign's parsed TOML, and the factors to SI of the columns of ``[averages]``.
 
+    Parameters
+    ----------
+    content : dict
+        The parsed TOML.
+    source : Path
+        For messages.
+
     Raises
     ------
     InputError
