@@ -301,6 +301,7 @@ class ReduceKeys(_Keys):
     spread: dict[str, dict[str, Any]]
     systematic_errors: list[dict[str, Any]]
     force_delay: dict[str, Any] | None
+    alignment: dict[str, Any] | None
     trends: list[dict[str, Any]]
     symmetry: dict[str, Any]
     leave_one_out: dict[str, list[dict[str, Any]]]

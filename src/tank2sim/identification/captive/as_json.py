@@ -52,6 +52,9 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         "spread": {force: _spread(result) for force, result in reduction.forces.items()},
         "systematic_errors": [{**asdict(error), "message": error.message} for error in reduction.systematic],
         "force_delay": _delay(reduction),
+        "alignment": asdict(reduction.alignment) | {"shown": reduction.alignment.shown}
+        if reduction.alignment
+        else None,
         "trends": [asdict(trend) for result in reduction.forces.values() for trend in result.trends],
         "symmetry": {force: asdict(result.asymmetry) for force, result in reduction.forces.items() if result.asymmetry},
         "leave_one_out": {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 
@@ -30,6 +31,7 @@ def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
         *_missing(reduction),
         *_physics(reduction),
         *_conventions(reduction),
+        *_alignment(reduction),
         *_unchecked(reduction),
     ]
     for force, result in reduction.forces.items():
@@ -139,6 +141,19 @@ def _unchecked(reduction: Reduction) -> Iterator[str]:
         )
     elif delay is not None and not delay.supported and any(e.source == "force_delay" for e in reduction.systematic):
         yield "Sway and yaw do not both show the delay: memory of the flow in one of them would look the same."
+
+
+def _alignment(reduction: Reduction) -> Iterator[str]:
+    """A zero of the drift angle that Y0 and N0 agree on."""
+    found = reduction.alignment
+    if found is None or not found.shown or "alignment_rad" in reduction.campaign.uncertainty.model_fields_set:
+        return
+    angle, error = math.degrees(found.angle_rad), math.degrees(found.standard_error_rad)
+    yield (
+        f"Y0 and N0 are those of a model turned by {angle:.3g} ± {error:.1g} deg against the recorded drift (or of a "
+        "hull that is as asymmetric): check its alignment; nothing is corrected, the standard errors of Y0 and N0 hold "
+        "it, and [uncertainty] alignment_deg states how well it is known."
+    )
 
 
 def _effect_of_delay(reduction: Reduction) -> str:

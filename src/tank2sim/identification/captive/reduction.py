@@ -14,6 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.alignment import AlignmentEstimate, alignment_estimate
 from tank2sim.identification.captive.contradictions import contradicted
 from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import SPEED_RANGE
@@ -46,7 +47,7 @@ from tank2sim.identification.captive.systematic import (
 )
 from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.identification.captive.trends import Trend, trends
-from tank2sim.identification.captive.type_b import type_b_shifts
+from tank2sim.identification.captive.type_b import type_b_shifts, with_error
 from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
@@ -132,6 +133,8 @@ class ForceResult:
         Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show.
     timing_s : float
         Delay of the forces that may be left, one standard deviation; 0 if it is stated, corrected or unknown.
+    alignment_rad : float
+        Zero of the drift angle that the campaign shows; 0 if it is stated or none is shown.
     """
 
     selection: Selection
@@ -144,6 +147,7 @@ class ForceResult:
     systematic: tuple[SystematicError, ...] = ()
     unchecked: tuple[str, ...] = ()
     timing_s: float = 0.0
+    alignment_rad: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -172,6 +176,8 @@ class Reduction:
         Names in :data:`ESSENTIAL` that the campaign does not give.
     delay : DelayEstimate or None
         Of the forces as recorded, less ``[test] force_delay_s``; None if no oscillations at two frequencies show it.
+    alignment : AlignmentEstimate or None
+        The zero of the drift angle by Y0 and N0; None if the campaign does not give them.
     """
 
     campaign: Campaign
@@ -185,6 +191,7 @@ class Reduction:
     cubics: tuple[CubicByTwoWays, ...]
     missing: tuple[str, ...]
     delay: DelayEstimate | None = None
+    alignment: AlignmentEstimate | None = None
 
     @property
     def systematic(self) -> tuple[SystematicError, ...]:
@@ -224,12 +231,20 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
         runs = [_advanced(run, delays[0].size) for run in runs]
         used, not_used = _used_runs(campaign, moderated(runs), options)
         selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
-    stated = "force_delay_s" in campaign.uncertainty.model_fields_set
+    stated_keys = campaign.uncertainty.model_fields_set
+    stated = "force_delay_s" in stated_keys
     timing = 0.0 if delays or stated or delay is None or not delay.alike else delay.possible_s
     forces = {
         force: replace(_force_result(campaign, selection, delays, options), timing_s=timing)
         for force, selection in selections.items()
     }
+    alignment = alignment_estimate(
+        campaign,
+        {force: forces[force].selection.equations for force in "YN"},
+        {force: forces[force].solution for force in "YN"},
+    )
+    if alignment is not None and alignment.shown and "alignment_rad" not in stated_keys:
+        forces = {force: replace(result, alignment_rad=alignment.angle_rad) for force, result in forces.items()}
     derivatives = {
         name: found for force in FORCE_COLUMNS for name, found in _derivatives(campaign, forces[force]).items()
     }
@@ -247,6 +262,7 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
         cubics=cubics([row for row in alone if row.run not in not_used]),
         missing=tuple(name for name in ESSENTIAL if name not in derivatives),
         delay=delay,
+        alignment=alignment,
     )
 
 
@@ -369,13 +385,17 @@ def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str
     """Change of each term of a force (prime), with its sign, by each error common to many runs: source to changes.
 
     Stated errors (Type B) of one standard deviation, the delay of the forces that may be left, and the full errors
-    that the campaign shows and that are not corrected.
+    (delays, gains, the zero of the drift angle) that the campaign shows and that are not corrected.
     """
     used, solution = result.selection.equations, result.solution
     shown = {error.source: error.shifts(used, solution) for error in result.systematic}
     if result.timing_s:
         moved = solve(correct_delay(used, result.timing_s), solution.spread).values - solution.values
         shown["force_delay"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
+    if result.alignment_rad:
+        turned = with_error(campaign, used, "alignment_rad", result.alignment_rad)
+        moved = solve(turned, solution.spread).values - solution.values
+        shown["alignment"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return type_b_shifts(campaign, used, solution) | shown
 
 

@@ -30,14 +30,24 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
     for source, size in stated.items():
         if not size:
             continue
-        erring = _with_error(campaign, used, source, size)
+        erring = with_error(campaign, used, source, size)
         moved = solve(erring, solution.spread).values - solution.values
         found[source] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return found
 
 
-def _with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
-    """The equations with an error of one standard deviation."""
+def with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
+    """The equations with an error common to the campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    used : CampaignEquations
+    source : str
+        A key of ``[uncertainty]``.
+    size : float
+        In the unit of the key.
+    """
     if source == "force_delay_s":
         return correct_delay(used, size)
     changed, altered = _with_altered_data(campaign, used.runs, source, size)

@@ -37,6 +37,7 @@ BUDGET_SOURCES = {
 
 _SOURCE_OF = {
     "calibration_relative": "calibration",
+    "alignment": "alignment",
     "alignment_rad": "alignment",
     "rudder_rad": "alignment",
     "force_delay": "timing",
