@@ -103,6 +103,22 @@ def test_a_column_that_is_named_as_a_quantity_is_not_passed_over_for_want_of_a_u
     assert error.value.place == "column v"
 
 
+def test_quotation_marks_keep_decimal_commas_apart_from_those_between_cells(tmp_path):
+    rows = [line.split(";") for line in (HEAD.replace("s;kN;Nm;N\n", "") + ROWS).splitlines()]
+    text = "\n".join(",".join(f'"{cell}"' for cell in row) for row in rows)
+    run = one_run(tmp_path, text, 'Zeit = "t_s"\nFy = "Y_kN"\nMz = "N_Nm"\nFx = "X_N"')
+    assert pytest.approx(10.0 * np.arange(20)) == run.Y_N
+
+
+@pytest.mark.parametrize("mark", ["#", "%"])
+def test_names_behind_a_comment_sign_are_names(tmp_path, mark):
+    body = ROWS.replace(";", "  ").replace(",", ".")
+    text = f"{mark} a preamble\n{mark} t[s]  Y[kN]  N[Nm]  X[N]\n{body}"
+    (tmp_path / "run.csv").write_text(text)
+    run = one_run(tmp_path, text, "")
+    assert pytest.approx(10.0 * np.arange(20)) == run.Y_N
+
+
 def test_a_run_may_have_a_map_of_its_own(tmp_path):
     with pytest.raises(InputError):
         one_run(tmp_path, HEAD + ROWS, 'Zeit = "t"')

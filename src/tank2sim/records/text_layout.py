@@ -107,6 +107,8 @@ def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: 
         mark = r"\s" if separator == WHITESPACE else re.escape(separator)
         comma = separator != "," and any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
         comma = comma or (separator != "," and any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:]))
+        # Commas between cells and in numbers can be distinguished by quotation marks alone.
+        comma = comma or (separator == "," and any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE]))
     names = [name.strip() or f"column {place}" for place, name in enumerate(names, start=1)]
     names += [f"column {place}" for place in range(len(names) + 1, width + 1)]
     names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
@@ -176,6 +178,7 @@ def _units(row: Sequence[str]) -> bool:
 
 def _named_cells(line: str, separator: str, width: int) -> list[str] | None:
     """Cells of a line of names; None if it has another number of them."""
+    line = line.removeprefix("%").strip(" ") if separator == WHITESPACE else line.removeprefix("%")
     candidates = [cells_of(line, separator)]
     if separator == WHITESPACE:
         joined = re.sub(r"\s+(?=[\[(])", "\0", line.strip())
