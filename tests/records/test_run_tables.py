@@ -9,6 +9,7 @@ import pytest
 
 from tank2sim.errors import InputError
 from tank2sim.records.campaigns import read_campaign
+from tank2sim.records.spelt_units import unit_factor
 from tests.identification.captive.generator import Campaign, write
 from tests.records.tank_files import FORMATS, converted
 
@@ -130,6 +131,23 @@ def test_a_run_may_have_a_map_of_its_own(tmp_path):
 def test_footers_and_words_are_faults_not_values(tmp_path):
     with pytest.raises(InputError, match="line 23"):
         one_run(tmp_path, HEAD + ROWS + "Ende der Messung\n", MAP)
+
+
+@pytest.mark.parametrize(
+    ("unit", "suffix", "factor"),
+    [
+        ("kN", "N", 1e3), ("kn", "N", 1e3), ("[N]", "N", 1.0), ("kp", "N", 9.80665), ("lbf", "N", 4.448221615),
+        ("kNm", "Nm", 1e3), ("kN m", "Nm", 1e3), ("N*m", "Nm", 1.0), ("N·m", "Nm", 1.0), ("Nmm", "Nm", 1e-3),
+        ("kgf m", "Nm", 9.80665), ("N-m", "Nm", 1.0), ("mm", "m", 1e-3), ("ft", "m", 0.3048), ("ms", "s", 1e-3),
+        ("kn", "mps", 1852 / 3600), ("knots", "mps", 1852 / 3600), ("cm/s", "mps", 0.01), ("m/s", "mps", 1.0),
+        ("mps", "mps", 1.0), ("°", "rad", np.pi / 180), ("deg", "rad", np.pi / 180), ("rad", "rad", 1.0),
+        ("°/s", "radps", np.pi / 180), ("deg/min", "radps", np.pi / 10800), ("degps", "radps", np.pi / 180),
+        ("kN", "m", None), ("Nm", "N", None), ("N", "Nm", None), ("m/s", "m", None), ("deg", "radps", None),
+    ],
+)  # fmt: skip
+def test_units_are_those_of_their_kind(unit, suffix, factor):
+    found = unit_factor(unit, suffix)
+    assert found == (None if factor is None else pytest.approx(factor, rel=1e-9))
 
 
 def test_a_missing_library_is_asked_for_in_a_line(tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from tank2sim.api.result import Result, ResultTable
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import write_together
 from tank2sim.identification.captive.single_runs import (
-    DIFFERS,
+    REPEATS_DIFFER,
     FourierCoefficient,
     RepeatedCoefficient,
     SingleRun,
@@ -64,7 +64,7 @@ class CaptiveRunResult(Result):
             )
         if len(self.runs) > 1 and not same_test(self.runs):
             notices.append("The runs are of different tests (angles, frequency, amplitude or speed): not compared.")
-        odd = [row for row in self.repeats if row.chance < DIFFERS]
+        odd = [row for row in self.repeats if row.chance < REPEATS_DIFFER]
         notices += [
             f"Repeats differ in {row.signal} {row.part} {row.order or ''}".rstrip()
             + f" by {row.deviation:.3g} {row.unit}, and their noise explains {row.expected:.2g} (chance "

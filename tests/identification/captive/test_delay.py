@@ -111,6 +111,21 @@ def test_oscillations_at_one_frequency_show_no_delay_and_say_what_it_would_do(tm
     assert "10 ms would change Yvdot by" in sentence
 
 
+def test_a_delay_that_sway_alone_shows_is_reported_and_not_corrected(tmp_path):
+    """Memory of the flow in sway would look the same."""
+    written = write(Campaign(seed=21, rate_hz=10.0, force_delay_s=0.03), tmp_path)
+    campaign = read_campaign(written.path)
+    yaws = {run.name for run in campaign.runs if run.type in ("pure_yaw", "yaw_with_drift")}
+    found = reduce_campaign(campaign.without(yaws))
+    assert found.delay is not None and not found.delay.supported
+    (error,) = [error for error in found.systematic if error.source == "force_delay"]
+    assert not error.corrected
+    assert abs(error.size - 0.03) < 4 * error.standard_error
+    derivative = found.derivatives["Yvdot"]
+    assert derivative.type_b["force_delay"] > 3 * derivative.type_a
+    assert abs(derivative.value - written.derivatives["Yvdot"]) < 1.96 * derivative.standard_error
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [-0.03, 0.0, 0.0015, 0.03])
 def test_intervals_cover_the_truth_with_any_delay(tmp_path, delay):

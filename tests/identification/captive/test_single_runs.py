@@ -63,6 +63,18 @@ def test_the_averaged_cycle_is_the_force_over_the_phase_and_its_scatter_the_nois
     assert result.runs[0].residual_rms["N"] == pytest.approx(0.5, rel=0.05)
 
 
+def test_the_averaged_cycle_shows_what_the_harmonics_lack(tmp_path):
+    file = oscillation(tmp_path, noise=0.0, periods=20.2)
+    table = np.loadtxt(file, delimiter=",", skiprows=1)
+    header = file.read_text().splitlines()[0]
+    phase = FREQUENCY * table[:, 0] + 1.1
+    table[:, header.split(",").index("X_N")] += 0.8 * np.cos(7 * phase)
+    np.savetxt(file, table, delimiter=",", header=header, comments="", fmt="%.9g")
+    cycle = t2s.reduce_runs(file, type="pure_yaw").cycle()
+    seventh = 0.8 * np.cos(7 * np.radians(cycle["phase_deg"]))
+    assert np.abs(cycle["X_mean"] - cycle["X_fit"] - seventh).max() < 0.1
+
+
 def test_repeats_that_differ_are_named_and_those_that_do_not_are_not(tmp_path):
     same = [oscillation(tmp_path, name) for name in ("a.csv", "b.csv", "c.csv")]
     result = t2s.reduce_runs(same, type="pure_yaw")

@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 
 from tank2sim.identification.captive.equations import CampaignEquations
 from tank2sim.identification.captive.regression import Solution, solve
-from tank2sim.identification.captive.type_b import with_error
+from tank2sim.identification.captive.type_b import with_common_error
 from tank2sim.records.campaigns import Campaign
 
 _SHOWN = 4.0
@@ -67,7 +67,7 @@ def alignment_estimate(
         solution, zero = solutions[force], f"{force}0"
         if not {zero, f"{force}v"} <= set(solution.names):
             return None
-        turned = with_error(campaign, equations[force], "alignment_rad", _SMALL_RAD)
+        turned = with_common_error(campaign, equations[force], "alignment_rad", _SMALL_RAD)
         slope = (solve(turned, solution.spread).value(zero) - solution.value(zero)) / _SMALL_RAD
         if not slope:
             return None

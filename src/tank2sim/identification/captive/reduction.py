@@ -47,7 +47,7 @@ from tank2sim.identification.captive.systematic import (
 )
 from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.identification.captive.trends import Trend, trends
-from tank2sim.identification.captive.type_b import type_b_shifts, with_error
+from tank2sim.identification.captive.type_b import type_b_shifts, with_common_error
 from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
@@ -393,7 +393,7 @@ def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str
         moved = solve(correct_delay(used, result.timing_s), solution.spread).values - solution.values
         shown["force_delay"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     if result.alignment_rad:
-        turned = with_error(campaign, used, "alignment_rad", result.alignment_rad)
+        turned = with_common_error(campaign, used, "alignment_rad", result.alignment_rad)
         moved = solve(turned, solution.spread).values - solution.values
         shown["alignment"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return type_b_shifts(campaign, used, solution) | shown

@@ -29,7 +29,7 @@ CYCLE_BINS = 72
 SAME_MOTION = 0.02
 """Relative difference of frequency, amplitude and speed within which two runs are repeats, as those of a campaign
 are (:mod:`tank2sim.identification.captive.repeats`)."""
-DIFFERS = 0.01
+REPEATS_DIFFER = 0.01
 """Probability below which repeats differ by more than the noise within them. Project choice."""
 
 

@@ -30,13 +30,13 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
     for source, size in stated.items():
         if not size:
             continue
-        erring = with_error(campaign, used, source, size)
+        erring = with_common_error(campaign, used, source, size)
         moved = solve(erring, solution.spread).values - solution.values
         found[source] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return found
 
 
-def with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
+def with_common_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
     """The equations with an error common to the campaign.
 
     Parameters
