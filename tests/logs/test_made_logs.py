@@ -139,6 +139,18 @@ def test_a_local_time_of_unknown_zone_is_marked(tmp_path) -> None:
     assert any("unknown zone" in mark for mark in log(path).marks)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
+def test_a_preamble_above_the_names_is_passed_over(tmp_path, encoding) -> None:
+    path = tmp_path / "preamble.csv"
+    head = ["Schiff: Möwe", "Reise 12; 3. Wache", ""]
+    table = ["utc;latitude;heading_deg"]
+    table += [f"2023-11-14T22:{k // 60:02d}:{k % 60:02d}Z;54,{k:04d};{k},5" for k in range(100)]
+    path.write_text("\n".join([*head, *table]), encoding=encoding)
+    found = read_log(path)
+    assert stream_of(found, "heading").values == pytest.approx(np.arange(100) + 0.5)
+    assert found.counts["rows"] == 100 and found.counts["skipped"] == 0
+
+
 def test_positions_in_degrees_and_minutes(tmp_path) -> None:
     path = tmp_path / "minutes.csv"
     rows = [f"2023-11-14T22:{k // 60:02d}:{k % 60:02d}Z,54 18.{k:04d} N,010 12.0000 W,40" for k in range(100)]
