@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import reduce_campaign
@@ -42,6 +43,24 @@ def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
         assert abs(derivative.value - written.derivatives[name]) < 3.5 * derivative.standard_error, name
     assert 0 < found.derivatives["Nrdot"].type_b["force_delay"] < 2 * found.derivatives["Nrdot"].type_a
     assert "CORRECTED" in reduction_findings(found)[0]
+
+
+@pytest.mark.parametrize("seed", [21, 22])
+def test_a_low_pass_filter_of_the_gauges_is_found_as_its_group_delay(tmp_path, seed):
+    """A Butterworth filter of the second order and 2 Hz delays slow signals by sqrt(2)/(2 pi 2 Hz) = 0.1125 s."""
+    written = write(Campaign(seed=seed, rate_hz=50.0, size="linear", part_periods=True), tmp_path)
+    campaign = read_campaign(written.path)
+    numerator, denominator = butter(2, 2.0, fs=50.0)
+
+    def late(values):
+        return lfilter(numerator, denominator, values - values[0]) + values[0]
+
+    runs = [replace(run, X_N=late(run.X_N), Y_N=late(run.Y_N), N_Nm=late(run.N_Nm)) for run in campaign.runs]
+    found = reduce_campaign(replace(campaign, runs=tuple(runs)))
+    (error,) = found.systematic
+    assert error.corrected
+    assert abs(error.size - np.sqrt(2) / (2 * np.pi * 2.0)) < 3 * error.standard_error
+    assert np.max(np.abs(errors_over(found, written, (*ACCELERATIONS, *DAMPING)))) < 3.0
 
 
 def test_without_a_delay_none_is_corrected_and_its_uncertainty_is_in_the_derivatives(tmp_path):
