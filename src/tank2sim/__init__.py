@@ -43,6 +43,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "AuditResult": "api.audit",
     "AutopilotResult": "api.autopilot",
+    "CaptiveRunResult": "api.captive_run",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
     "DemoResult": "api.demo",
@@ -83,6 +84,7 @@ _HOMES = {
     "make_report": "api.report",
     "read_trial": "api.trial",
     "reduce": "api.reduction",
+    "reduce_runs": "api.captive_run",
     "run_demo": "api.demo",
     "ships": "api.ship",
     "signals": "api.signals",
@@ -96,6 +98,7 @@ _HOMES = {
 __all__ = [
     "AuditResult",
     "AutopilotResult",
+    "CaptiveRunResult",
     "CheckResult",
     "ComparisonResult",
     "DemoResult",
@@ -136,6 +139,7 @@ __all__ = [
     "make_report",
     "read_trial",
     "reduce",
+    "reduce_runs",
     "run_demo",
     "ships",
     "signals",
