@@ -67,6 +67,13 @@ BETTER_FROM = 1.1
 EXPLAINED = 0.2
 """Coefficients explain a gap that they reduce to less than this share, or to noise (project choice)."""
 
+TRIES = 4
+"""Explanations that are simulated at most, one after the other (project choice)."""
+
+CLEARLY = 0.7
+"""Largest share of the misfit that may remain where a second explanation, or one next to something unknown, is named
+(project choice)."""
+
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
 
@@ -166,7 +173,7 @@ def _search_once(
     found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
     decision = decide(found, options.false_discovery)
     progress("proving")
-    return _assemble_gap(card, trials, found, decision, progress)
+    return _assemble_gap(card, trials, found, decision, progress, options.false_discovery)
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
@@ -211,24 +218,19 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
 
 
 def _assemble_gap(
-    card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: StageReport
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    decision: Decision,
+    progress: StageReport,
+    share: float,
 ) -> tuple[Gap, tuple[Measured, Measured]]:
     """The results that follow from the decision, and the trials with the winds and currents that were found."""
     fitted, held = trials
-    estimated: list[Found] = []
-    by_trial: ByTrial = {}
-    if decision.verdict in (MISSING, AMBIGUOUS):
-        by_formula = found.likelihood.by_formula(decision.best)
-        estimated = estimates(by_formula)
-        by_trial = surroundings_by_trial(by_formula, found.likelihood.motion.names)
     noise = _noise(found, decision.best, fitted)
     sigmas = {name: sigma for name, (sigma, _) in noise.items()}
-    proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, found, decision.best)
-    withheld = ""
-    if estimated and not closes_gap(proof.results):
-        withheld = " and ".join(name for name, *_ in estimated)
-        decision, estimated = replace(decision, verdict=OUTSIDE_LIBRARY), []
-        proof = _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+    judged = _judge_by_simulation(card, trials, found, decision, sigmas, share)
+    decision, estimated, proof, withheld = judged.decision, judged.estimated, judged.proof, judged.withheld
     if decision.verdict == NO_EFFECT_MISSING:
         before, after = (_misfit_of(proof.results, version) for version in ("before", "after"))
         if (
@@ -272,6 +274,63 @@ def _assemble_gap(
         notices=_notices(card, decision, results, agreement, (fitted, held), withheld),
     )
     return gap, proof.trials
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A decision after the simulations with its names, and the names that brought none closer."""
+
+    decision: Decision
+    estimated: list[Found]
+    proof: _Proof
+    withheld: tuple[str, ...]
+
+
+def _judge_by_simulation(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    decision: Decision,
+    sigmas: Mapping[str, float],
+    share: float,
+) -> _Judged:
+    """The decision that stands up to free-running simulations.
+
+    An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
+    the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts
+    next to something that no effect explains, must close the gap clearly (:data:`CLEARLY`); nothing is named without.
+    `share` is the option ``false_discovery``.
+    """
+    withheld: list[str] = []
+    remaining, current = found, decision
+    for _ in range(TRIES):
+        if not current.best.hypothesis.effects:
+            break
+        by_formula = remaining.likelihood.by_formula(current.best)
+        estimated = estimates(by_formula)
+        by_trial = surroundings_by_trial(by_formula, remaining.likelihood.motion.names)
+        proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, remaining, current.best)
+        unknown = current.verdict == OUTSIDE_LIBRARY
+        if _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results):
+            verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
+            return _Judged(replace(current, verdict=verdict), estimated, proof, tuple(withheld))
+        if not unknown:
+            withheld.append(" and ".join(current.best.hypothesis.effects))
+        kept = tuple(fit for fit in remaining.fits if fit is not current.best)
+        remaining = replace(remaining, fits=kept)
+        current = decide(remaining, share)
+    proof = _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+    if decision.best.hypothesis.effects:
+        decision = replace(decision, verdict=OUTSIDE_LIBRARY)
+    return _Judged(decision, [], proof, tuple(withheld))
+
+
+def _closes_clearly(results: Sequence[Passed]) -> bool:
+    """Whether a gap that is far above the noise becomes clearly smaller, in the trials held out as well."""
+    before, after = (_misfit_of(results, version) for version in ("before", "after"))
+    held = [result for result in results if result.held_out]
+    alike = not held or _misfit_of(held, "after") < CLEARLY * _misfit_of(held, "before")
+    return before > MUCH and after < CLEARLY * before and alike and closes_gap(results, CLEARLY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -407,11 +466,12 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
 
 
 def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
+    """The best explanations, and none; the probability of those that simulations excluded is 0."""
     least = found.fits[0].score
     shown = [*found.fits[:RIVALS]]
     shown += [found.none] if found.none not in shown else []
     return tuple(
-        Rival(fit.hypothesis.effects, fit.score - least, decision.probabilities[fit.hypothesis.effects])
+        Rival(fit.hypothesis.effects, fit.score - least, decision.probabilities.get(fit.hypothesis.effects, 0.0))
         for fit in shown
     )
 
@@ -451,14 +511,14 @@ def _notices(
     results: Sequence[Passed],
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
-    withheld: str,
+    withheld: Sequence[str],
 ) -> tuple[str, ...]:
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(strange) for strange in decision.strange]
-    if withheld:
-        notices.append(
-            f"{withheld}: fits best from instant to instant, but a simulation with it is not closer: not named"
-        )
+    notices += [
+        f"{names}: fits best from instant to instant, but a simulation with it is not closer: not named"
+        for names in withheld
+    ]
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
         notices.append(f"{have}: kept as on the card, and not sought")

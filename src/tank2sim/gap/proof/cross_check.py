@@ -160,11 +160,12 @@ class _Fit:
         return model.parameter_values({name: values[name] + float(change) for name, change in moved.items()})
 
 
-def closes_gap(passed: Sequence[Passed]) -> bool:
+def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
     By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
     signals of all trials in which the two simulations differ by :data:`DIFFERS`, for an effect may act in few of them.
+    `limit` is the largest median.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
     if min(np.sqrt(np.mean(values**2)) for values in rms) < MUCH:
@@ -173,7 +174,7 @@ def closes_gap(passed: Sequence[Passed]) -> bool:
     pairs = [(replay.misfit("before", name), replay.misfit("after", name)) for replay, name in shown]
     ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
     changed = [ratio for ratio, (replay, name) in zip(ratios, shown, strict=True) if _differs(replay, name)]
-    return bool(changed and np.median(changed) < CLOSES)
+    return bool(changed and np.median(changed) < limit)
 
 
 def _differs(replay: Passed, name: str) -> bool:
