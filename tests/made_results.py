@@ -17,6 +17,7 @@ from tank2sim.bundled import bundled
 from tank2sim.gap.result import Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.gap import made_up
+from tests.identification.captive.made_runs import oscillation
 from tests.yaw_truth import Truth, record, written
 
 NO_TRIALS = Measured((), "angle", ())
@@ -84,6 +85,10 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "log": lambda folder: t2s.log(_trials(folder)),
     "pilotcard": lambda _: t2s.load("mariner").pilot_card(),
     "poster": lambda _: t2s.load("mariner").poster(),
+    "run": lambda folder: t2s.reduce_runs(oscillation(folder), type="pure_yaw"),
+    "run and repeat": lambda folder: t2s.reduce_runs(
+        [oscillation(folder, name) for name in ("a.csv", "b.csv")], type="pure_yaw"
+    ),
     "ships": lambda _: list_ships(),
     "signals": lambda folder: t2s.signals(_trials(folder)),
     "signals with a filter": lambda folder: t2s.signals(_trials(folder), "r_degps", filter="lowpass:0.1"),

@@ -12,6 +12,7 @@ from gap_truth.draws import DRAWS, OUTSIDERS, TRIALS_STRUCK
 from gap_truth.manoeuvres import FIT, MANOEUVRES, Manoeuvre
 from gap_truth.ship import perturbed
 
+SURROUNDINGS = ("wind", "current")
 PROCESSES = ("none", "gusts", "waves")
 
 
@@ -26,6 +27,7 @@ class Setting:
     process: str = "none"  # none | gusts | waves
     coefficients: str = "exact"  # exact | independent | correlated
     manoeuvres: tuple[str, ...] | None = None  # None: all
+    by_trial: bool = False  # wind and current are drawn for each trial
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.effects if name not in DRAWS]
@@ -63,6 +65,10 @@ def parameters_of(setting: Setting) -> dict[str, dict[str, float]]:
     """The truth of a set in file units; for an outsider that strikes some trials only, 1 at `in_<trial>`."""
     truth: dict[str, dict[str, float]] = {}
     for name in setting.effects:
+        if setting.by_trial and name in SURROUNDINGS:
+            each = {trial: _drawn(setting, name, f" in {trial}") for trial in setting.trials}
+            truth[name] = {f"{key} in {trial}": value for trial, found in each.items() for key, value in found.items()}
+            continue
         generator = setting.generator(f"parameters of {name}")
         truth[name] = {key: float(value) for key, value in DRAWS[name](generator, setting.strength).items()}
         if name in TRIALS_STRUCK:
@@ -72,6 +78,11 @@ def parameters_of(setting: Setting) -> dict[str, dict[str, float]]:
             count = min(TRIALS_STRUCK[name], len(possible))
             truth[name] |= {f"in_{trial}": 1.0 for trial in sorted(generator.choice(possible, count, replace=False))}
     return truth
+
+
+def _drawn(setting: Setting, name: str, where: str) -> dict[str, float]:
+    generator = setting.generator(f"parameters of {name}{where}")
+    return {key: float(value) for key, value in DRAWS[name](generator, setting.strength).items()}
 
 
 def lanes_of(setting: Setting) -> list[Lane]:
@@ -84,7 +95,7 @@ def lanes_of(setting: Setting) -> list[Lane]:
     lanes = []
     for trial in setting.trials:
         here = {
-            name: values
+            name: _drawn(setting, name, f" in {trial}") if setting.by_trial and name in SURROUNDINGS else values
             for name, values in truth.items()
             if name not in OUTSIDERS or name not in TRIALS_STRUCK or f"in_{trial}" in values
         }

@@ -44,6 +44,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "AuditResult": "api.audit",
     "AutopilotResult": "api.autopilot",
+    "CaptiveRunResult": "api.captive_run",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
     "ConversionResult": "api.conversion",
@@ -86,6 +87,7 @@ _HOMES = {
     "make_report": "api.report",
     "read_trial": "api.trial",
     "reduce": "api.reduction",
+    "reduce_runs": "api.captive_run",
     "run_demo": "api.demo",
     "ships": "api.ship",
     "signals": "api.signals",
@@ -99,6 +101,7 @@ _HOMES = {
 __all__ = [
     "AuditResult",
     "AutopilotResult",
+    "CaptiveRunResult",
     "CheckResult",
     "ComparisonResult",
     "ConversionResult",
@@ -141,6 +144,7 @@ __all__ = [
     "make_report",
     "read_trial",
     "reduce",
+    "reduce_runs",
     "run_demo",
     "ships",
     "signals",

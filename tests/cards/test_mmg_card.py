@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import pytest
 
 from tank2sim.bundled import bundled_cards
@@ -11,6 +13,7 @@ from tank2sim.cards.mmg import fujii
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters
 from tank2sim.errors import InputError
+from tank2sim.identification.yaw import card as yaw_card
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
 
@@ -66,6 +69,15 @@ def test_fujiis_slope_is_that_of_the_kvlcc2() -> None:
     """f_alpha = 2.747 belongs to Lambda = 1.827."""
     assert fujii(1.827) == pytest.approx(2.747, abs=1e-3)
     assert mmg_of(TEXT.replace("f_alpha = 2.747", "aspect_ratio = 1.827")).rudder.f_alpha == pytest.approx(fujii(1.827))
+
+
+def test_a_yaw_rig_writes_the_added_inertia_of_the_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(yaw_card, "nrdot_prime", lambda *_: (-8e-4, 1e-4))
+    monkeypatch.setattr(yaw_card, "tank_density", lambda _: 1000.0)
+    new = yaw_card.with_nrdot(mmg_of(TEXT), None, "output_error", 7.0)  # type: ignore[arg-type]
+    assert tomllib.loads(new.text)["derivatives"]["Jz"] == pytest.approx(8e-4 * 7 / 0.46, rel=1e-5)
+    assert new.derivatives["Nrdot"] == pytest.approx(-8e-4, rel=1e-5)
+    assert new.uncertainty["Nrdot"] == pytest.approx(1e-4, rel=1e-5)
 
 
 def test_stated_revolutions_are_taken() -> None:

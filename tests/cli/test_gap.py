@@ -69,7 +69,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object,
                 for trial in (*fitted.trials, *held.trials)
             )
             improved = add_effects_to_card(card, [(one.name, one.parameters, one.standard_errors) for one in effects])
-            gap = replace(made_up.missing(), card=card, improved=improved, verdict=verdict, effects=effects)
+            gap = replace(made_up.missing(), card=card, base=card, improved=improved, verdict=verdict, effects=effects)
             where = tuple(replace(one, trial=passed[0].name) for one in gap.where)
             gap = replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
             return gap if test else replace(gap, next_test=None)

@@ -76,7 +76,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             improved = add_effects_to_card(
                 card, [(one.name, one.parameters, one.standard_errors) for one in (CURRENT,)]
             )
-            gap = replace(made_up.missing(), card=card, improved=improved, effects=(CURRENT,), passed=passed)
+            gap = replace(made_up.missing(), card=card, base=card, improved=improved, effects=(CURRENT,), passed=passed)
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 
         monkeypatch.setattr("tank2sim.gap.fleet.search.run_gap_workflow", find_gap)

@@ -76,6 +76,7 @@ def missing() -> Gap:
     return Gap(
         card=card(),
         improved=card(),
+        base=card(),
         verdict=MISSING,
         effects=(current,),
         coefficients=(),
@@ -92,6 +93,7 @@ def missing() -> Gap:
         figures_before=figures(1.1),
         figures_after=figures(1.01),
         missing_force=force(),
+        at_work=(),
         could_hide={"rudder_bias": {"angle_rad": np.deg2rad(0.25)}, "linear_yaw_damping": {"factor": 0.05}},
         agreement={
             "current.speed": {"turn35": (0.44, 0.03), "zigzag": (0.47, 0.4), "turn20": (0.46, 0.03)},

@@ -58,6 +58,8 @@ def test_trials_that_got_worse_are_named() -> None:
         ([(math.inf, 5), (math.inf, 4)], True),  # a simulation that ran away is caught
         ([(math.inf, math.inf), (90, 30), (80, 30)], True),
         ([(90, math.inf), (80, math.inf)], False),
+        ([(90, 10), (90, 90), (80, 80), (70, 70)], True),  # it acts in one trial alone
+        ([(90, 90), (80, 80)], False),
     ],
 )
 def test_a_name_that_brings_no_simulation_nearer_closes_nothing(sizes, closed: bool) -> None:

@@ -130,6 +130,24 @@ FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
 
 
 @pytest.mark.usefixtures("calm")
+def test_a_name_that_is_not_sure_enough_is_one_of_several() -> None:
+    fits = [fit(0), fit(-50, 0), fit(-38, 1)]  # odds of exp(2) to 1
+    search = Search(SimpleNamespace(), tuple(sorted(fits, key=lambda found: found.score)), ())
+    assert 0.85 < decide(search).confidence(YAW) < 0.9
+    for share, verdict in ((0.5, MISSING), (0.2, MISSING), (0.1, AMBIGUOUS), (0.02, AMBIGUOUS)):
+        found = decide(search, share)
+        assert found.verdict == verdict and found.best.hypothesis.effects == (YAW,)
+        assert [other.hypothesis.effects for other in found.alike] == ([] if verdict == MISSING else [(SURGE,)])
+
+
+@pytest.mark.usefixtures("calm")
+def test_where_no_other_effect_comes_near_the_alternative_is_nothing() -> None:
+    search = Search(SimpleNamespace(), (fit(-12, 0), fit(0)), ())  # odds of exp(2) to 1
+    (alternative,) = decide(search, 0.05).alike
+    assert alternative.hypothesis.effects == () and decide(search).alike == ()
+
+
+@pytest.mark.usefixtures("calm")
 @pytest.mark.parametrize(
     ("pair", "share"),
     [

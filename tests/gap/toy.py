@@ -48,6 +48,11 @@ class Toy:
     indices: tuple | None = None
     model = SimpleNamespace(input_names=("rudder.command",))
     card = SimpleNamespace(steering_gear=None)
+    each = recorded = ()
+
+    @property
+    def moved_together(self):
+        return tuple((place,) for place in range(len(self.priors)))
 
     @property
     def effects(self):

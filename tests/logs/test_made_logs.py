@@ -12,10 +12,11 @@ from tank2sim.api.log import log
 from tank2sim.errors import InputError
 from tank2sim.logs.clock import utc_text
 from tank2sim.logs.nmea0183 import read_nmea0183
-from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name, split_unit
+from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.reference import local_metres
 from tank2sim.logs.table import read_table_log
+from tank2sim.records.spelt_units import split_unit
 from tests.logs.made_logs import T0, candump_lines, frame, nmea_lines, rmc, sentence, voyage
 
 
@@ -136,6 +137,18 @@ def test_a_local_time_of_unknown_zone_is_marked(tmp_path) -> None:
     path = tmp_path / "local.csv"
     table.to_csv(path, index=False)
     assert any("unknown zone" in mark for mark in log(path).marks)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
+def test_a_preamble_above_the_names_is_passed_over(tmp_path, encoding) -> None:
+    path = tmp_path / "preamble.csv"
+    head = ["Schiff: Möwe", "Reise 12; 3. Wache", ""]
+    table = ["utc;latitude;heading_deg"]
+    table += [f"2023-11-14T22:{k // 60:02d}:{k % 60:02d}Z;54,{k:04d};{k},5" for k in range(100)]
+    path.write_text("\n".join([*head, *table]), encoding=encoding)
+    found = read_log(path)
+    assert stream_of(found, "heading").values == pytest.approx(np.arange(100) + 0.5)
+    assert found.counts["rows"] == 100 and found.counts["skipped"] == 0
 
 
 def test_positions_in_degrees_and_minutes(tmp_path) -> None:

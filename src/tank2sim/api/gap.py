@@ -11,11 +11,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles, folder_made, put
+from tank2sim.api.gap_files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
-from tank2sim.cards import Card, parse_card
+from tank2sim.cards import Card, ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import not_referring
 from tank2sim.cards.derived import derived_card
 from tank2sim.dynamics.effects import EFFECTS
@@ -34,16 +34,23 @@ from tank2sim.gap.outcome.export import (
     signal_display_name,
 )
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
+from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
+from tank2sim.gap.search.model_choice import SUREST
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.identification.trials.problem.signatures import fitted_as, with_fitted_trials
+from tank2sim.records.signals.writing import trial_text
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
+
+
+SUREST_WRONG = round(1 - SUREST, 9)
+"""Probability with which even the surest name may be wrong."""
 
 
 class GapResult(Result):
@@ -86,6 +93,34 @@ class GapResult(Result):
         return pd.DataFrame(rows, columns=["effect", "parameter", *numbers]).astype(dict.fromkeys(numbers, float))
 
     @property
+    def surroundings(self) -> pd.DataFrame:
+        """Winds and currents that differ from trial to trial: effect, trial, speed (m/s), direction (deg), errors.
+
+        Directions count clockwise from north: from which a wind comes, towards which a current sets. Of a trial held
+        out they were fitted to that trial itself.
+        """
+        import pandas as pd
+
+        columns = [
+            "effect",
+            "trial",
+            "held_out",
+            "speed_mps",
+            "direction_deg",
+            "speed_error_mps",
+            "direction_error_deg",
+        ]
+        rows = [
+            [
+                *(effect["name"], row["trial"], row["held_out"], row["speed_mps"], row["direction_deg"]),
+                *row["standard_errors"].values(),
+            ]
+            for effect in self._results["effects"]
+            for row in effect["by_trial"]
+        ]
+        return pd.DataFrame(rows, columns=columns)
+
+    @property
     def coefficients(self) -> pd.DataFrame:
         """Coefficients that were fitted together with the effects, by name; empty where the given ones were kept.
 
@@ -112,8 +147,9 @@ class GapResult(Result):
     def improved(self) -> Card:
         """The card with the effects; the given card where none of the ship was named."""
         text = self._improved_text("the improved card")
-        card = parse_card(text, self.gap.card.source)
-        return replace(card, covariance=self.gap.card.covariance) if text == self.gap.card.text else card
+        if text == self.gap.card.text:
+            return replace(parse_card(text, self.gap.card.source), covariance=self.gap.card.covariance)
+        return derived_card(self.gap.base, text, self.gap.card.source)[0]
 
     @property
     def ship(self) -> Ship:
@@ -183,11 +219,12 @@ class GapResult(Result):
         """Path to content of the files that belong into a folder, and messages about them.
 
         ``gap.json``, ``improved.toml`` with its covariance, ``report.html``, ``next_test.csv`` where a test would
-        decide, and ``corrected/`` where a sensor is at fault.
+        decide, ``corrected/`` where a sensor is at fault, and ``surroundings/`` with the winds and currents of single
+        trials as columns, with which the improved card follows them.
         """
         gap, trials = self.gap, (*self.fitted.trials, *self.held.trials)
         text = self._improved_text(str(folder / IMPROVED))
-        improved, notices = improved_files(gap.card, text, folder / IMPROVED)
+        improved, notices = improved_files(gap.base, text, folder / IMPROVED)
         files: GapFiles = {**improved, folder / REPORT: self.page()}
         if gap.next_test:
             files[folder / NEXT_TEST_FILE] = gap.next_test.orders
@@ -198,6 +235,7 @@ class GapResult(Result):
                     files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
                 new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
                 notices += [f"{trial.path.name}: {text}" for text in new if text.startswith(REMAINING_FAULTS)]
+        files |= {folder / SURROUNDED / f"{name}.csv": text for name, text in self._surrounded().items()}
         names = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
         files[folder / GAP] = self.to_json(files=names)
         return files, notices
@@ -215,6 +253,15 @@ class GapResult(Result):
             files, notices = self.files(Path(folder))
             return *notices, *put(files, Path(folder), inputs)
 
+    def _surrounded(self) -> dict[str, str]:
+        """Name of each trial to its text with the winds and currents that were found for it."""
+        found = {effect.name: effect.by_trial for effect in self.gap.effects if effect.by_trial}
+        if not found:
+            return {}
+        remark = f"{' and '.join(found)} of this trial estimated by tank2sim gap; at the size of {self.gap.card.source}"
+        trials = (trial for group in (self.fitted, self.held) for trial in with_surroundings(group, found).trials)
+        return {trial.name: trial_text(replace(trial, scale=None), [remark]) for trial in trials}
+
     @property
     def _found(self) -> list[Found]:
         return [(effect.name, effect.parameters, effect.standard_errors) for effect in self.gap.effects]
@@ -226,7 +273,7 @@ class GapResult(Result):
         if gap.improved.text != text:
             rivals = [joined(names) for names in gap.alternatives]
             names = [trial.name for trial in self.fitted.trials]
-            text = card_with_effects_text(gap.improved, self._found, names, rivals)
+            text = card_with_effects_text(gap.improved, self._found, names, rivals, len(gap.coefficients))
             text = with_fitted_trials(text, source, self.fitted.trials)
         parse_card(text, source)
         return text
@@ -283,6 +330,7 @@ def find_gap(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
     max_effects: int = 2,
+    false_discovery: float = 0.5,
     executor: str = PROCESSES,
     workers: int | None = None,
     progress: StageReport = lambda text: None,
@@ -299,6 +347,9 @@ def find_gap(
         Look for these alone; do not look for these. By default the whole library.
     max_effects : int
         1 or 2 effects at a time.
+    false_discovery : float
+        Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5; what is less sure is one of
+        several candidates.
     executor : str
         ``processes`` or ``dask://host:port``.
     workers : int, optional
@@ -312,27 +363,55 @@ def find_gap(
         A file is at fault, a trial is too short, or an effect is not known or cannot be tried on this card.
     """
     ship = nonlinear_card(as_ship(card).card)
-    options = gap_options(effects, without, max_effects, workers)
+    options = gap_options(effects, without, max_effects, workers, false_discovery)
     fitted, held = fitted_and_held(trials, holdout, ship)
+    fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
     with _cluster(executor) as pool:
         return GapResult(run_workflow(ship, fitted, held, options, progress, pool), fitted, held)
 
 
+def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
+    """A notice if the card was identified from some of these trials: its coefficients may hold what is missing.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    fitted : Measured
+        Trials that name the effect.
+    """
+    names = [trial.name for trial in fitted.trials if fitted_as(card, trial) is not None]
+    if not names:
+        return []
+    return [
+        f"{card.source} was fitted to {', '.join(names)}: its coefficients may hold a part of what is missing. "
+        "Give gap the card as it was before these trials, and identify on the improved card afterwards"
+    ]
+
+
 def gap_options(
-    effects: Sequence[str] = (), without: Sequence[str] = (), max_effects: int = 2, workers: int | None = None
+    effects: Sequence[str] = (),
+    without: Sequence[str] = (),
+    max_effects: int = 2,
+    workers: int | None = None,
+    false_discovery: float = 0.5,
 ) -> GapOptions:
     """Options of the search. Raises InputError for an effect that is not known.
 
     Parameters
     ----------
-    effects, without, max_effects, workers
+    effects, without, max_effects, workers, false_discovery
         As of :func:`find_gap`.
     """
     for option, names in (("--effects", effects), ("--without", without)):
         for name in names:
             if EFFECTS.get(name) is None:
                 raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers=workers)
+    if not SUREST_WRONG <= false_discovery <= 0.5:
+        problem = f"is {false_discovery:g}: no name is surer than {1 - SUREST_WRONG:g}, and half is a guess"
+        raise InputError("--false-discovery", "", problem, f"give {SUREST_WRONG:g} to 0.5")
+    return GapOptions(
+        tuple(effects) or None, tuple(without), max_effects, workers=workers, false_discovery=false_discovery
+    )
 
 
 @contextmanager

@@ -25,6 +25,12 @@ SOMETIMES = (NEXT_TEST_FILE, covariance_file(Path(IMPROVED)).name)
 CORRECTED = "corrected"
 """Folder of trials without the faults of their sensors."""
 
+SURROUNDED = "surroundings"
+"""Folder of trials with the winds and currents that were found for each as columns."""
+
+FOLDERS = (CORRECTED, SURROUNDED)
+"""Folders of trials that only some runs write."""
+
 GapFiles = dict[Path, str | bytes]
 
 
@@ -76,28 +82,32 @@ def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path])
         Files that must not be overwritten.
     """
     earlier = _of_earlier_run(folder)
-    some_corrected = any(path.parent == folder / CORRECTED for path in files)
-    with folder_made(folder / CORRECTED) if some_corrected else contextlib.nullcontext():
+    with contextlib.ExitStack() as made:
+        for path in dict.fromkeys(path.parent for path in files if path.parent in {folder / name for name in FOLDERS}):
+            made.enter_context(folder_made(path))
         write_together(files, inputs=inputs, outputs=[*files])
     return _tidied(folder, earlier, {*files, *map(Path.resolve, inputs)})
 
 
 def _of_earlier_run(folder: Path) -> set[Path]:
-    """Orders, corrected trials and covariance that an earlier run lists in its ``gap.json``."""
+    """Orders, written trials and covariance that an earlier run lists in its ``gap.json``."""
     try:
         earlier = json.loads((folder / GAP).read_text(encoding="utf-8"))
         names = [*earlier.get("files", ()), (earlier.get("next_test") or {}).get("orders", "")]
         paths = [PurePosixPath(name) for name in names]
     except (OSError, ValueError, AttributeError, TypeError):
         return set()  # none, or another program's
-    corrected_ones = {folder / path for path in paths if len(path.parts) == 2 and path.match(f"{CORRECTED}/*.csv")}
-    return corrected_ones | {folder / name for name in SOMETIMES if PurePosixPath(name) in paths}
+    trials = {
+        folder / path for path in paths if len(path.parts) == 2 and any(path.match(f"{name}/*.csv") for name in FOLDERS)
+    }
+    return trials | {folder / name for name in SOMETIMES if PurePosixPath(name) in paths}
 
 
 def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
     """Remove files of an earlier run that this run does not replace; return messages, also about unknown files."""
     messages = []
-    for path in (*(folder / name for name in SOMETIMES), *sorted((folder / CORRECTED).glob("*.csv"))):
+    trials = [path for name in FOLDERS for path in sorted((folder / name).glob("*.csv"))]
+    for path in (*(folder / name for name in SOMETIMES), *trials):
         if path in kept or not path.exists():
             continue
         if path not in earlier or path.resolve() in kept:
@@ -109,6 +119,7 @@ def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
             messages.append(f"{path} is of an earlier run, and could not be removed")
         else:
             messages.append(f"{path} was of an earlier run, and was removed")
-    with contextlib.suppress(OSError):  # not there, or not empty
-        (folder / CORRECTED).rmdir()
+    for name in FOLDERS:
+        with contextlib.suppress(OSError):  # not there, or not empty
+            (folder / name).rmdir()
     return messages

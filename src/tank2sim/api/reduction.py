@@ -30,6 +30,7 @@ from tank2sim.identification.captive.tables import (
     terms_left_out,
     terms_not_excited,
 )
+from tank2sim.identification.captive.uncertainty_budget import uncertainty_budget
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
 
 if TYPE_CHECKING:
@@ -90,6 +91,18 @@ class ReductionResult(Result):
             for row in derivative_rows(self.reduction, self.contents)
         ]
         return pd.DataFrame(rows, columns=["name", "value", "standard_error", "origin"]).set_index("name")
+
+    @property
+    def budget(self) -> pd.DataFrame:
+        """Uncertainty budget by derivative (ITTC 7.5-02-06-04): share of the variance of each source; prime
+        ``combined`` and ``expanded`` (k = 2) uncertainty."""
+        import pandas as pd
+
+        rows = [
+            {"name": row.name, "value": row.value, "combined": row.combined, "expanded": row.expanded, **row.shares}
+            for row in uncertainty_budget(self.reduction)
+        ]
+        return pd.DataFrame(rows).set_index("name")
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""

@@ -208,6 +208,82 @@ class DerivativeKeys(_Part):
     paper_order: NotRequired[dict[str, Any] | None]
 
 
+class FourierCoefficientKeys(_Part):
+    """A Fourier coefficient of a signal of a captive run."""
+
+    signal: str
+    unit: str
+    order: int
+    cosine: float
+    sine: float
+    cosine_error: Number
+    sine_error: Number
+    amplitude: float
+    amplitude_error: Number
+    phase_rad: float
+    phase_error_rad: Number
+
+
+class SingleRunKeys(_Part):
+    """A captive run reduced by itself."""
+
+    name: str
+    type: str
+    speed_mps: float
+    frequency_radps: float
+    periods: int
+    readings: int
+    coefficients: list[FourierCoefficientKeys]
+    cycles: dict[str, Columns]
+    residual_rms: dict[str, Number]
+    derivatives: dict[str, Any] | None
+    history: Columns
+    faults: list[str]
+
+
+class RepeatedCoefficientKeys(_Part):
+    """A Fourier coefficient in repeats of a run."""
+
+    signal: str
+    unit: str
+    order: int
+    part: str
+    values: list[Number]
+    mean: float
+    deviation: float
+    expected: float
+    chance: Number
+
+
+class RunKeys(_Keys):
+    """Captive runs reduced by themselves."""
+
+    runs: list[SingleRunKeys]
+    repeats: list[RepeatedCoefficientKeys]
+    inertia_removed: bool
+    notices: list[str]
+
+
+class BudgetRowKeys(_Part):
+    """Uncertainty of a derivative (prime) by its causes: standard uncertainties, and shares of the variance."""
+
+    value: float
+    combined: float
+    expanded: float
+    parts: dict[str, float]
+    shares: dict[str, float]
+
+
+class BudgetKeys(_Part):
+    """The uncertainty budget of a campaign after ITTC 7.5-02-06-04."""
+
+    coverage_factor: float
+    sources: dict[str, str]
+    not_stated: list[str]
+    blockage_speed_relative: Number
+    derivatives: dict[str, BudgetRowKeys]
+
+
 class ReduceKeys(_Keys):
     """Captive tests reduced to derivatives."""
 
@@ -217,12 +293,15 @@ class ReduceKeys(_Keys):
     conventions: dict[str, str | float | None]
     rigid_body: dict[str, Number]
     derivatives: dict[str, DerivativeKeys]
+    uncertainty_budget: BudgetKeys
     missing: list[str]
     warnings: list[str]
     methods: dict[str, Any]
     selection: dict[str, list[dict[str, Any]]]
     spread: dict[str, dict[str, Any]]
     systematic_errors: list[dict[str, Any]]
+    force_delay: dict[str, Any] | None
+    alignment: dict[str, Any] | None
     trends: list[dict[str, Any]]
     symmetry: dict[str, Any]
     leave_one_out: dict[str, list[dict[str, Any]]]
@@ -727,6 +806,7 @@ KEYS: dict[str, Any] = {
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "reduce": ReduceKeys,
+    "run": RunKeys,
     "ships": ShipsKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,

@@ -27,6 +27,7 @@ from tank2sim.plugins import PluginWarning
 GROUPS = {
     "Measure": {
         "log": "a vessel's own log, cut into trials",
+        "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
         "reduce": "captive tests to derivatives",
         "tow": "surge mass and drag from accelerating tows",
         "yaw": "added yaw inertia and dissipation from records of a yaw rig",

@@ -41,6 +41,14 @@ from tank2sim.gap.fleet.ships import GAP, HOLDOUT, ship_alone
 @click.option("--effects", multiple=True, metavar="NAME...", help="Look for these alone.")
 @click.option("--without", multiple=True, metavar="NAME...", help="Do not look for these.")
 @click.option("--max-effects", type=click.IntRange(1, 2), default=2, show_default=True, help="Effects at a time.")
+@click.option(
+    "--false-discovery",
+    type=float,
+    default=0.5,
+    show_default=True,
+    metavar="Q",
+    help="Largest probability with which a name given alone may be wrong, 0.01 to 0.5; less sure: several candidates.",
+)
 @click.option("--again", is_flag=True, help="Of a fleet, compute also what an earlier run has computed.")
 @json_option
 def command(
@@ -53,6 +61,7 @@ def command(
     effects: tuple[str, ...],
     without: tuple[str, ...],
     max_effects: int,
+    false_discovery: float,
     again: bool,
     json_file: Path | None,
 ) -> int:
@@ -72,7 +81,7 @@ def command(
         if single_ship is None:
             from tank2sim.cli.gap_fleet import FleetRequest, run_fleet  # its page is slow to import
 
-            options = gap_options(effects, without, max_effects, workers)
+            options = gap_options(effects, without, max_effects, workers, false_discovery)
             return run_fleet(FleetRequest(folder, output, options, executor, again, json_file))
         card, trials, holdout = str(single_ship.card), single_ship.trials, single_ship.holdout
     elif not trials:
@@ -89,6 +98,7 @@ def command(
             effects=effects,
             without=without,
             max_effects=max_effects,
+            false_discovery=false_discovery,
             executor=executor,
             workers=workers,
             progress=progress,

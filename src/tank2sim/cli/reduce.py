@@ -28,6 +28,12 @@ from tank2sim.identification.captive.result_card import FILLS
 @click.option("--off-speed", is_flag=True, help="Use runs away from the test speed, too, for terms in the speed.")
 @click.option("--all-terms", is_flag=True, help="Keep terms that the tests do not determine.")
 @click.option("--test-symmetry", is_flag=True, help="Test terms that port-starboard symmetry leaves out.")
+@click.option(
+    "--budget",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.csv",
+    help="Write the uncertainty budget (ITTC 7.5-02-06-04): shares of the variance, combined and expanded.",
+)
 @page_option()
 @plot_folder_option
 @json_option
@@ -41,6 +47,7 @@ def command(
     off_speed: bool,
     all_terms: bool,
     test_symmetry: bool,
+    budget: Path | None,
     page: Path | None,
     plots: Path | None,
     json_file: Path | None,
@@ -57,6 +64,8 @@ def command(
         test_symmetry=test_symmetry,
     )
     files = result.card.files(output) if output else {}
+    if budget:
+        files[budget] = result.budget.to_csv(float_format="%.6g", lineterminator="\n")
     inputs = [campaign, *(campaign.parent / run.name.partition(" line ")[0] for run in result.reduction.campaign.runs)]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)

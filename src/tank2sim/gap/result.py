@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -20,6 +21,38 @@ GAP_VERDICTS = (MISSING, NO_EFFECT_MISSING, COEFFICIENTS, AMBIGUOUS, OUTSIDE_LIB
 
 
 @dataclass(frozen=True)
+class Surroundings:
+    """Wind or current of one trial.
+
+    Parameters
+    ----------
+    speed_mps, direction_rad : float
+        Direction as the effect counts it: from which a wind comes, towards which a current sets; -pi to pi.
+    speed_error_mps, direction_error_rad : float
+        Standard errors; pi where the direction is not determined.
+    """
+
+    speed_mps: float
+    direction_rad: float
+    speed_error_mps: float
+    direction_error_rad: float
+
+    @classmethod
+    def of_parts(cls, parts: Array, errors: Array) -> Surroundings:
+        """From the parts along north and east (2,), m/s, and their standard errors, taken as independent."""
+        speed = float(np.hypot(*parts))
+        if speed == 0.0:
+            return cls(0.0, 0.0, float(np.max(errors)), math.pi)
+        along, across = parts / speed, np.array([-parts[1], parts[0]]) / speed
+        return cls(
+            speed,
+            float(np.arctan2(parts[1], parts[0])),
+            float(np.hypot(*(along * errors))),
+            min(float(np.hypot(*(across * errors))) / speed, math.pi),
+        )
+
+
+@dataclass(frozen=True)
 class Named:
     """An effect that was named.
 
@@ -33,12 +66,15 @@ class Named:
         Of those that were estimated, SI.
     confidence : float
         Calibrated probability that this effect is present.
+    by_trial : mapping
+        Name of a trial to its wind or current, where that differs from trial to trial; it is none of `parameters` then.
     """
 
     name: str
     parameters: Mapping[str, float]
     standard_errors: Mapping[str, float]
     confidence: float
+    by_trial: Mapping[str, Surroundings] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -273,6 +309,9 @@ class Gap:
     improved : ManoeuvringCard
         With the effect, and with the coefficients fitted together with it where the trials are then followed better;
         the given card where no effect of the ship was named (nothing, or a sensor's fault) and none was refitted.
+    base : ManoeuvringCard
+        The card with the refitted coefficients and their covariance, before the effects were added; the given card
+        where none was refitted.
     verdict : str
         One of :data:`GAP_VERDICTS`.
     effects : tuple of Named
@@ -296,6 +335,8 @@ class Gap:
     figures_before, figures_after : tuple of FigureComparison
         Of turns and zigzags.
     missing_force : MissingForce or None
+    at_work : tuple of Acting
+        Intervals in which the forces of the named effects act, the most significant first.
     could_hide : mapping
         Effect to {parameter: size (SI)} below which these data could not show it.
     agreement : mapping
@@ -306,6 +347,7 @@ class Gap:
 
     card: ManoeuvringCard
     improved: ManoeuvringCard
+    base: ManoeuvringCard
     verdict: str
     effects: tuple[Named, ...]
     coefficients: tuple[Refitted, ...]
@@ -319,6 +361,7 @@ class Gap:
     figures_before: tuple[FigureComparison, ...]
     figures_after: tuple[FigureComparison, ...]
     missing_force: MissingForce | None
+    at_work: tuple[Acting, ...]
     could_hide: Mapping[str, Mapping[str, float]]
     agreement: Mapping[str, Mapping[str, tuple[float, float]]]
     next_test: NextTest | None

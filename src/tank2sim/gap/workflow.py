@@ -16,15 +16,22 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
-from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lacking
+from tank2sim.gap.diagnosis.residuals import (
+    each_trial,
+    effects_at_work,
+    estimates,
+    force_lacking,
+    surroundings_by_trial,
+)
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.combine import combine_passes
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
-from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
+from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.refit import refit_coefficients
+from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
 from tank2sim.gap.proof.replay import replay_trials, with_black_box
 from tank2sim.gap.result import (
@@ -42,7 +49,7 @@ from tank2sim.gap.result import (
 )
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
-from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, Decision, Strange, decide
+from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
@@ -59,6 +66,13 @@ BETTER_FROM = 1.1
 
 EXPLAINED = 0.2
 """Coefficients explain a gap that they reduce to less than this share, or to noise (project choice)."""
+
+TRIES = 4
+"""Explanations that are simulated at most, one after the other (project choice)."""
+
+CLEARLY = 0.7
+"""Largest share of the misfit that may remain where a second explanation, or one next to something unknown, is named
+(project choice)."""
 
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
@@ -90,6 +104,8 @@ class GapOptions:
         card, up to this number.
     workers : int, optional
         Processes; by default as many as there are processors.
+    false_discovery : float
+        Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5.
     """
 
     effects: tuple[str, ...] | None = None
@@ -97,6 +113,7 @@ class GapOptions:
     max_effects: int = 2
     most_effects: int = MOST_EFFECTS
     workers: int | None = None
+    false_discovery: float = 1 - LIKELY
 
 
 def run_gap_workflow(
@@ -129,7 +146,7 @@ def run_gap_workflow(
     options = options or GapOptions()
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
-        gap = _search_once(card, (fitted, held), options, progress, pool)
+        gap, trials = _search_once(card, (fitted, held), options, progress, pool)
         while _seeks_more(gap, options):
             named = tuple(effect.name for effect in gap.effects)
             most = min(options.max_effects, options.most_effects - len(named))
@@ -137,10 +154,10 @@ def run_gap_workflow(
             if wanted == () or gap.improved is card:
                 break
             more = replace(options, effects=wanted, without=(*options.without, *named), max_effects=most)
-            further = _search_once(gap.improved, (fitted, held), more, progress, pool)
-            if further.verdict != MISSING or any(EFFECTS[name.name].acts_on == "sensor" for name in further.effects):
+            further, found_trials = _search_once(gap.improved, trials, more, progress, pool)
+            if not _adds(gap, further, 1 - options.false_discovery):
                 break
-            gap = combine_passes(gap, further)
+            gap, trials = combine_passes(gap, further), found_trials
         return gap
 
 
@@ -150,13 +167,13 @@ def _search_once(
     options: GapOptions,
     progress: StageReport,
     pool: Executor | None,
-) -> Gap:
-    """One search, the decision and its proof."""
+) -> tuple[Gap, tuple[Measured, Measured]]:
+    """One search, the decision and its proof; and the trials with the winds and currents that were found."""
     names = _names(card, trials[0], options)
     found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
-    decision = decide(found)
+    decision = decide(found, options.false_discovery)
     progress("proving")
-    return _assemble_gap(card, trials, found, decision, progress)
+    return _assemble_gap(card, trials, found, decision, progress, options.false_discovery)
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
@@ -166,6 +183,15 @@ def _seeks_more(gap: Gap, options: GapOptions) -> bool:
     if any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
         return False  # the trials would have to be corrected first
     return _misfit_of(gap.passed, "after", held_out=False) > AGAIN
+
+
+def _adds(gap: Gap, further: Gap, likely: float) -> bool:
+    """Whether a search on the improved card named effects of the ship, each with a probability of `likely` at least,
+    that bring it closer."""
+    if further.verdict != MISSING or any(EFFECTS[effect.name].acts_on == "sensor" for effect in further.effects):
+        return False
+    before, after = (_misfit_of(result.passed, "after", held_out=False) for result in (gap, further))
+    return min(effect.confidence for effect in further.effects) >= likely and after < (1 - BETTER) * before
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
@@ -192,21 +218,19 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
 
 
 def _assemble_gap(
-    card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: StageReport
-) -> Gap:
-    """The results that follow from the decision."""
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    decision: Decision,
+    progress: StageReport,
+    share: float,
+) -> tuple[Gap, tuple[Measured, Measured]]:
+    """The results that follow from the decision, and the trials with the winds and currents that were found."""
     fitted, held = trials
-    estimated: list[Found] = []
-    if decision.verdict in (MISSING, AMBIGUOUS):
-        estimated = estimates(found.likelihood.by_formula(decision.best))
     noise = _noise(found, decision.best, fitted)
     sigmas = {name: sigma for name, (sigma, _) in noise.items()}
-    proof = _prove(card, trials, estimated, sigmas, found, decision.best)
-    withheld = ""
-    if estimated and not closes_gap(proof.results):
-        withheld = " and ".join(name for name, *_ in estimated)
-        decision, estimated = replace(decision, verdict=OUTSIDE_LIBRARY), []
-        proof = _prove(card, trials, estimated, sigmas, found, found.none)
+    judged = _judge_by_simulation(card, trials, found, decision, sigmas, share)
+    decision, estimated, proof, withheld = judged.decision, judged.estimated, judged.proof, judged.withheld
     if decision.verdict == NO_EFFECT_MISSING:
         before, after = (_misfit_of(proof.results, version) for version in ("before", "after"))
         if (
@@ -224,11 +248,14 @@ def _assemble_gap(
     force = force_lacking(found.likelihood, found.none)
     every = (*fitted.trials, *held.trials)
     agreement = each_trial(found.likelihood, decision.best) if estimated else {}
-    return Gap(
+    gap = Gap(
         card=card,
         improved=improved,
+        base=proof.base,
         verdict=decision.verdict,
-        effects=tuple(Named(*effect, decision.confidence(effect[0])) for effect in estimated),
+        effects=tuple(
+            Named(*effect, decision.confidence(effect[0]), proof.by_trial.get(effect[0], {})) for effect in estimated
+        ),
         coefficients=proof.coefficients,
         effect_alone=proof.effect_alone,
         alternatives=tuple(fit.hypothesis.effects for fit in decision.alike) if estimated else (),
@@ -240,17 +267,87 @@ def _assemble_gap(
         figures_before=figures(card, every, results, "before"),
         figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
         missing_force=force,
+        at_work=effects_at_work(found.likelihood, decision.best) if estimated else (),
         could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
         agreement=agreement,
         next_test=_next(card, found, decision, sigmas),
         notices=_notices(card, decision, results, agreement, (fitted, held), withheld),
     )
+    return gap, proof.trials
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A decision after the simulations with its names, and the names that brought none closer."""
+
+    decision: Decision
+    estimated: list[Found]
+    proof: _Proof
+    withheld: tuple[str, ...]
+
+
+def _judge_by_simulation(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    decision: Decision,
+    sigmas: Mapping[str, float],
+    share: float,
+) -> _Judged:
+    """The decision that stands up to free-running simulations.
+
+    An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
+    the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts
+    next to something that no effect explains, must close the gap clearly (:data:`CLEARLY`); nothing is named without.
+    `share` is the option ``false_discovery``.
+    """
+    withheld: list[str] = []
+    remaining, current = found, decision
+    for _ in range(TRIES):
+        if not current.best.hypothesis.effects:
+            break
+        by_formula = remaining.likelihood.by_formula(current.best)
+        estimated = estimates(by_formula)
+        by_trial = surroundings_by_trial(by_formula, remaining.likelihood.motion.names)
+        proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, remaining, current.best)
+        unknown = current.verdict == OUTSIDE_LIBRARY
+        if _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results):
+            verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
+            return _Judged(replace(current, verdict=verdict), estimated, proof, tuple(withheld))
+        if not unknown:
+            withheld.append(" and ".join(current.best.hypothesis.effects))
+        kept = tuple(fit for fit in remaining.fits if fit is not current.best)
+        remaining = replace(remaining, fits=kept)
+        current = decide(remaining, share)
+    proof = _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+    if decision.best.hypothesis.effects:
+        decision = replace(decision, verdict=OUTSIDE_LIBRARY)
+    return _Judged(decision, [], proof, tuple(withheld))
+
+
+def _closes_clearly(results: Sequence[Passed]) -> bool:
+    """Whether a gap that is far above the noise becomes clearly smaller, in the trials held out as well."""
+    before, after = (_misfit_of(results, version) for version in ("before", "after"))
+    held = [result for result in results if result.held_out]
+    alike = not held or _misfit_of(held, "after") < CLEARLY * _misfit_of(held, "before")
+    return before > MUCH and after < CLEARLY * before and alike and closes_gap(results, CLEARLY)
+
+
+@dataclass(frozen=True, eq=False)
+class _NamedEffects:
+    """Effects with their parameters, and the winds and currents of single trials."""
+
+    estimated: list[Found]
+    by_trial: ByTrial
 
 
 @dataclass(frozen=True, eq=False)
 class _Proof:
     """An improved card, all trials replayed by both cards, and what was fitted together with the effects."""
 
+    trials: tuple[Measured, Measured]
+    by_trial: ByTrial
+    base: ManoeuvringCard
     improved: ManoeuvringCard
     results: list[Passed]
     coefficients: tuple[Refitted, ...] = ()
@@ -259,28 +356,34 @@ class _Proof:
 
 def _prove(
     card: ManoeuvringCard,
-    trials: tuple[Measured, Measured],
-    estimated: list[Found],
+    given: tuple[Measured, Measured],
+    named: _NamedEffects,
     sigmas: Mapping[str, float],
     found: Search,
     best: ExplanationFit,
 ) -> _Proof:
     """The card with the effects, and with coefficients fitted together with them if fitted trials are then followed
-    better by :data:`BETTER`; replays by both cards, and by a black box where an effect is named."""
+    better by :data:`BETTER`; replays by both cards, and by a black box where an effect is named.
+
+    Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
+    """
+    estimated, by_trial = named.estimated, named.by_trial
     alone = add_effects_to_card(card, estimated)
+    trials, by_trial = _in_surroundings(alone, given, by_trial, sigmas)
     sensors = _sensor_faults(estimated)
     results = _replay_all(card, alone, trials, sensors, sigmas)
-    proof = _Proof(alone, results)
+    proof = _Proof(trials, by_trial, card, alone, results)
     if _misfit_of(results, "after", held_out=False) > BETTER_FROM:
         estimates_with = found.likelihood.coefficients_with(best)
         refitted, base = refit_coefficients(card, found.likelihood.none.model, estimates_with)
         joint = add_effects_to_card(base, estimated)
+        trials, by_trial = _in_surroundings(joint, given, by_trial, sigmas)
         joint_results = _replay_all(card, joint, trials, sensors, sigmas)
         misfits = [_misfit_of(group, "after", held_out=False) for group in (results, joint_results)]
-        if misfits[1] < (1 - BETTER) * misfits[0]:
+        if misfits[1] < (1 - BETTER) * misfits[0] and _most_are_closer(results, joint_results):
             keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
             of_effect = {key: _misfit_of(results, "after", held_out=held) for key, held in keys.items()}
-            proof = _Proof(joint, joint_results, refitted, of_effect if estimated else {})
+            proof = _Proof(trials, by_trial, base, joint, joint_results, refitted, of_effect if estimated else {})
     if not estimated:
         return proof
     box = black_box(card, trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
@@ -289,6 +392,17 @@ def _prove(
         of_group = [result for result in proof.results if result.held_out == held_out]
         boxed += with_black_box(of_group, box.card, group, sigmas) if of_group else []
     return replace(proof, results=boxed)
+
+
+def _in_surroundings(
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], by_trial: ByTrial, sigmas: Mapping[str, float]
+) -> tuple[tuple[Measured, Measured], ByTrial]:
+    """Trials in the winds and currents that were found for them, and those, with the ones of the trials held out."""
+    if not by_trial:
+        return trials, by_trial
+    held = fit_surroundings(card, trials[1], tuple(by_trial), sigmas) if trials[1].trials else {}
+    every = {name: {**found, **held.get(name, {})} for name, found in by_trial.items()}
+    return (with_surroundings(trials[0], every), with_surroundings(trials[1], every)), every
 
 
 def _replay_all(
@@ -305,6 +419,13 @@ def _replay_all(
             corrected = _corrected(group, sensors)
             results += replay_trials(card, improved, group, sigmas, held_out, corrected)
     return results
+
+
+def _most_are_closer(before: Sequence[Passed], after: Sequence[Passed]) -> bool:
+    """Whether at least half of the fitted trials are followed no worse: coefficients hold in all of them, and must not
+    follow what happened in one."""
+    pairs = [pair for pair in zip(before, after, strict=True) if not pair[0].held_out]
+    return bool(np.median([new.misfit("after") / old.misfit("after") for old, new in pairs]) <= 1.0)
 
 
 def _misfit_of(results: Sequence[Passed], version: str, *, held_out: bool | None = None) -> float:
@@ -345,11 +466,12 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
 
 
 def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
+    """The best explanations, and none; the probability of those that simulations excluded is 0."""
     least = found.fits[0].score
     shown = [*found.fits[:RIVALS]]
     shown += [found.none] if found.none not in shown else []
     return tuple(
-        Rival(fit.hypothesis.effects, fit.score - least, decision.probabilities[fit.hypothesis.effects])
+        Rival(fit.hypothesis.effects, fit.score - least, decision.probabilities.get(fit.hypothesis.effects, 0.0))
         for fit in shown
     )
 
@@ -365,19 +487,21 @@ def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mappi
 def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> Explanation:
     """A card with an explanation's effects, and the covariance of its uncertain parameters."""
     entries = [
-        EffectEntry(name=name, parameters=dict(values), uncertainty=dict(errors))
+        EffectEntry(name=name, parameters={**at_rest(name), **values}, uncertainty=dict(errors))
         for name, values, errors in estimates(fit)
     ]
     whole = replace(card, effects=(*card.effects, *entries))
     coefficients = found.likelihood.coefficients
     # An effect may take the place of a parameter: of the gear's time constant, for a lag.
     kept = [place for place, name in enumerate(coefficients.names) if name in fit.hypothesis.model]
-    variables = [estimate.variable for estimate in fit.hypothesis.estimated]
+    shared_by_trials = [place for place, estimate in enumerate(fit.hypothesis.estimated) if estimate.run is None]
+    variables = [fit.hypothesis.estimated[place].variable for place in shared_by_trials]
     names = (*variables, *(coefficients.names[place] for place in kept))
     shared = coefficients.spread(fit.width)[kept]
     spread = np.zeros((len(names), len(names)))
-    spread[len(fit.theta) :, len(fit.theta) :] = shared @ shared.T
-    spread[: len(fit.theta), : len(fit.theta)] = fit.covariance
+    count = len(variables)
+    spread[count:, count:] = shared @ shared.T
+    spread[:count, :count] = fit.covariance[np.ix_(shared_by_trials, shared_by_trials)]
     return Explanation(" and ".join(fit.hypothesis.effects) or "none", whole, names, spread)
 
 
@@ -387,14 +511,14 @@ def _notices(
     results: Sequence[Passed],
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
-    withheld: str,
+    withheld: Sequence[str],
 ) -> tuple[str, ...]:
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(strange) for strange in decision.strange]
-    if withheld:
-        notices.append(
-            f"{withheld}: fits best from instant to instant, but a simulation with it is not closer: not named"
-        )
+    notices += [
+        f"{names}: fits best from instant to instant, but a simulation with it is not closer: not named"
+        for names in withheld
+    ]
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
         notices.append(f"{have}: kept as on the card, and not sought")

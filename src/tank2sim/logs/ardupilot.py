@@ -13,8 +13,8 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.quantities import unit_of_text
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
+from tank2sim.records.spelt_units import unit_of_text
 
 GPS_EPOCH_S = 315964800.0
 """1980-01-06 in seconds since 1970 (IS-GPS-200, 3.3.4)."""

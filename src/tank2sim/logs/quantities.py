@@ -83,54 +83,6 @@ QUANTITIES: dict[str, LogQuantity] = {
 }
 """Every quantity of a channel. Signs are those of the trial format: starboard, ahead and clockwise are positive."""
 
-_UNIT_SPELLINGS = {
-    "deg": ("deg", "degree", "degrees", "°", "grad"),
-    "rad": ("rad", "radian", "radians"),
-    "deg/s": ("deg/s", "degps", "deg_s", "dps", "°/s", "deg_per_s", "degs"),
-    "deg/min": ("deg/min", "degpmin", "deg_min", "°/min", "dpm", "deg_per_min"),
-    "rad/s": ("rad/s", "radps", "rad_s", "rad_per_s"),
-    "kn": ("kn", "kt", "kts", "knot", "knots", "kns"),
-    "km/h": ("km/h", "kmh", "km_h", "kph", "kmph"),
-    "m/s": ("m/s", "mps", "m_s", "ms-1", "m_per_s"),
-    "rpm": ("rpm", "1/min", "u/min", "min-1", "r/min", "rev/min"),
-    "1/s": ("rps", "1/s", "hz", "rev/s"),
-    "%": ("%", "percent", "pct", "prozent"),
-    "m": ("m", "metre", "meter", "metres", "meters"),
-    "m/s2": ("m/s2", "m/s^2", "m/s/s", "mps2", "m_s2", "m/s²"),
-    "g": ("g",),
-    "s": ("s", "sec", "seconds"),
-    "V": ("v", "volt"),
-    "degC": ("degc", "°c"),
-}
-_UNIT_OF = {spelling: unit for unit, spellings in _UNIT_SPELLINGS.items() for spelling in spellings}
-_UNIT_OF |= {"degheading": "deg", "deglatitude": "deg", "deglongitude": "deg"}
-_BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
-
-
-def unit_of_text(text: str) -> str:
-    """Unit that a text spells (``knots`` is ``kn``); the text itself if it is not known."""
-    return _UNIT_OF.get(text.strip().lower(), text.strip())
-
-
-def split_unit(name: str) -> tuple[str, str]:
-    """Words of a name, and the unit that is in its brackets or at its end; "" where there is none.
-
-    ``sog_kn`` is (``sog``, ``kn``), ``Heading [deg]`` is (``Heading``, ``deg``), ``ground_speed_m_s`` has ``m/s``.
-    """
-    for match in _BRACKET.finditer(name):
-        if match[1].lower() in _UNIT_OF:
-            return (name[: match.start()] + name[match.end() :]).strip(), _UNIT_OF[match[1].lower()]
-    for length in (3, 2, 1):
-        parts = re.split(r"[_ ]", name)
-        ending = "_".join(parts[-length:]).lower()
-        if len(parts) > length and ending in _UNIT_OF and not (ending in ("g", "v", "s", "m") and length == 1):
-            return "_".join(parts[:-length]), _UNIT_OF[ending]
-    parts = re.split(r"[_ ]", name)
-    if len(parts) > 1 and parts[-1] == "m":
-        return "_".join(parts[:-1]), "m"
-    return name, ""
-
-
 _PORT = r"\b(port|left|bb|backbord|babord|ps|l|prt|ptt)\b"
 _STARBOARD = r"\b(stbd|starboard|right|stb|steuerbord|tribord|sb|r|strb)\b"
 _ORDER = r"\b(order|orders|ordered|cmd|command|commanded|demand|set|setpoint|soll|desired|ref|reference|target)\b"

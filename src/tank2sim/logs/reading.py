@@ -58,7 +58,7 @@ def read_log(path: Path | str) -> VesselLog:
         return read_nmea2000(path)
     if looks_like_nmea0183(head):
         return read_nmea0183(path)
-    if b"\0" in head.removeprefix(b"\xff\xfe"):
+    if b"\0" in head and head[:2] not in (b"\xff\xfe", b"\xfe\xff"):  # the marks of UTF-16, as spreadsheets export
         known = "ROS bags, MCAP, ULog, ArduPilot .bin and .tlog, NMEA 0183, NMEA 2000 (text) and CSV"
         raise InputError(path, "", "is of no known format, or its beginning is missing", f"known are {known}")
     return read_table_log(path)

@@ -18,8 +18,9 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.quantities import QUANTITIES, plain_words, quantity_of_name, split_unit
+from tank2sim.logs.quantities import QUANTITIES, plain_words, quantity_of_name
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, optional_library
+from tank2sim.records.spelt_units import split_unit
 
 LONGEST_VECTOR = 8
 """Entries of an array up to which each is a stream. Project choice: actuators and joints are few, scans and pictures

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,10 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, split_unit, unit_of_text
+from tank2sim.logs.quantities import QUANTITIES, quantity_of_name
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
+from tank2sim.records.spelt_units import split_unit
+from tank2sim.records.text_layout import WHITESPACE, TextLayout, decoded_text, text_layout
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,25 +30,13 @@ _DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha)\b")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 """Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
 
-_HEAD_LINES = 50
-"""Lines by which separator, decimal sign and units are judged. Project choice: enough to meet values with decimals."""
+_HEAD_BYTES = 1 << 16
+"""Bytes by which separator, decimal sign and units are judged. Project choice: some hundred rows."""
 
 _DEGREES_MINUTES = re.compile(
     r"^\s*(?P<front>[NSEW])?\s*(?P<degrees>[+-]?\d{1,3})\s*[°\s]\s*(?P<minutes>\d+(?:[.,]\d+)?)\s*['′]?"
     r"(?:\s*(?P<seconds>\d+(?:[.,]\d+)?)\s*[\"″])?\s*(?P<back>[NSEW])?\s*$"
 )
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """How a table is written."""
-
-    encoding: str
-    separator: str
-    comma: bool
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    skip: int
 
 
 def read_table_log(path: Path) -> VesselLog:
@@ -65,17 +55,17 @@ def read_table_log(path: Path) -> VesselLog:
     """
     import pandas as pd
 
-    layout = _layout(path)
+    layout, encoding = _layout(path)
     try:
         frame = pd.read_csv(
             path,
-            sep=layout.separator,
+            sep=r"\s+" if layout.separator == WHITESPACE else layout.separator,
             names=list(layout.names),
             index_col=False,
             skiprows=layout.skip,
             comment="#",
             decimal="," if layout.comma else ".",
-            encoding=layout.encoding,
+            encoding=encoding,
             encoding_errors="replace",
             on_bad_lines="skip",
             low_memory=False,
@@ -85,8 +75,8 @@ def read_table_log(path: Path) -> VesselLog:
     rows = len(frame)
     frame = frame.drop_duplicates(ignore_index=True)
     with path.open("rb") as file:
-        lines = sum(1 for line in file if line.strip() and not line.startswith(b"#"))
-    skipped = max(0, lines - rows - (2 if any(layout.units) else 1))
+        body = itertools.islice(file, layout.skip, None)
+        skipped = max(0, sum(1 for line in body if line.strip() and not line.startswith(b"#")) - rows)
     findings = [LogFinding("note", f"{skipped} rows have too many cells and are left out")] if skipped else []
     time, dated, used = _time(path, frame, findings)
     streams = [
@@ -110,60 +100,18 @@ def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
     return LogStream(name, time, values, unit, quantity, "name" if quantity else "")
 
 
-def _layout(path: Path) -> _Layout:
+def _layout(path: Path) -> tuple[TextLayout, str]:
+    """Layout by the beginning of the file, and its encoding."""
     try:
         with path.open("rb") as file:
-            head = file.read(1 << 16)
+            head = file.read(_HEAD_BYTES)
     except OSError as error:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
-    encoding = "utf-8-sig"
-    try:
-        text = head.decode(encoding)
-    except UnicodeDecodeError as error:
-        if error.start > len(head) - 4:
-            text = head[: error.start].decode(encoding)
-        else:
-            encoding, text = "cp1252", head.decode("cp1252", errors="replace")
-    all_lines = text.splitlines()
-    numbered = [(number, line) for number, line in enumerate(all_lines) if line.strip() and not line.startswith("#")]
-    if len(numbered) < 2:
-        raise InputError(path, "", "has no rows", "give a table with a line of names and rows of values")
-    lines = [line for _, line in numbered[:_HEAD_LINES]]
-    separator = max(";\t|,", key=lambda sign: min(line.count(sign) for line in lines[:4]))
-    names = [name.strip() or f"column {place}" for place, name in enumerate(_cells(lines[0], separator), start=1)]
-    header = sum(_is_number(name) for name in names) <= len(names) / 2
-    if not header:
-        names = [f"column {place}" for place in range(1, len(names) + 1)]
-        lines = [lines[0], *lines]
-    names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
-    second = _cells(lines[1], separator)
-    has_units = (
-        header
-        and len(lines) > 2
-        and not any(re.search(r"\d{2}|^-?\d", cell.strip()) and cell not in _UNIT_NUMBERS for cell in second)
-    )
-    units = [unit_of_text(cell) for cell in second] if has_units else []
-    units = [*units, *[""] * len(names)][: len(names)]
-    body = lines[2 if has_units else 1 :]
-    comma = separator != "," and any(re.search(rf"(?:^|{re.escape(separator)})\s*-?\d+,\d+", line) for line in body)
-    skip = numbered[1 if has_units else 0][0] + 1 if header else 0
-    return _Layout(encoding, separator, comma, tuple(names), tuple(units), skip)
-
-
-_UNIT_NUMBERS = ("1/min", "1/s")
-"""Units that begin with a digit."""
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator), [])
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+    text, encoding = decoded_text(head, complete=False)
+    lines = text.splitlines()
+    if len(head) == _HEAD_BYTES and len(lines) > 1:
+        lines.pop()  # a part of a line
+    return text_layout(path, lines), encoding
 
 
 def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[Array, bool, set[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.records.campaign_form import CampaignFile
 from tank2sim.records.csv_table import LARGEST
+from tank2sim.records.spelt_units import unit_factor
+from tank2sim.records.text_layout import cells_of, decoded_text, text_layout
 
 LEAST_FORCE = 1e-9
 """A column of forces that stays below it (N, N m or prime) was not measured. Project choice: the resistance of a model,
@@ -60,7 +63,7 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
     averages = form.averages
     assert averages is not None
     file = path.parent / averages.file
-    lines, rows = _cells(file)
+    lines, rows, units = _cells(file)
     heads = rows.pop(0)
     values: dict[str, list[float]] = {}
     for key, heading in averages.columns.model_dump(exclude_none=True).items():
@@ -68,6 +71,7 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
             problem = f"the table has no column {heading!r}"
             raise InputError(path, f"averages.columns.{key}", problem, f"its columns are {', '.join(heads)}")
         place = heads.index(heading)
+        _refuse_other_unit(file, heading, key, units[place] if place < len(units) else "", factors.get(key, 1.0))
         cells = [
             _number(file, (line, heading), row[place] if place < len(row) else "")
             for line, row in zip(lines[1:], rows, strict=True)
@@ -90,17 +94,36 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
     return conditions, [text] if repeated else []
 
 
-def _cells(file: Path) -> tuple[list[int], list[list[str]]]:
-    """Line numbers and cells of the lines that are neither empty nor comments; the first is the header."""
-    lines: list[int] = []
-    rows: list[list[str]] = []
-    for number, line in enumerate(read_text(file).split("\n"), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            lines.append(number)
-            rows.append([cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))])
-    if len(rows) < 2:
+def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
+    """Line numbers and cells of the lines that are neither empty nor comments, the first the header; units if any."""
+    try:
+        text, _ = decoded_text(file.read_bytes())
+    except OSError:
+        text = read_text(file)  # which says what is wrong with it
+    all_lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    numbered = [(n, line) for n, line in enumerate(all_lines, start=1) if line.strip() and line.lstrip()[0] != "#"]
+    if len(numbered) < 2:
         raise InputError(file, "", "has no rows under a header", "give a header and a row for each condition")
-    return lines, rows
+    if "," in numbered[0][1] and not re.search("[;\t]", numbered[0][1]):
+        rows = [[cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))] for _, line in numbered]
+        return [number for number, _ in numbered], rows, []
+    layout = text_layout(file, all_lines)
+    numbered = [(number, line) for number, line in numbered if number > layout.skip]
+    rows = [[cell.strip() for cell in cells_of(line, layout.separator)] for _, line in numbered]
+    if layout.comma:
+        rows = [[cell.replace(",", ".") if "." not in cell else cell + " (point)" for cell in row] for row in rows]
+    return [layout.skip, *(number for number, _ in numbered)], [list(layout.names), *rows], list(layout.units)
+
+
+def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:
+    """Refuse a unit under a heading that is not the one in which the column is read."""
+    suffix = {"X": "N", "Y": "N", "N": "Nm"}.get(key, key.rpartition("_")[2])
+    if unit in ("", "-", "1") or (key == "propeller_radps"):
+        return
+    size = unit_factor(unit, suffix)
+    if size is None or not math.isclose(size, factor, rel_tol=1e-6):
+        problem = f"is in {unit} by the row of units, and read as {key}"
+        raise InputError(file, f"column {heading}", problem, "name the key with its unit (drift_deg), forces in N")
 
 
 def _number(file: Path, place: tuple[int, str], text: str) -> float:

@@ -128,7 +128,9 @@ class UncertaintySection(CardSection):
     mass_relative, yaw_inertia_relative
         Of the carried mass and its yaw inertia.
     force_delay_s
-        Of the delay of the forces behind the motion, s.
+        Of the delay of the forces behind the motion, s; stated, it takes the place of what the campaign shows.
+    blockage_relative
+        Of the speed of the water past the model, by the walls of the tank.
     """
 
     calibration_relative: NotNegative = 0.0
@@ -138,6 +140,7 @@ class UncertaintySection(CardSection):
     mass_relative: NotNegative = 0.0
     yaw_inertia_relative: NotNegative = 0.0
     force_delay_s: NotNegative = 0.0
+    blockage_relative: NotNegative = 0.0
 
 
 class FullScaleSection(CardSection):
@@ -146,6 +149,57 @@ class FullScaleSection(CardSection):
     water_density_kgpm3: TestWaterDensity = 1025.0
     gravity_mps2: TestGravity = 9.80665
     kinematic_viscosity_m2ps: TestViscosity = 1.19e-6
+
+
+class ColumnEntry(CardSection):
+    """An entry of ``[columns]``: what a column of the run files holds. SI value = sign * factor * (recorded - offset).
+
+    Parameters
+    ----------
+    quantity
+        ``t y psi v r speed delta X Y N``, or with its unit: ``Y_kN``.
+    unit
+        Of the recorded values (``kN``, ``mm``, ``deg/s``); by default that of the file. Not needed with a factor.
+    sign
+        1, or -1 where the column has the opposite sign.
+    factor
+        To the unit, or to SI if none is given: for channels in volts or in a unit that is not known here.
+    offset
+        Recorded value that is zero.
+    """
+
+    quantity: Text
+    unit: Text | None = None
+    sign: Literal[1, -1] = 1
+    factor: Annotated[float, Field(gt=0)] | None = None
+    offset: float = 0.0
+
+
+ColumnMap = dict[str, ColumnEntry | Text]
+
+
+class FilesSection(CardSection):
+    """``[files]``: the layout of run files that are text, where it is not found from the files themselves.
+
+    Parameters
+    ----------
+    separator
+        Between columns: ``,`` ``;`` ``|``, ``tab``, or ``blanks`` for any number of blanks.
+    decimal
+        Sign of decimals.
+    widths
+        Characters of each column of fixed width, where no blank separates them.
+    names
+        Of the columns of files without names.
+    skip_lines
+        Lines at the beginning that are not read.
+    """
+
+    separator: Literal[",", ";", "|", "tab", "blanks"] | None = None
+    decimal: Literal[",", "."] | None = None
+    widths: list[Annotated[int, Field(gt=0)]] | None = None
+    names: list[Text] | None = None
+    skip_lines: Annotated[int, Field(ge=0)] = 0
 
 
 class RunSheet(CardSection):
@@ -160,6 +214,7 @@ class RunSheet(CardSection):
     yaw_rate_amplitude_radps: Positive | None = None
     propeller_radps: NotNegative | None = None
     notes: str | None = None
+    columns: ColumnMap = Field(default_factory=dict)
 
 
 class AverageColumns(CardSection):
@@ -193,11 +248,20 @@ class CampaignFile(CardSection):
     uncertainty: UncertaintySection = UncertaintySection()
     full_scale: FullScaleSection | None = None
     averages: AveragesSection | None = None
+    files: FilesSection = FilesSection()
+    columns: ColumnMap = Field(default_factory=dict)
     runs: tuple[RunSheet, ...] = ()
 
 
 def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, float]]:
     """The checked form of a campaign's parsed TOML, and the factors to SI of the columns of ``[averages]``.
+
+    Parameters
+    ----------
+    content : dict
+        The parsed TOML.
+    source : Path
+        For messages.
 
     Raises
     ------

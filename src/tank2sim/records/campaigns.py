@@ -13,6 +13,7 @@ Inside the program a :class:`CaptiveRun` has, whatever its file says:
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ from tank2sim.records.averages import Condition, read_averages
 from tank2sim.records.campaign_form import (
     OSCILLATING,
     CampaignFile,
+    ColumnEntry,
+    FilesSection,
     FullScaleSection,
     ModelSection,
     RunSheet,
@@ -38,7 +41,8 @@ from tank2sim.records.campaign_form import (
     UncertaintySection,
     campaign_file,
 )
-from tank2sim.records.csv_table import CsvTable, read_table
+from tank2sim.records.csv_table import CsvTable
+from tank2sim.records.run_tables import read_run_table
 
 FORCE_COLUMNS = ("X", "Y", "N")
 _FEWEST_READINGS = 16
@@ -187,7 +191,8 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     _refuse_doubled_names(form, path)
     for sheet in form.runs:
         try:
-            runs.append(_read_run(sheet, form, path.parent))
+            columns = {**form.columns, **sheet.columns}
+            runs.append(read_captive_run(path.parent / sheet.file, sheet, form.test, columns, form.files))
         except InputError as fault:
             faults.append(fault)
     copies = _copies(runs)
@@ -259,13 +264,47 @@ def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
             raise InputError(path, f"runs.{number}.file", f"{name} is given twice", "give each run once")
 
 
-def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> CaptiveRun:
-    table = read_table(folder / sheet.file).si()
+def read_campaign_form(path: Path | str) -> CampaignFile:
+    """The checked content of ``campaign.toml``, without the files of its runs.
+
+    Raises
+    ------
+    InputError
+        The file is missing or at fault.
+    """
+    path = Path(path)
+    return campaign_file(_parsed(path), path)[0]
+
+
+def read_captive_run(
+    path: Path, sheet: RunSheet, test: TankTest, columns: Mapping[str, ColumnEntry | str], files: FilesSection
+) -> CaptiveRun:
+    """Read one captive run from its file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, of any layout (:func:`tank2sim.records.run_tables.read_run_table`).
+    sheet : RunSheet
+        What the test sheet says of it.
+    test : TankTest
+        Signs, speed and delay.
+    columns : mapping
+        Column of the file to its quantity.
+    files : FilesSection
+        Layout of text files.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or lacks a column.
+    """
+    table = read_run_table(path, columns, files)
     time = table.increasing("t_s") - float(table.column("t_s")[0])
-    to_port = form.test.rudder_sign == "port"
+    to_port = test.rudder_sign == "port"
     if to_port and sheet.rudder_rad is not None:
         sheet = sheet.model_copy(update={"rudder_rad": -sheet.rudder_rad})
-    sense = -1.0 if form.test.force_convention == "on_model" else 1.0
+    sense = -1.0 if test.force_convention == "on_model" else 1.0
     rudder = _optional(table, "delta_rad")
     if rudder is None:
         rudder = np.full(len(time), 0.0 if sheet.rudder_rad is None else sheet.rudder_rad)
@@ -273,7 +312,7 @@ def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> CaptiveRun:
         rudder = -rudder
     speed = _optional(table, "speed_mps")
     if speed is None:
-        speed = np.full(len(time), form.test.speed_mps)
+        speed = np.full(len(time), test.speed_mps)
     y, psi = _optional(table, "y_m"), _optional(table, "psi_rad")
     rate = _optional(table, "r_radps")
     if rate is None:
@@ -290,8 +329,8 @@ def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> CaptiveRun:
         **{column: sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
         y_m=y,
         psi_rad=psi,
-        propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else form.test.propeller_radps,
-        force_delay_s=form.test.force_delay_s,
+        propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps,
+        force_delay_s=test.force_delay_s,
     )
 
 

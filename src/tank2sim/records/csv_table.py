@@ -194,12 +194,35 @@ def read_table(path: Path | str) -> CsvTable:
         raise InputError(path, "", "there are no rows under the header", "add the measured values")
     lines = np.array(numbers[1:], dtype=np.int64)
     rows = [stripped[number - 1] for number in numbers[1:]]
+    comments, remarks = _comments([line for line in stripped if line.startswith("#")])
+    return replace(table_of_rows(path, names, rows, lines), comments=comments, remarks=remarks)
+
+
+def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> CsvTable:
+    """Table of rows with commas between cells and points in numbers.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    names : sequence of str
+        Of the columns.
+    rows : sequence of str
+    lines : array of int, (rows,)
+        Line of the file of each row.
+
+    Raises
+    ------
+    InputError
+        There are no rows; a row has too many or too few cells; a cell is not a finite number.
+    """
+    if not rows:
+        raise InputError(path, "", "there are no rows under the header", "add the measured values")
     values = _read_fast(rows, len(names))
     if values is None:
         values = _read_with_care(path, names, rows, lines)
-    comments, remarks = _comments([line for line in stripped if line.startswith("#")])
     columns = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(names)}
-    return CsvTable(path, columns, lines, comments, remarks)
+    return CsvTable(path, columns, lines)
 
 
 def _header(path: Path, number: int, line: str) -> list[str]:

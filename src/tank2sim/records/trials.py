@@ -17,8 +17,9 @@ RUDDERS = ("delta_rad", "delta_order_rad")
 MEASURED_COLUMNS = (
     *("u_mps", "v_mps", "u_ground_mps", "v_ground_mps", "sog_mps", "cog_rad", "r_radps", "psi_rad", "x_m", "y_m"),
     *("phi_rad", "wind_speed_mps", "wind_direction_rad", "wind_rel_speed_mps", "wind_rel_direction_rad"),
+    *("current_speed_mps", "current_direction_rad"),
 )
-"""Quantities of the motion and the wind that sensors measure."""
+"""Quantities of the motion, the wind and the current that sensors measure."""
 TRIAL_SIGNALS = (*RUDDERS, "n_radps", *MEASURED_COLUMNS)
 """Every signal of the trial format, in SI."""
 
@@ -37,7 +38,8 @@ class Trial:
         Name to values (n,), SI, rad, nan where nothing was measured. Names are those of the trial format in SI:
         ``delta_rad`` (angle), ``delta_order_rad`` (order, held until the next), both positive to starboard;
         ``n_radps u_mps v_mps u_ground_mps v_ground_mps sog_mps cog_rad r_radps psi_rad x_m y_m phi_rad wind_speed_mps
-        wind_direction_rad wind_rel_speed_mps wind_rel_direction_rad``. psi is continuous.
+        wind_direction_rad wind_rel_speed_mps wind_rel_direction_rad current_speed_mps current_direction_rad``. psi is
+        continuous; the wind comes from its direction, the current sets towards it.
     noise : mapping
         Standard deviation of the measurement by signal, where the file states it, SI.
     scale : float or None

@@ -50,6 +50,8 @@ FED = {
     "n_radps": "propeller.speed",
     "wind_speed_mps": "wind.speed",
     "wind_direction_rad": "wind.direction",
+    "current_speed_mps": "current.speed",
+    "current_direction_rad": "current.direction",
 }
 """Signal of a trial to the input of a model, in addition to the rudder."""
 

@@ -48,8 +48,8 @@ def test_a_delay_of_the_forces_is_estimated_and_reported_first(tmp_path, delay, 
     assert error.standard_error < 0.1 * abs(delay)
     assert reduction_findings(found)[0] == error.message
     wrong = ratios(found, written, ("Yvdot", "Yrdot", "Nvdot", "Nrdot"))
-    assert max(map(abs, wrong.values())) < 1.96, wrong
-    assert found.derivatives["Yrdot"].type_b["force_delay"] > 5 * found.derivatives["Yrdot"].type_a
+    assert max(map(abs, wrong.values())) < 3.0, wrong
+    assert 0 < found.derivatives["Yrdot"].type_b["force_delay"] < found.derivatives["Yrdot"].type_a
 
 
 def test_the_key_of_the_campaign_takes_the_delay_out(tmp_path, sound):

@@ -216,6 +216,12 @@ class Effect:
         """True if all of it is between the rudder order and a measured angle of the rudder."""
         return self.acts_on == self.looks_like == "actuator"
 
+    @property
+    def surroundings(self) -> bool:
+        """True for a wind or a current: its speed and direction are inputs of the model, and each trial has its own."""
+        inputs = {parameter.name for parameter in self.parameters if parameter.input_name}
+        return inputs == set(self.measured_as) == {"speed_mps", "direction_rad"}
+
     def required(self) -> tuple[str, ...]:
         """Names of the parameters without a default."""
         return tuple(parameter.name for parameter in self.parameters if parameter.default is None)

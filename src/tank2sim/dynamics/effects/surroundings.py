@@ -55,6 +55,7 @@ CURRENT = Effect(
         ),
     ),
     equations=_with_current,
+    measured_as={"speed_mps": "current_speed_mps", "direction_rad": "current_direction_rad"},
     terminal="Current of the water over the ground",
 )
 

@@ -33,13 +33,14 @@ def acting(gap: Gap) -> tuple[Acting, ...]:
     """Times at which the model is wrong, the most significant first; empty if there are none.
 
     Contradictions of the records come before the forces, with which the smoother follows such records; where only
-    kinematics or sensors are at fault there are no forces.
+    kinematics or sensors are at fault there are no forces. Of a named effect the intervals are those in which its own
+    force acts, else those in which the smoother needs one.
     """
     signals = {signal.quantity: signal for signal in _lacking(gap.passed)}
     messages = [*_passages("heading", [signals[name] for name in TURNING if name in signals])]
     messages += _passages("track", [signals[name] for name in TRACK[:2] if name in signals])
     force = missing_force_intervals(gap)
-    return (*by_significance(messages), *(force.passages if force is not None else ()))
+    return (*by_significance(messages), *(gap.at_work or (force.passages if force is not None else ())))
 
 
 def missing_force_intervals(gap: Gap) -> MissingForce | None:

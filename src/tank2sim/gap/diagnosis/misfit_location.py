@@ -243,6 +243,41 @@ def _at_work(trials: NDArray[np.object_], time_s: Array, force: Array, errors: A
     return by_significance(found)
 
 
+def effect_passages(trials: Sequence[str], time_s: Array, force: Array, errors: Array) -> tuple[Acting, ...]:
+    """Intervals in which the forces of named effects act, the most significant first.
+
+    These forces are known by their formulas far better than the smoother sees a force. Of each equation in which they
+    exceed the smoother's standard error as a root mean square, or which has the largest ones, those blocks count in
+    which the square exceeds :data:`USUAL` of its mean over all trials.
+
+    Parameters
+    ----------
+    trials : sequence of str
+        Trial of each of the n rows.
+    time_s : array (n,)
+        s.
+    force, errors : array (n, 3)
+        X, Y (N) and N (N m) of the effects, and the standard errors of the smoother's.
+    """
+    names = np.asarray(trials, dtype=object)
+    sizes = np.sqrt(np.mean((force / errors) ** 2, axis=0))
+    found = []
+    for axis, equation in enumerate(EQUATIONS.values()):
+        if sizes[axis] == 0 or sizes[axis] < min(1.0, float(sizes.max())):
+            continue
+        square, usual = force[:, axis] ** 2, float(np.mean(force[:, axis] ** 2))
+        for trial in dict.fromkeys(names):
+            rows = np.flatnonzero(names == trial)
+            high = uniform_filter1d(square[rows], min(_SHORT, len(rows))) > USUAL * usual
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], high.astype(int), [0]])))
+            for begin, end in zip(edges[::2], edges[1::2], strict=True):
+                part = rows[begin:end]
+                size = float(np.sqrt(np.mean(square[part] / errors[part, axis] ** 2)))
+                times = time_s[part[[0, -1]]]
+                found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size))
+    return by_significance(found)
+
+
 def by_significance(found: Sequence[Acting]) -> tuple[Acting, ...]:
     """Sorted by the sum of squares, the largest first."""
     return tuple(sorted(found, key=lambda interval: -(interval.size**2) * (interval.t_end_s - interval.t_start_s)))

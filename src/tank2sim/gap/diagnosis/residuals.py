@@ -10,13 +10,13 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.model import Parameter
-from tank2sim.gap.diagnosis.misfit_location import missing_force_by_state
+from tank2sim.gap.diagnosis.misfit_location import effect_passages, missing_force_by_state
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.outcome.improve_card import Found
-from tank2sim.gap.result import MissingForce
+from tank2sim.gap.result import Acting, MissingForce, Surroundings
 
 
 def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce | None:
@@ -48,6 +48,19 @@ def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce |
     )
 
 
+def effects_at_work(likelihood: Likelihood, fit: ExplanationFit) -> tuple[Acting, ...]:
+    """Intervals in which the forces of an explanation's effects act (:func:`.misfit_location.effect_passages`)."""
+    motion, hypothesis = likelihood.motion, fit.hypothesis
+    spread = likelihood.smooth(fit)[1]
+    inertia = _inertia(likelihood.none)
+    driving, _ = likelihood.added(hypothesis, fit.theta)
+    force = np.einsum("ij,rtj->rti", inertia, driving[..., :FORCE_STATES] / motion.block_s)
+    errors = np.sqrt(np.einsum("ij,rtjk,ik->rti", inertia, spread, inertia))[:, :-1]
+    part = motion.inside[:, 1:]
+    names = np.repeat(np.array(motion.names)[:, None], part.shape[1], axis=1)[part]
+    return effect_passages(list(names), motion.times[:, :-1][part], force[part], errors[part])
+
+
 def _inertia(hypothesis: Hypothesis) -> Array:
     """Mass matrix (3, 3): forces X, Y (N) and N (N m) by accelerations of surge, sway and yaw at the design speed."""
     pushes = [Parameter(name=f"push.{axis}", unit="1", description="A force", start=0.0) for axis in "XYN"]
@@ -63,20 +76,21 @@ def _inertia(hypothesis: Hypothesis) -> Array:
 def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[str, tuple[float, float]]]:
     """Estimates of the effects' parameters by each trial alone: variable to {trial: (value, standard error)}.
 
-    The other parameters have the covariance of the fit to all trials; the card's coefficients and the
-    forms of the effects as before.
+    Not of parameters that act in one trial only. The other parameters have the covariance of the fit to all trials;
+    the card's coefficients and the forms of the effects as before.
     """
     whitened, _ = likelihood.whiten(fit)
     k = len(fit.theta)
     estimated = fit.hypothesis.estimated
-    by_trial: dict[str, dict[str, tuple[float, float]]] = {estimate.variable: {} for estimate in estimated}
+    shared = [place for place, estimate in enumerate(estimated) if estimate.run is None]
+    by_trial: dict[str, dict[str, tuple[float, float]]] = {estimated[place].variable: {} for place in shared}
     for run, name in enumerate(likelihood.motion.names):
         flat = whitened[run].reshape(-1, whitened.shape[-1])
         gram = flat.T @ flat
         held = gram[1 + k :, 1 + k :] + np.eye(len(gram) - 1 - k)
         mixed = gram[: 1 + k, 1 + k :]
         reduced = gram[: 1 + k, : 1 + k] - mixed @ np.linalg.solve(held, mixed.T)
-        for place, estimate in enumerate(estimated):
+        for place in shared:
             remaining = np.delete(np.arange(k), place)
             prior = np.linalg.inv(fit.covariance[np.ix_(remaining, remaining)] + 1e-300 * np.eye(k - 1))
             rows, columns = 1 + remaining, np.array([1 + place, 0])
@@ -84,17 +98,37 @@ def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[st
             information, pull = reduced[1 + place, columns] - reduced[1 + place, rows] @ solved
             if information > 0:
                 value = float(fit.theta[place] - pull / information)
-                by_trial[estimate.variable][name] = value, float(1 / np.sqrt(information))
+                by_trial[estimated[place].variable][name] = value, float(1 / np.sqrt(information))
     return by_trial
 
 
 def estimates(fit: ExplanationFit) -> list[Found]:
-    """Each effect of a fit with its parameters and their standard errors, SI, by the names of the parameters."""
+    """Each effect of a fit with its parameters and their standard errors, SI, by the names of the parameters.
+
+    Those of single trials are in :func:`surroundings_by_trial`.
+    """
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     found: list[Found] = []
     for effect in fit.hypothesis.effects:
-        places = [place for place, estimate in enumerate(fit.hypothesis.estimated) if estimate.effect == effect]
+        places = [
+            place
+            for place, estimate in enumerate(fit.hypothesis.estimated)
+            if estimate.effect == effect and estimate.run is None
+        ]
         names: Sequence[str] = [fit.hypothesis.estimated[place].parameter.name for place in places]
         values = {name: float(fit.theta[place]) for name, place in zip(names, places, strict=True)}
         found.append((effect, values, {name: float(errors[p]) for name, p in zip(names, places, strict=True)}))
     return found
+
+
+def surroundings_by_trial(fit: ExplanationFit, trials: Sequence[str]) -> dict[str, dict[str, Surroundings]]:
+    """Each wind or current that differs from trial to trial: effect to the name of each of the `trials` to its own."""
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    variances = fit.hypothesis.of_each_trial(errors)
+    return {
+        effect: {
+            name: Surroundings.of_parts(part, error)
+            for name, part, error in zip(trials, parts, variances[effect], strict=True)
+        }
+        for effect, parts in fit.hypothesis.of_each_trial(fit.theta).items()
+    }

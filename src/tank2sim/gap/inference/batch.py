@@ -8,8 +8,8 @@ linearisation for each explanation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, measured_motion, sensor_noise
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, seen_in
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.trials import Trial, sampling_step
-from tank2sim.simulation.recorded import SMOOTHING
+from tank2sim.simulation.recorded import FED, SMOOTHING
 
 _Truths = NDArray[np.bool_]
 
@@ -77,6 +79,9 @@ class MeasuredBatch:
     unsure_s : array (R,)
         Time from one reading of the rudder's order to the next, s: within it the order changed, at an unknown instant.
         0 where the rudder's angle was measured.
+    recorded : mapping
+        Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
+        `inputs` does not hold; directions without jumps of a full turn.
     """
 
     names: tuple[str, ...]
@@ -90,6 +95,7 @@ class MeasuredBatch:
     measured: Array
     noise: Array
     unsure_s: Array
+    recorded: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def block_s(self) -> float:
@@ -243,8 +249,31 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         inputs=np.array(inputs),
         measured=np.array(measured),
         unsure_s=np.array([0.0 if "delta_rad" in trial.signals else sampling_step(trial) for trial in trials]),
+        recorded=_recorded(trials, runs, size, model.input_names),
         noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
     )
+
+
+def _recorded(
+    trials: Sequence[Trial], runs: Sequence[SampledRun], size: int, inputs: Sequence[str]
+) -> dict[str, Array]:
+    """Winds and currents that every trial recorded, halfway between the fine instants, but for known inputs."""
+    found = {}
+    for signals in (effect.measured_as for effect in EFFECTS.values() if effect.surroundings):
+        names = set(signals.values())
+        measured = all(np.isfinite(trial.signals.get(name, np.nan)).any() for trial in trials for name in names)
+        if not measured or {FED[name] for name in names} & set(inputs):
+            continue
+        for signal in signals.values():
+            rows = []
+            for trial, run in zip(trials, runs, strict=True):
+                values = trial.signals[signal]
+                known = np.isfinite(values)
+                whole = np.unwrap(values[known]) if signal in DIRECTION_COLUMNS else values[known]
+                middles = run.begin_s + run.step_s * (np.arange(len(run.measured)) + 0.5)
+                rows.append(_padded(np.interp(middles, trial.time_s[known], whole), size)[:-1])
+            found[FED[signal]] = np.array(rows)
+    return found
 
 
 def _at_step(run: SampledRun, step: float) -> SampledRun:

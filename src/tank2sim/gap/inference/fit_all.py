@@ -15,7 +15,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.inference.batch import MeasuredBatch
 from tank2sim.gap.inference.fit import Belief, ExplanationFit, NuisanceParameters
-from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.hypothesis import Hypothesis, TrialSurroundings
 from tank2sim.gap.inference.likelihood import Likelihood
 
 StageReport = Callable[[str], None]
@@ -34,12 +34,15 @@ class Proposal:
     rounds : sequence of int
     limit : float
         See :meth:`.likelihood.Likelihood.at_best`.
+    each : tuple of str
+        Those of the effects whose wind or current differs from trial to trial.
     """
 
     thetas: dict[str, Array]
     starts: Sequence[Array]
     rounds: Sequence[int]
     limit: float = np.inf
+    each: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -48,17 +51,34 @@ class Proposal:
 
 
 class HypothesisCache:
-    """Hypotheses by their effects, each built once."""
+    """Hypotheses by their effects, each built once.
 
-    def __init__(self, none: Hypothesis):
-        self.none = none
-        self._made: dict[tuple[str, ...], Hypothesis] = {(): none}
+    Parameters
+    ----------
+    none : Hypothesis
+        The card without an effect.
+    motion : MeasuredBatch, optional
+        Of the trials: their number, and the winds and currents that they recorded.
+    """
 
-    def __call__(self, *effects: str) -> Hypothesis:
-        """The card with these effects."""
-        if effects not in self._made:
-            self._made[effects] = Hypothesis(self.none.card, self.none.driven_by, effects, self.none.model)
-        return self._made[effects]
+    def __init__(self, none: Hypothesis, motion: MeasuredBatch | None = None):
+        self.none, self.runs = none, 0 if motion is None else len(motion.names)
+        recorded = set() if motion is None else set(motion.recorded)
+        self.recorded = tuple(
+            name
+            for name, effect in EFFECTS.items()
+            if effect.surroundings and set(effect.model_names().values()) & recorded
+        )
+        self._made: dict[tuple[tuple[str, ...], tuple[str, ...]], Hypothesis] = {((), ()): none}
+
+    def __call__(self, *effects: str, each: tuple[str, ...] = ()) -> Hypothesis:
+        """The card with these effects; the wind or current of those in `each` differs from trial to trial."""
+        key = effects, each
+        if key not in self._made:
+            none, recorded = self.none, tuple(name for name in effects if name in self.recorded)
+            given = TrialSurroundings(each, recorded, self.runs)
+            self._made[key] = Hypothesis(none.card, none.driven_by, effects, none.model, given)
+        return self._made[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +130,9 @@ class Fitting:
     def _keep(self, proposal: Proposal, found: ExplanationFit) -> None:
         before = self.found.get(proposal.effects)
         if before is None or found.score < before.score:
-            self.found[proposal.effects] = replace(found, hypothesis=self.hypotheses(*proposal.effects))
+            self.found[proposal.effects] = replace(
+                found, hypothesis=self.hypotheses(*proposal.effects, each=proposal.each)
+            )
 
     def best(self, count: int | None = None) -> ExplanationFit:
         """The best fit so far, of all or of those with `count` effects; raises ValueError if there is none."""
@@ -122,6 +144,18 @@ class Fitting:
         return any(len(effects) == count for effects in self.found)
 
 
+def refit(fit: ExplanationFit, starts: Sequence[Array], rounds: Sequence[int]) -> Proposal:
+    """The proposal to fit an explanation again, from its parameters.
+
+    Parameters
+    ----------
+    fit : ExplanationFit
+    starts, rounds
+        As of :class:`Proposal`.
+    """
+    return Proposal(thetas_of(fit), starts, rounds, each=fit.hypothesis.each)
+
+
 def thetas_of(fit: ExplanationFit) -> dict[str, Array]:
     """Parameters of a fit by effect."""
     names = np.array([parameter.effect for parameter in fit.hypothesis.estimated])
@@ -131,7 +165,9 @@ def thetas_of(fit: ExplanationFit) -> dict[str, Array]:
 def _fit(likelihood: Likelihood, hypotheses: HypothesisCache, proposal: Proposal) -> ExplanationFit:
     effects = proposal.effects
     theta = np.concatenate([np.zeros(0), *(proposal.thetas[effect] for effect in effects)])
-    return likelihood.at_best(hypotheses(*effects), theta, proposal.starts, proposal.rounds, proposal.limit)
+    return likelihood.at_best(
+        hypotheses(*effects, each=proposal.each), theta, proposal.starts, proposal.rounds, proposal.limit
+    )
 
 
 _LIKELIHOODS: dict[str, tuple[Likelihood, HypothesisCache]] = {}
@@ -141,17 +177,22 @@ _LOCK = Lock()
 """Threads of one executor share the dictionary above."""
 
 
+def _same_trials(cache: HypothesisCache, ship: tuple[ManoeuvringCard, str], sent: _LikelihoodParts) -> bool:
+    """Whether hypotheses were built for the same ship and trials."""
+    new = HypothesisCache(cache.none, sent.motion)
+    known = cache.none.card, cache.none.driven_by
+    return known == ship and (cache.runs, cache.recorded) == (new.runs, new.recorded)
+
+
 def _fit_in_worker(sent: _LikelihoodParts, proposal: Proposal) -> ExplanationFit:
     with _LOCK:
         if sent.token not in _LIKELIHOODS:
             ship = sent.card, sent.driven_by
-            hypotheses = next(
-                (cache for _, cache in _LIKELIHOODS.values() if (cache.none.card, cache.none.driven_by) == ship), None
-            )
+            hypotheses = next((cache for _, cache in _LIKELIHOODS.values() if _same_trials(cache, ship, sent)), None)
             none = hypotheses.none if hypotheses else Hypothesis(*ship)
             _LIKELIHOODS.clear()
             likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief)
-            _LIKELIHOODS[sent.token] = likelihood, hypotheses or HypothesisCache(none)
+            _LIKELIHOODS[sent.token] = likelihood, hypotheses or HypothesisCache(none, sent.motion)
         likelihood_and_hypotheses = _LIKELIHOODS[sent.token]
     found = _fit(*likelihood_and_hypotheses, proposal)
     return replace(found, hypothesis=None)  # type: ignore[arg-type]  # CasADi's functions stay where they are

@@ -49,16 +49,42 @@ class EstimatedParameter:
     parameter : EffectParameter
     variable : str
         Of the model that holds it.
+    run : int, optional
+        Place of the only trial in which it acts; None for a parameter of all trials.
+    axis : int
+        Of one trial's wind or current, as `direction_rad` counts: 0 for its part along north, 1 along east, m/s.
     """
 
     effect: str
     parameter: EffectParameter
     variable: str
+    run: int | None = None
+    axis: int = 0
 
     @property
     def is_amplitude(self) -> bool:
         """Whether the effect vanishes at one value of the parameter, which has no default."""
         return self.parameter.absent is not None and self.parameter.default is None
+
+
+@dataclass(frozen=True)
+class TrialSurroundings:
+    """Effects whose wind or current is a matter of each trial.
+
+    Parameters
+    ----------
+    each : tuple of str
+        Those that differ from trial to trial: two unknowns for each trial, normal about zero with the typical speed of
+        the effect as standard deviation.
+    recorded : tuple of str
+        Those that every trial recorded.
+    runs : int
+        Number of trials, for `each`.
+    """
+
+    each: tuple[str, ...] = ()
+    recorded: tuple[str, ...] = ()
+    runs: int = 0
 
 
 class Hypothesis:
@@ -74,6 +100,8 @@ class Hypothesis:
         Names of effects that are added.
     ship : Model, optional
         The card's model driven by that signal, if it was built already.
+    surroundings : TrialSurroundings
+        What is a matter of each trial.
 
     Attributes
     ----------
@@ -81,9 +109,16 @@ class Hypothesis:
         The parameters that are estimated, in the order of every `theta`.
     """
 
-    def __init__(self, card: ManoeuvringCard, driven_by: str, effects: Sequence[str] = (), ship: Model | None = None):
-        self.card, self.driven_by = card, driven_by
-        self.effects = tuple(effects)
+    def __init__(
+        self,
+        card: ManoeuvringCard,
+        driven_by: str,
+        effects: Sequence[str] = (),
+        ship: Model | None = None,
+        surroundings: TrialSurroundings = TrialSurroundings(),
+    ):
+        self.card, self.driven_by, self.effects = card, driven_by, tuple(effects)
+        self.each, self.recorded, runs = surroundings.each, surroundings.recorded, surroundings.runs
         model = driven_model(card, driven_by) if ship is None else ship
         estimated: list[EstimatedParameter] = []
         for name in self.effects:
@@ -95,10 +130,18 @@ class Hypothesis:
             }
             model = effect.apply(model, start, card)
             places = effect.model_names()
+            given = {*effect.measured_as} if name in {*self.each, *self.recorded} else set()
+            if name in self.each:
+                (speed,) = (parameter for parameter in effect.parameters if parameter.name == "speed_mps")
+                estimated += [
+                    EstimatedParameter(name, speed, places[speed.name], run, axis)
+                    for run in range(runs)
+                    for axis in (0, 1)
+                ]
             estimated += [
                 EstimatedParameter(name, parameter, places[parameter.name])
                 for parameter in effect.parameters
-                if parameter.name in effect.free(card)
+                if parameter.name in effect.free(card) and parameter.name not in given
             ]
         self.model = model
         self.estimated = tuple(estimated)
@@ -108,7 +151,8 @@ class Hypothesis:
     @property
     def directed(self) -> bool:
         """Whether one of the effects comes from a direction of the compass."""
-        return any(estimate.parameter.name == "direction_rad" for estimate in self.estimated)
+        names = {parameter.name for effect in self.effects for parameter in EFFECTS[effect].parameters}
+        return "direction_rad" in names
 
     @cached_property
     def influences(self) -> tuple[bool, bool, bool]:
@@ -116,8 +160,9 @@ class Hypothesis:
 
         Those that they do not change equal the values of the card without the effects.
         """
-        symbols = [self.model.symbol(estimate.variable) for estimate in self.estimated]
-        chosen = ca.vcat(symbols) if symbols else ca.SX(0, 1)
+        given = [EFFECTS[name].model_names()[key] for name in self._given for key in EFFECTS[name].measured_as]
+        names = dict.fromkeys([*(estimate.variable for estimate in self.estimated), *given])
+        chosen = ca.vcat([self.model.symbol(name) for name in names]) if names else ca.SX(0, 1)
         states = bool(self._delays(np.ones(len(self.estimated)))) or ca.depends_on(self._of(self.unmeasured), chosen)
         rates = states or ca.depends_on(self._known_rates, chosen)
         return states, rates, states or ca.depends_on(self._shown(SENSED), chosen)
@@ -127,7 +172,12 @@ class Hypothesis:
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of each estimated parameter (k,); times at least as long as can be integrated."""
-        low = np.array([estimate.parameter.lowest(self.card) for estimate in self.estimated])
+        low = np.array(
+            [
+                estimate.parameter.lowest(self.card) if estimate.run is None else -estimate.parameter.maximum
+                for estimate in self.estimated
+            ]
+        )
         timed = [estimate.parameter.name.endswith("_s") for estimate in self.estimated]
         times = np.array(timed, dtype=bool) & (low > 0)
         low[times] = np.maximum(low[times], STEPS_IN_A_TIME * self.model.step_s)
@@ -139,6 +189,10 @@ class Hypothesis:
         means, precisions = [], []
         for estimate in self.estimated:
             spread = estimate.parameter.spread_value(self.card)
+            if estimate.run is not None:
+                means.append(0.0)
+                precisions.append(max(map(abs, estimate.parameter.typical_values(self.card))) ** -2)
+                continue
             means.append(estimate.parameter.value({}, self.card) if spread else 0.0)
             precisions.append(1 / spread**2 if spread else 0.0)
         return np.array(means), np.array(precisions)
@@ -158,8 +212,36 @@ class Hypothesis:
         return self.model.parameter_values(self._chosen(theta, self.model.parameter_names))
 
     def _chosen(self, theta: Array, names: Sequence[str]) -> dict[str, float]:
-        values = zip(self.estimated, theta, strict=True)
+        values = [
+            (estimate, value) for estimate, value in zip(self.estimated, theta, strict=True) if estimate.run is None
+        ]
         return {estimate.variable: float(value) for estimate, value in values if estimate.variable in names}
+
+    @property
+    def _given(self) -> tuple[str, ...]:
+        """Effects whose wind or current is not a parameter of all trials."""
+        return (*self.each, *self.recorded)
+
+    @cached_property
+    def moved_together(self) -> tuple[tuple[int, ...], ...]:
+        """Places of the estimated parameters (k,), those together that act in different trials."""
+        groups: dict[tuple[str, str, int, bool], list[int]] = {}
+        for place, estimate in enumerate(self.estimated):
+            key = estimate.effect, estimate.parameter.name, estimate.axis, estimate.run is None
+            groups.setdefault(key, []).append(place)
+        return tuple(map(tuple, groups.values()))
+
+    def of_each_trial(self, theta: Array) -> dict[str, Array]:
+        """Parts along north and east (R, 2), m/s, of each wind or current that differs from trial to trial."""
+        found = {}
+        for name in self.each:
+            places = [
+                place
+                for place, estimate in enumerate(self.estimated)
+                if estimate.effect == name and estimate.run is not None
+            ]
+            found[name] = np.asarray(theta)[places].reshape(-1, 2)
+        return found
 
     def inputs(self, motion: MeasuredBatch, theta: Array) -> Array:
         """Inputs of this model at every fine step (R, n - 1, nu)."""
@@ -171,6 +253,14 @@ class Hypothesis:
         inputs[:, :, count:] = self.model.input_values()[count:]
         for name, value in self._chosen(theta, names).items():
             inputs[:, :, names.index(name)] = value
+        for effect, parts in self.of_each_trial(theta).items():
+            variables = EFFECTS[effect].model_names()
+            inputs[:, :, names.index(variables["speed_mps"])] = np.hypot(*parts.T)[:, None]
+            inputs[:, :, names.index(variables["direction_rad"])] = np.arctan2(parts[:, 1], parts[:, 0])[:, None]
+        for effect in self.recorded:
+            for variable in map(EFFECTS[effect].model_names().get, EFFECTS[effect].measured_as):
+                assert variable is not None
+                inputs[:, :, names.index(variable)] = motion.recorded[variable]
         for name, delay in self._delays(theta).items():
             if not self._states_behind(name):
                 place = names.index(name)

@@ -80,7 +80,7 @@ class Likelihood:
 
     def __init__(self, motion: MeasuredBatch, none: Hypothesis, coefficients: NuisanceParameters, belief: Belief):
         self.motion, self.none, self.coefficients, self.belief = motion, none, coefficients, belief
-        self._residuals: dict[tuple[tuple[str, ...], bytes], tuple[Array, Array]] = {}
+        self._residuals: dict[tuple[tuple[str, ...], tuple[str, ...], bytes], tuple[Array, Array]] = {}
         nothing = np.zeros(0)
         self._unmeasured = none.unmeasured_states(motion, nothing)
         self._block_rates = none.rates(motion, nothing, self._unmeasured)
@@ -125,7 +125,7 @@ class Likelihood:
 
     def residual(self, hypothesis: Hypothesis, theta: Array) -> tuple[Array, Array]:
         """Driving (R, T - 1, 6) and shown (R, T, ny) of the residual at some parameters."""
-        key = hypothesis.effects, theta.tobytes()
+        key = hypothesis.effects, hypothesis.each, theta.tobytes()
         found = self._residuals.get(key)
         if found is None:
             if len(self._residuals) >= REMEMBERED:
@@ -154,20 +154,27 @@ class Likelihood:
         """Residual, its slopes in the parameters (difference quotients), and the coefficients."""
         driving, shown = self.residual(hypothesis, theta)
         _, high = hypothesis.bounds
-        driven, seen = [driving], [shown]
-        for place, step in enumerate(hypothesis.steps):
+        driven = np.zeros((*driving.shape, 1 + len(theta)))
+        seen = np.zeros((*shown.shape, 1 + len(theta)))
+        driven[..., 0], seen[..., 0] = driving, shown
+        steps = hypothesis.steps
+        for group in hypothesis.moved_together:
+            places = list(group)
             moved = theta.copy()
-            moved[place] += step if theta[place] + step <= high[place] else -step
+            moved[places] += np.where(theta[places] + steps[places] <= high[places], steps[places], -steps[places])
             moved_residual = self.residual(hypothesis, moved)
-            change = moved[place] - theta[place]
-            driven.append((moved_residual[0] - driving) / change)
-            seen.append((moved_residual[1] - shown) / change)
+            for place in places:
+                run = hypothesis.estimated[place].run
+                rows = slice(None) if run is None else slice(run, run + 1)
+                change = moved[place] - theta[place]
+                driven[rows, ..., 1 + place] = ((moved_residual[0] - driving) / change)[rows]
+                seen[rows, ..., 1 + place] = ((moved_residual[1] - shown) / change)[rows]
         forms = np.zeros((*driving.shape, 0))
         if len(theta) and self._forms is not None:
             forms = self._forms.columns(driving - self._lack, directed=hypothesis.directed)
-        pairs = np.concatenate([np.stack(driven, axis=-1), of_coefficients, forms], axis=-1)
+        pairs = np.concatenate([driven, of_coefficients, forms], axis=-1)
         readings = np.zeros((*shown.shape, pairs.shape[-1]))
-        readings[..., : 1 + len(theta)] = np.stack(seen, axis=-1)
+        readings[..., : 1 + len(theta)] = seen
         return FilterColumns(pairs, readings, len(theta), self.coefficients.scaled)
 
     def whiten(self, fit: ExplanationFit) -> tuple[Array, Array]:

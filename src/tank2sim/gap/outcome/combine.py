@@ -34,6 +34,7 @@ def combine_passes(first: Gap, further: Gap) -> Gap:
     return replace(
         further,
         card=first.card,
+        base=further.base if further.coefficients else first.base,
         effects=(*(_updated(effect, refitted) for effect in first.effects), *further.effects),
         coefficients=coefficients or first.coefficients,
         effect_alone={**further.effect_alone, **first.effect_alone},

@@ -51,7 +51,9 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, A
         {
             "ship": gap.card.ship.name,
             "verdict": gap.verdict,
-            "effects": [_effect(effect) for effect in gap.effects],
+            "effects": [
+                _effect(effect, {replay.name for replay in gap.passed if replay.held_out}) for effect in gap.effects
+            ],
             "coefficients": [_coefficient(coefficient) for coefficient in gap.coefficients],
             "alternatives": [joined(alternative) for alternative in gap.alternatives],
             "where": _where(gap, names),
@@ -201,13 +203,28 @@ def _figures(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
     ]
 
 
-def _effect(effect: Named) -> dict[str, object]:
+def _effect(effect: Named, held_out: set[str]) -> dict[str, object]:
     return {
         "name": effect.name,
         "parameters": _in_file(effect.parameters, estimate_in_file),
         "standard_errors": _in_file(effect.standard_errors),
         "confidence": _finite(effect.confidence),
+        "by_trial": _by_trial(effect, held_out),
     }
+
+
+def _by_trial(effect: Named, held_out: set[str]) -> list[dict[str, object]]:
+    return [
+        {
+            "trial": trial,
+            "held_out": trial in held_out,
+            **_in_file({"speed_mps": found.speed_mps, "direction_rad": found.direction_rad}, estimate_in_file),
+            "standard_errors": _in_file(
+                {"speed_mps": found.speed_error_mps, "direction_rad": found.direction_error_rad}
+            ),
+        }
+        for trial, found in effect.by_trial.items()
+    ]
 
 
 def _coefficient(coefficient: Refitted) -> dict[str, object]:

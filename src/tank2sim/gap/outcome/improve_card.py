@@ -61,7 +61,8 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
     ship = [effect for effect in found if EFFECTS[effect[0]].acts_on != "sensor"]
     for name in {entry.name for entry in card.effects} & {name for name, *_ in ship}:
         raise ValueError(f"the card has {name} already")
-    for place, (name, values, errors) in enumerate(ship):
+    for place, (name, found_values, errors) in enumerate(ship):
+        values = {**at_rest(name), **found_values}
         read_later = any(EFFECTS[later].reads_derivatives for later, *_ in ship[place + 1 :])
         if EFFECTS[name].in_place_of:
             card = _changed(card, _stated(card, name, values, errors))
@@ -72,22 +73,32 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
     return card
 
 
+def at_rest(name: str) -> dict[str, float]:
+    """Speed and direction of a wind or current, zero: what a card states where that is a matter of each trial.
+
+    Empty for other effects.
+    """
+    return dict.fromkeys(EFFECTS[name].measured_as, 0.0) if EFFECTS[name].surroundings else {}
+
+
 def card_with_effects_text(
-    card: ManoeuvringCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = ()
+    card: ManoeuvringCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = (), refitted: int = 0
 ) -> str:
     """Text of a card with effects added by :func:`add_effects_to_card`, headed by their names and the trials used.
 
-    A card to which no effect was added is returned unchanged. `rivals` are the explanations that these trials cannot
-    distinguish from them.
+    A card to which nothing was added is returned unchanged. `rivals` are the explanations that these trials cannot
+    distinguish from the effects; `refitted` is the number of coefficients that were fitted to the trials.
     """
     names = [name for name, *_ in found if EFFECTS[name].acts_on != "sensor"]
-    if not names:
+    changes = [f"{' and '.join(names)} added"] if names else []
+    changes += [f"{refitted} coefficients refitted"] if refitted else []
+    if not changes:
         return card.text
-    how = f"{' and '.join(names)} added by tank2sim gap from {', '.join(trials)}"
+    how = f"{', '.join(changes)} by tank2sim gap from {', '.join(trials)}"
     text = changed_text(card.text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     messages = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
     lines = [how, *messages]
-    if any(EFFECTS[name].in_place_of or EFFECTS[name].changes_on(card) for name in names):
+    if refitted or any(EFFECTS[name].in_place_of or EFFECTS[name].changes_on(card) for name in names):
         lines.append("Keys that were changed for this have their old values in comments.")
     if rivals:
         lines.append(f"These trials cannot distinguish this from: {'; '.join(rivals)}.")

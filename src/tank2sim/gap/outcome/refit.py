@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.fit import CoefficientEstimates
@@ -15,7 +18,7 @@ from tank2sim.identification.trials.problem.problem_from_card import card_with_e
 def refit_coefficients(
     card: ManoeuvringCard, model: Model, estimates: CoefficientEstimates
 ) -> tuple[tuple[Refitted, ...], ManoeuvringCard]:
-    """The coefficients with their values before and after, and the card with them.
+    """The coefficients with their values before and after, and the card with them and their covariance.
 
     Data of the steering gear and the clock of the record are part of the fit and are not written: the card states what
     the gear is, and the clock is the record's.
@@ -40,4 +43,7 @@ def refit_coefficients(
     estimate = Estimate("gap", names, values, covariance, np.asarray(np.linalg.pinv(covariance), dtype=np.float64))
     short = [name.removeprefix("derivatives.") for name in names]
     columns = zip(short, values.tolist(), estimate.standard_errors.tolist(), *before.T.tolist(), strict=True)
-    return tuple(Refitted(*row) for row in columns), card_with_estimate(card, estimate, "refitted by gap")
+    refitted = card_with_estimate(card, estimate, "refitted by gap")
+    return tuple(Refitted(*row) for row in columns), replace(
+        refitted, covariance=by_file_name(refitted, names, covariance)
+    )

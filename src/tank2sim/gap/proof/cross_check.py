@@ -31,6 +31,10 @@ MUCH = 3.0
 CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
+DIFFERS = 0.3
+"""Root mean square difference of two simulations, in noise units, from which an effect acts in a trial (project choice:
+far less than shows): a stall shows in hard turns alone."""
+
 REACH = 1e-3
 """Differences by a coefficient are taken over this share of the largest linear one (project choice: rounding and
 curvature are both far below the noise)."""
@@ -156,11 +160,12 @@ class _Fit:
         return model.parameter_values({name: values[name] + float(change) for name, change in moved.items()})
 
 
-def closes_gap(passed: Sequence[Passed]) -> bool:
+def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
-    By the median ratio of misfits after and before, over all signals of all trials, for one diverging simulation
-    would dominate a mean.
+    By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
+    signals of all trials in which the two simulations differ by :data:`DIFFERS`, for an effect may act in few of them.
+    `limit` is the largest median.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
     if min(np.sqrt(np.mean(values**2)) for values in rms) < MUCH:
@@ -168,7 +173,17 @@ def closes_gap(passed: Sequence[Passed]) -> bool:
     shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
     pairs = [(replay.misfit("before", name), replay.misfit("after", name)) for replay, name in shown]
     ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
-    return bool(np.median(ratios) < CLOSES)
+    changed = [ratio for ratio, (replay, name) in zip(ratios, shown, strict=True) if _differs(replay, name)]
+    return bool(changed and np.median(changed) < limit)
+
+
+def _differs(replay: Passed, name: str) -> bool:
+    """Whether simulations before and after differ in a signal where it was measured."""
+    known = np.isfinite(replay.measured[name])
+    before, after = replay.before[name][known], replay.after[name][known]
+    if not (np.isfinite(before).all() and np.isfinite(after).all()):
+        return True
+    return bool(np.sqrt(np.mean(np.square((after - before) / replay.noise[name]))) > DIFFERS)
 
 
 def worse_trials(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:

@@ -73,7 +73,8 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
             known = sizes.setdefault(variant.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
     replacing = {variant.effect: variant for variant in search.variants if not variant.amplitudes}
-    for variant in (replacing[name] for name in replacing if name not in best.hypothesis.effects):
+    unseen = [variant for name, variant in replacing.items() if name not in best.hypothesis.effects]
+    for variant in (variant for variant in unseen if not variant.hypothesis.recorded):
         value = _hidden_value(likelihood, best, variant, enough)
         if value is not None:
             sizes[variant.effect] = {variant.hypothesis.estimated[0].parameter.name: value}

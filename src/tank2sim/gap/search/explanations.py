@@ -14,9 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.arrays import Array
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, StageReport, thetas_of
+from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, StageReport, refit, thetas_of
+from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import candidate_explanations
 from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
@@ -93,7 +96,8 @@ def search(
     most : int
         Effects at a time, 1 or 2.
     """
-    hypotheses, believed = HypothesisCache(likelihood.none), likelihood.belief.logs
+    hypotheses = HypothesisCache(likelihood.none, likelihood.motion)
+    believed = likelihood.belief.logs
     rough = Fitting(likelihood, hypotheses, progress, executor)
     rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
     chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
@@ -108,9 +112,10 @@ def search(
     again = [fit for fit in rough.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     fitting.fit(
         [Proposal({}, [best.logs, none.logs, believed], ROUNDS_OF_NONE)]
-        + [Proposal(thetas_of(fit), [best.logs, fit.logs], ROUNDS) for fit in again]
+        + [refit(fit, [best.logs, fit.logs], ROUNDS) for fit in again]
     )
     _explore(fitting, every, believed, most)
+    _let_surroundings_differ(fitting, every, most)
     _polish(fitting)
     fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
     return Search(fitting.likelihood, tuple(fits), every)
@@ -140,10 +145,48 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
     pair = fitting.best(2)
     swapped: list[Screened] = []
     for name, theta in thetas_of(pair).items():
-        alone = fitting.hypotheses(name)
+        alone = fitting.hypotheses(name)  # surroundings differ between trials only after this
         base = ExplanationFit(alone, theta, np.zeros((len(theta), len(theta))), pair.logs, np.inf, pair.change)
         swapped += [Screened({name: theta}, 0.0), *_on_top_of(fitting, base, every)[:SWAPS]]
     fitting.fit(_proposals(fitting, swapped, [pair.logs], limit=pair.score + _FAR))
+
+
+def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
+    """Winds and currents that differ from trial to trial, alone, together, and next to the best explanation."""
+    chosen = dict.fromkeys(variant.effect for variant in every)
+    unknown = [name for name in chosen if EFFECTS[name].surroundings and name not in fitting.hypotheses.recorded]
+    runs = fitting.hypotheses.runs
+    if runs < 2:
+        return
+    best = fitting.best()
+    still = {name: _still(fitting.hypotheses(name, each=(name,))) for name in unknown}
+    sets = [{name: still[name]} for name in unknown]
+    if most > 1 and len(unknown) > 1:
+        sets.append(dict(still))
+    if most > 1:
+        others = {effect: theta for effect, theta in thetas_of(best).items() if effect not in unknown}
+        sets += [{effect: theta, name: still[name]} for effect, theta in others.items() for name in unknown]
+    starts = [best.logs, fitting.likelihood.belief.logs]
+    fitting.fit(
+        [
+            Proposal(thetas, starts, ROUNDS, best.score + _FAR, each=tuple(name for name in unknown if name in thetas))
+            for thetas in sets
+        ]
+    )
+    best = fitting.best(1)
+    if most > 1 and best.hypothesis.each and best.score < fitting.best(2).score + _FAR:
+        fitting.fit(
+            [
+                Proposal(proposed.thetas, [best.logs], ROUNDS, best.score + _FAR, each=best.hypothesis.each)
+                for proposed in _on_top_of(fitting, best, every)[:WITH_THE_BEST]
+                if proposed.gain > -WORTH
+            ]
+        )
+
+
+def _still(hypothesis: Hypothesis) -> Array:
+    """Parameters of a wind or current of zero in each trial."""
+    return np.where([estimate.run is None for estimate in hypothesis.estimated], hypothesis.prior[0], 0.0)
 
 
 def _polish(fitting: Fitting) -> None:
@@ -152,22 +195,31 @@ def _polish(fitting: Fitting) -> None:
     Scores at noises that have not converged differ by more than explanations do. An explanation that shares an effect
     with the best is also tried from the best's parameters: a descent may have stopped at another minimum.
     """
-    fitting.fit([Proposal(thetas_of(fitting.best()), [fitting.best().logs], LAST_ROUNDS)])
+    fitting.fit([refit(fitting.best(), [fitting.best().logs], LAST_ROUNDS)])
     best = fitting.best()
     best_thetas = thetas_of(best)
-    begins = [{name: theta} for name, theta in best_thetas.items() if len(best_thetas) > 1]
+    each = best.hypothesis.each
+    begins = [({name: theta}, each) for name, theta in best_thetas.items() if len(best_thetas) > 1]
     for fit in (fit for fit in fitting.found.values() if fit.score < best.score + _FAR or not fit.hypothesis.effects):
         thetas = thetas_of(fit)
-        begins += [thetas] if fit is not best else []
-        begins += [{name: best_thetas.get(name, theta) for name, theta in thetas.items()}] if len(thetas) > 1 else []
-    fitting.fit([Proposal(thetas, [best.logs], SAME_NOISE) for thetas in begins])
+        begins += [(thetas, fit.hypothesis.each)] if fit is not best else []
+        if len(thetas) > 1:
+            alike = {name for name in thetas if (name in fit.hypothesis.each) == (name in each)}
+            mixed = {name: best_thetas.get(name, theta) if name in alike else theta for name, theta in thetas.items()}
+            begins.append((mixed, fit.hypothesis.each))
+    fitting.fit(
+        [
+            Proposal(thetas, [best.logs], SAME_NOISE, each=tuple(name for name in differ if name in thetas))
+            for thetas, differ in begins
+        ]
+    )
     best = fitting.best()
     close = [
         fit
         for effects, fit in fitting.found.items()
         if fit is not best and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
     ]
-    fitting.fit([Proposal(thetas_of(fit), [fit.logs, best.logs], LAST_ROUNDS) for fit in close])
+    fitting.fit([refit(fit, [fit.logs, best.logs], LAST_ROUNDS) for fit in close])
 
 
 def _on_top_of(fitting: Fitting, base: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
-from scipy.stats import chi2, gamma
+from scipy.stats import chi2, gamma, norm
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
@@ -111,8 +111,17 @@ class Strange:
     excess: float
 
 
-def decide(search: Search) -> Decision:
-    """Return the verdict that the scores of a search support."""
+def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
+    """Return the verdict that the scores of a search support.
+
+    Parameters
+    ----------
+    search : Search
+    false_discovery : float
+        Largest probability with which a single name may be wrong, 1 - :data:`SUREST` to 1 - :data:`LIKELY`. An effect
+        whose own is larger is one of several candidates, so that of all names that are given alone no larger share is
+        wrong on average.
+    """
     none = search.none
     best = none
     single = next((fit for fit in search.fits if len(fit.hypothesis.effects) == 1 and is_significant(fit)), None)
@@ -126,7 +135,8 @@ def decide(search: Search) -> Decision:
     weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
     probabilities = {fit.hypothesis.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
     behind = ALIKE
-    if any(_confidence(probabilities, name) < LIKELY for name in best.hypothesis.effects):
+    unsure = {name for name in best.hypothesis.effects if _confidence(probabilities, name) < 1 - false_discovery}
+    if unsure:
         behind = max(ALIKE, -2 * TEMPER * np.log(RIVAL))
     alike = tuple(
         fit
@@ -138,6 +148,8 @@ def decide(search: Search) -> Decision:
         and len(fit.hypothesis.effects) <= max(len(best.hypothesis.effects), 1)
         and best is not none
     )
+    if unsure and not alike and false_discovery < 1 - LIKELY:
+        alike = tuple(fit for fit in search.fits if not unsure & set(fit.hypothesis.effects))[:1]
     strange = find_strangeness(search.likelihood, best)
     verdict = NO_EFFECT_MISSING if best is none else AMBIGUOUS if alike else MISSING
     return Decision(OUTSIDE_LIBRARY if strange else verdict, best, alike, probabilities, strange)
@@ -164,15 +176,29 @@ def is_significant(fit: ExplanationFit) -> bool:
         sizes = [
             abs(value - estimate.parameter.absent) / error if error > 0 else np.inf
             for estimate, value, error in zip(fit.hypothesis.estimated, fit.theta, errors, strict=True)
-            if estimate.effect == name and estimate.is_amplitude
+            if estimate.effect == name and estimate.is_amplitude and estimate.run is None
         ]
         if sizes and max(sizes) < STANDARD_ERRORS:
+            return False
+        if name in fit.hypothesis.each and not _differs_from_zero(fit, name):
             return False
         if EFFECTS[name].changes_on(fit.hypothesis.card) and _change(fit, name) < STANDARD_ERRORS:
             return False
         if EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS:
             return False
     return True
+
+
+def _differs_from_zero(fit: ExplanationFit, name: str) -> bool:
+    """Whether winds or currents of the single trials are together beyond :data:`STANDARD_ERRORS` (Wald's test)."""
+    places = [
+        place
+        for place, estimate in enumerate(fit.hypothesis.estimated)
+        if estimate.effect == name and estimate.run is not None
+    ]
+    sizes = fit.theta[places]
+    statistic = float(sizes @ np.linalg.solve(fit.covariance[np.ix_(places, places)], sizes))
+    return bool(chi2.logsf(statistic, len(places)) < norm.logsf(STANDARD_ERRORS) + np.log(2))
 
 
 def _change(fit: ExplanationFit, name: str) -> float:

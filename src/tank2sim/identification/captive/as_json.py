@@ -15,6 +15,13 @@ from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice
 from tank2sim.identification.captive.tables import by_the_papers_order, prediction_errors
+from tank2sim.identification.captive.uncertainty_budget import (
+    BUDGET_SOURCES,
+    COVERAGE_FACTOR,
+    blockage_speed,
+    sources_not_stated,
+    uncertainty_budget,
+)
 from tank2sim.records.campaigns import Campaign
 
 
@@ -34,6 +41,7 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         },
         "rigid_body": {"mass": card.mass, "yaw_inertia": card.yaw_inertia, "x_G": card.x_G},
         "derivatives": {name: _derivative(reduction, card, name) for name in card.entries},
+        "uncertainty_budget": _budget(reduction),
         "missing": card.missing,
         "warnings": warnings,
         "methods": {force: _methods(result) for force, result in reduction.forces.items()},
@@ -43,6 +51,10 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         },
         "spread": {force: _spread(result) for force, result in reduction.forces.items()},
         "systematic_errors": [{**asdict(error), "message": error.message} for error in reduction.systematic],
+        "force_delay": _delay(reduction),
+        "alignment": asdict(reduction.alignment) | {"shown": reduction.alignment.shown}
+        if reduction.alignment
+        else None,
         "trends": [asdict(trend) for result in reduction.forces.values() for trend in result.trends],
         "symmetry": {force: asdict(result.asymmetry) for force, result in reduction.forces.items() if result.asymmetry},
         "leave_one_out": {
@@ -63,6 +75,34 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         resistance = reduction.derivatives["X0"]
         found["resistance"] = {"X0": {"value": resistance.value, "standard_error": resistance.standard_error}}
     return found
+
+
+def _budget(reduction: Reduction) -> dict[str, Any]:
+    """The budget after ITTC 7.5-02-06-04: standard uncertainties (prime) and shares of the variance by source."""
+    return {
+        "coverage_factor": COVERAGE_FACTOR,
+        "sources": BUDGET_SOURCES,
+        "not_stated": sources_not_stated(reduction),
+        "blockage_speed_relative": blockage_speed(reduction),
+        "derivatives": {
+            row.name: {
+                "value": row.value,
+                "combined": row.combined,
+                "expanded": row.expanded,
+                "parts": row.parts,
+                "shares": row.shares,
+            }
+            for row in uncertainty_budget(reduction)
+        },
+    }
+
+
+def _delay(reduction: Reduction) -> dict[str, Any] | None:
+    """The delay of the forces behind the motion, s; None if the campaign cannot show it."""
+    if reduction.delay is None:
+        return None
+    corrected = any(error.corrected for error in reduction.systematic)
+    return {**asdict(reduction.delay), "corrected": corrected}
 
 
 def _choice(choice: Choice) -> dict[str, Any]:

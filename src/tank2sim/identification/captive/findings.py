@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
+from tank2sim.identification.captive.regression import solve
 from tank2sim.identification.captive.repeats import repeats
-from tank2sim.identification.captive.systematic import can_show_delay
+from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 
 _SHEET = 0.05
@@ -29,6 +31,7 @@ def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
         *_missing(reduction),
         *_physics(reduction),
         *_conventions(reduction),
+        *_alignment(reduction),
         *_unchecked(reduction),
     ]
     for force, result in reduction.forces.items():
@@ -121,7 +124,50 @@ def _unchecked(reduction: Reduction) -> Iterator[str]:
             "no other kind of run gives the same derivatives."
         )
     if any(run.run.oscillates for run in reduction.runs) and not can_show_delay(reduction.runs):
-        yield "It is not known whether the forces lag the motion: that needs oscillations at two frequencies or more."
+        effect = _effect_of_delay(reduction)
+        yield (
+            "It is not known whether the forces lag the motion, and the standard errors do not include it: that needs "
+            f"oscillations at two frequencies or more{effect}."
+        )
+    delay = reduction.delay
+    if delay is not None and not delay.alike:
+        channels = ", ".join(
+            f"{channel.force} in {channel.motion} {channel.size:.3g} ± {channel.standard_error:.2g} s"
+            for channel in delay.channels
+        )
+        yield (
+            f"The forces lag the motion by times that differ ({channels}): memory of the flow, or a fault of one "
+            "channel, not a delay of all; nothing is corrected for it."
+        )
+    elif delay is not None and not delay.supported and any(e.source == "force_delay" for e in reduction.systematic):
+        yield "Sway and yaw do not both show the delay: memory of the flow in one of them would look the same."
+
+
+def _alignment(reduction: Reduction) -> Iterator[str]:
+    """A zero of the drift angle that Y0 and N0 agree on."""
+    found = reduction.alignment
+    if found is None or not found.shown or "alignment_rad" in reduction.campaign.uncertainty.model_fields_set:
+        return
+    angle, error = math.degrees(found.angle_rad), math.degrees(found.standard_error_rad)
+    yield (
+        f"Y0 and N0 are those of a model turned by {angle:.3g} ± {error:.1g} deg against the recorded drift (or of a "
+        "hull that is as asymmetric): check its alignment; nothing is corrected, the standard errors of Y0 and N0 hold "
+        "it, and [uncertainty] alignment_deg states how well it is known."
+    )
+
+
+def _effect_of_delay(reduction: Reduction) -> str:
+    """What an unknown delay of 10 ms would do to accelerations, in % of them."""
+    moved = []
+    for name in ("Yvdot", "Nrdot"):
+        result = reduction.forces[name[0]]
+        if name in reduction.derivatives and name in result.solution.names:
+            used, solution = result.selection.equations, result.solution
+            shift = (solve(correct_delay(used, 0.01), solution.spread).values - solution.values)[
+                solution.names.index(name)
+            ]
+            moved.append(f"{name} by {abs(100 * shift / reduction.derivatives[name].value):.2g} %")
+    return f"; 10 ms would change {', '.join(moved)}" if moved else ""
 
 
 def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[str]:

@@ -8,12 +8,13 @@ complex. The numbers are prime, instantaneous, "hydrodynamic", starboard-positiv
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.alignment import AlignmentEstimate, alignment_estimate
 from tank2sim.identification.captive.contradictions import contradicted
 from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import SPEED_RANGE
@@ -25,7 +26,7 @@ from tank2sim.identification.captive.oscillation import (
     oscillations,
     run_frequency_parameter,
 )
-from tank2sim.identification.captive.regression import Solution, efficient_solution
+from tank2sim.identification.captive.regression import Solution, efficient_solution, solve
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.identification.captive.selection import Selection, select
 from tank2sim.identification.captive.stepwise import (
@@ -36,10 +37,17 @@ from tank2sim.identification.captive.stepwise import (
     stepwise,
 )
 from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
-from tank2sim.identification.captive.systematic import SystematicError, force_delays, gauge_gains
+from tank2sim.identification.captive.systematic import (
+    DelayEstimate,
+    SystematicError,
+    correct_delay,
+    delay_estimate,
+    force_delays,
+    gauge_gains,
+)
 from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.identification.captive.trends import Trend, trends
-from tank2sim.identification.captive.type_b import type_b_shifts
+from tank2sim.identification.captive.type_b import type_b_shifts, with_common_error
 from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
@@ -123,6 +131,10 @@ class ForceResult:
         Errors common to many runs that the campaign shows in this force.
     unchecked : tuple of str
         Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show.
+    timing_s : float
+        Delay of the forces that may be left, one standard deviation; 0 if it is stated, corrected or unknown.
+    alignment_rad : float
+        Zero of the drift angle that the campaign shows; 0 if it is stated or none is shown.
     """
 
     selection: Selection
@@ -134,6 +146,8 @@ class ForceResult:
     asymmetry: Asymmetry | None = None
     systematic: tuple[SystematicError, ...] = ()
     unchecked: tuple[str, ...] = ()
+    timing_s: float = 0.0
+    alignment_rad: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -160,6 +174,10 @@ class Reduction:
         Evaluation of single oscillation tests.
     missing : tuple of str
         Names in :data:`ESSENTIAL` that the campaign does not give.
+    delay : DelayEstimate or None
+        Of the forces as recorded, less ``[test] force_delay_s``; None if no oscillations at two frequencies show it.
+    alignment : AlignmentEstimate or None
+        The zero of the drift angle by Y0 and N0; None if the campaign does not give them.
     """
 
     campaign: Campaign
@@ -172,6 +190,8 @@ class Reduction:
     oscillations: tuple[OscillationDerivatives, ...]
     cubics: tuple[CubicByTwoWays, ...]
     missing: tuple[str, ...]
+    delay: DelayEstimate | None = None
+    alignment: AlignmentEstimate | None = None
 
     @property
     def systematic(self) -> tuple[SystematicError, ...]:
@@ -204,8 +224,27 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
         remedy = f"the first was left out: {messages[0]}" if messages else "give it runs"
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
     selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
-    delays = force_delays({force: selection.equations for force, selection in selections.items()})
-    forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
+    equations = {force: selection.equations for force, selection in selections.items()}
+    delay = delay_estimate(equations)
+    delays = force_delays(equations, delay)
+    if any(error.corrected for error in delays):
+        runs = [_advanced(run, delays[0].size) for run in runs]
+        used, not_used = _used_runs(campaign, moderated(runs), options)
+        selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
+    stated_keys = campaign.uncertainty.model_fields_set
+    stated = "force_delay_s" in stated_keys
+    timing = 0.0 if delays or stated or delay is None or not delay.alike else delay.possible_s
+    forces = {
+        force: replace(_force_result(campaign, selection, delays, options), timing_s=timing)
+        for force, selection in selections.items()
+    }
+    alignment = alignment_estimate(
+        campaign,
+        {force: forces[force].selection.equations for force in "YN"},
+        {force: forces[force].solution for force in "YN"},
+    )
+    if alignment is not None and alignment.shown and "alignment_rad" not in stated_keys:
+        forces = {force: replace(result, alignment_rad=alignment.angle_rad) for force, result in forces.items()}
     derivatives = {
         name: found for force in FORCE_COLUMNS for name, found in _derivatives(campaign, forces[force]).items()
     }
@@ -222,7 +261,16 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
         oscillations=alone,
         cubics=cubics([row for row in alone if row.run not in not_used]),
         missing=tuple(name for name in ESSENTIAL if name not in derivatives),
+        delay=delay,
+        alignment=alignment,
     )
+
+
+def _advanced(run: ReducedRun, delay_s: float) -> ReducedRun:
+    """A run reduced again with its forces a time earlier."""
+    if not run.run.oscillates:
+        return run
+    return reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + delay_s))
 
 
 def _refuse_impossible_body(campaign: Campaign) -> None:
@@ -291,9 +339,10 @@ def _force_result(
     solution = selection.solution
     unchecked: tuple[str, ...] = ()
     systematic = tuple(delay for delay in delays if selection.equations.force in delay.force)
-    if not systematic:
+    if all(error.corrected for error in systematic):
         rival = max((abs(trend.slope) / trend.standard_error for trend in found), default=0.0)
-        systematic, unchecked = gauge_gains(selected.equations, scatter_within_tests(selected.equations), rival)
+        gains, unchecked = gauge_gains(selected.equations, scatter_within_tests(selected.equations), rival)
+        systematic = (*systematic, *gains)
     within = scatter_within_tests(selection.equations)
     steps = stepwise(selection.equations, within, campaign.test.speed_mps)
     together = efficient_solution(selection.equations, within)
@@ -335,10 +384,18 @@ def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivativ
 def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str, float]]:
     """Change of each term of a force (prime), with its sign, by each error common to many runs: source to changes.
 
-    Stated errors (Type B) of one standard deviation, and the full errors that the campaign shows.
+    Stated errors (Type B) of one standard deviation, the delay of the forces that may be left, and the full errors
+    (delays, gains, the zero of the drift angle) that the campaign shows and that are not corrected.
     """
     used, solution = result.selection.equations, result.solution
     shown = {error.source: error.shifts(used, solution) for error in result.systematic}
+    if result.timing_s:
+        moved = solve(correct_delay(used, result.timing_s), solution.spread).values - solution.values
+        shown["force_delay"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
+    if result.alignment_rad:
+        turned = with_common_error(campaign, used, "alignment_rad", result.alignment_rad)
+        moved = solve(turned, solution.spread).values - solution.values
+        shown["alignment"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return type_b_shifts(campaign, used, solution) | shown
 
 

@@ -77,6 +77,12 @@ class Selection:
         return tuple(choice.name for choice in self.choices if choice.kept)
 
     @property
+    def widening(self) -> float:
+        """Student's t over the normal quantile, by which the errors are widened."""
+        free = len(self.equations.names) - len(self.equations.prior)
+        return float(stdtrit(max(1, len(self.equations.runs) - free), 0.975)) / _NORMAL
+
+    @property
     def solution(self) -> Solution:
         """All terms of the regression, its errors widened by Student's t over the normal quantile.
 
@@ -84,9 +90,7 @@ class Selection:
         degrees of freedom.
         """
         solution = solve(self.equations, self.spread)
-        free = len(self.equations.names) - len(self.equations.prior)
-        widened = float(stdtrit(max(1, len(self.equations.runs) - free), 0.975)) / _NORMAL
-        return replace(solution, covariance=solution.covariance * widened**2)
+        return replace(solution, covariance=solution.covariance * self.widening**2)
 
 
 def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_terms: bool = False) -> Selection:

@@ -30,14 +30,24 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
     for source, size in stated.items():
         if not size:
             continue
-        erring = _with_error(campaign, used, source, size)
+        erring = with_common_error(campaign, used, source, size)
         moved = solve(erring, solution.spread).values - solution.values
         found[source] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return found
 
 
-def _with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
-    """The equations with an error of one standard deviation."""
+def with_common_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
+    """The equations with an error common to the campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    used : CampaignEquations
+    source : str
+        A key of ``[uncertainty]``.
+    size : float
+        In the unit of the key.
+    """
     if source == "force_delay_s":
         return correct_delay(used, size)
     changed, altered = _with_altered_data(campaign, used.runs, source, size)
@@ -58,6 +68,7 @@ def _with_altered_data(
         "alignment_rad": lambda motion: replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size)),
         "rudder_rad": lambda motion: replace(motion, delta_rad=motion.delta_rad + size),
         "speed_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
+        "blockage_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
     }
     return campaign, [replace(run, motion=changes[source](run.motion)) for run in runs]
 

@@ -9,8 +9,7 @@ import tomlkit
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.form import YawRig
 from tank2sim.cards.reading import changed_text
-from tank2sim.cards.scaling import Scales, file_factor
-from tank2sim.cards.terms import known_term
+from tank2sim.cards.scaling import Scales
 from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
 from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
@@ -83,8 +82,7 @@ def with_nrdot(card: ManoeuvringCard, result: YawIdentification, method: str, le
         As :func:`known_added_inertia`.
     """
     value, error = nrdot_prime(result, method, length_m, tank_density(result))
-    scales = card.scales if card.model.scaling == "dimensional" else None
-    factor = file_factor(known_term("Nrdot"), scales, rudder_to_port=False)
+    factor = card.file_factor("Nrdot")
     key = card.places.get("Nrdot", "Nrdot")
     text = _replace_key(card.text, card.source, f"derivatives.{key}", value * factor, f"yaw rig, {method}")
     if error is not None:

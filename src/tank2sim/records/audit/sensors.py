@@ -17,7 +17,7 @@ from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noi
 from tank2sim.records.audit.weak import FALSE_ALARM
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step, with_signals
 
-MOTIONS = tuple(name for name in MEASURED_COLUMNS if not name.startswith("wind_"))
+MOTIONS = tuple(name for name in MEASURED_COLUMNS if not name.startswith(("wind_", "current_")))
 """Signals that inertia makes smooth; wind may jump."""
 SPIKE_SAMPLES = 3
 """A spike is this many samples long at most; what lasts longer is a step."""

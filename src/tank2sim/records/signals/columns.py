@@ -12,7 +12,9 @@ from tank2sim.units import from_si, to_si
 HELD_COLUMNS = frozenset({"delta_order_rad", "n_radps"})
 """Signals that hold until their next value: orders."""
 
-DIRECTION_COLUMNS = frozenset({"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
+DIRECTION_COLUMNS = frozenset(
+    {"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad", "current_direction_rad"}
+)
 """Signals that go round the compass: a step through north is not a jump."""
 
 _WORDS = {
@@ -34,6 +36,8 @@ _WORDS = {
     "wind_direction": "wind direction",
     "wind_rel_speed": "relative wind speed",
     "wind_rel_direction": "relative wind direction",
+    "current_speed": "current speed",
+    "current_direction": "current direction",
 }
 
 # Suffix in SI to the suffix in which the trial format writes it, and to the unit as it is read.

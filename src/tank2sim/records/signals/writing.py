@@ -16,7 +16,7 @@ from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.trials import Trial, with_signals
 
-_CIRCLE = frozenset({"cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
+_CIRCLE = frozenset({"cog_rad", "wind_direction_rad", "wind_rel_direction_rad", "current_direction_rad"})
 
 
 def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:

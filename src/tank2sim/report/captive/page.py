@@ -49,6 +49,7 @@ def reduction_page(found: Json) -> Page:
             tables=[_derivatives(derivatives)],
             notes=found["warnings"],
         ),
+        *_budget(found.get("uncertainty_budget")),
         PageSection(
             heading="Which terms, and why",
             text="Terms that the runs excite and that are not in the card.",
@@ -116,6 +117,43 @@ def _derivatives(derivatives: Json) -> PageTable:
         rows.append([name, *regression, *stepwise, derivative["origin"]])
     heads = ("", "regression", "±", "paper's order", "±", "from tests", "origin")
     return PageTable(caption="Prime system, times 10⁵", columns=[Column(title=head) for head in heads], rows=rows)
+
+
+def _budget(budget: Json) -> list[PageSection]:
+    """The uncertainty budget; nothing for a result of an older version."""
+    if not budget:
+        return []
+    sources: Mapping[str, str] = budget["sources"]
+    rows: list[list[Cell]] = [
+        [
+            name,
+            1e5 * row["value"],
+            *(100 * row["shares"][source] for source in sources),
+            1e5 * row["combined"],
+            1e5 * row["expanded"],
+        ]
+        for name, row in budget["derivatives"].items()
+    ]
+    columns = [
+        *(Column(title=""), Column(title="value")),
+        *(Column(title=source, unit="%", digits=3) for source in sources),
+        *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+    ]
+    meanings: list[list[Cell]] = [[source, words] for source, words in sources.items()]
+    tables = [
+        PageTable(
+            caption="Shares of the variance; values and uncertainties prime, times 10⁵", columns=columns, rows=rows
+        ),
+        PageTable(caption="Sources", columns=[Column(title=""), Column(title="")], rows=meanings),
+    ]
+    notes = []
+    if budget["not_stated"]:
+        notes.append(f"Not stated in [uncertainty], and taken as zero: {', '.join(budget['not_stated'])}.")
+    if budget["blockage_speed_relative"] and "blockage_relative" in budget["not_stated"]:
+        percent = 100 * budget["blockage_speed_relative"]
+        notes.append(f"By Schuster's formula the walls raise the speed past the model by {percent:.2g} %.")
+    text = "After ITTC 7.5-02-06-04: the combined uncertainty is the standard error of the result."
+    return [PageSection(heading="Uncertainty budget", text=text, tables=tables, notes=notes)]
 
 
 def _left_out(selection: Json) -> PageTable:

@@ -86,7 +86,7 @@ def gap_page(found: Json) -> Page:
         PageSection(
             heading="Verdict",
             text="\n\n".join([verdict_in_words(found), *verdict_context(found)]),
-            tables=[*_parameters(found), *_candidates(found), *_explanations(found)],
+            tables=[*_parameters(found), *_by_trial(found), *_candidates(found), *_explanations(found)],
             charts=drawn("rivals"),
         ),
         PageSection(
@@ -239,6 +239,25 @@ def _parameters(found: Json) -> list[PageTable]:
     heads = ("effect", "parameter", "value", "unit", "meaning")
     what = "What the best of the candidates would be" if found["verdict"] == AMBIGUOUS else "What was found"
     return [_table(f"{what}, ± one standard error", heads, rows)] if rows else []
+
+
+def _by_trial(found: Json) -> list[PageTable]:
+    """Winds and currents that differ from trial to trial."""
+    tables = []
+    for effect in found["effects"]:
+        rows: list[list[Cell]] = [
+            [
+                trial_name(row["trial"]),
+                "held out" if row["held_out"] else "fitted",
+                with_error(or_nan(row["speed_mps"]), or_nan(row["standard_errors"]["speed_mps"])),
+                with_error(or_nan(row["direction_deg"]), or_nan(row["standard_errors"]["direction_deg"])),
+            ]
+            for row in effect.get("by_trial") or []
+        ]
+        title = f"{effect_in_words(effect['name']).capitalize()} of each trial, ± one standard error"
+        heads = ("trial", "set", "speed, m/s", "direction, deg from north")
+        tables += [_table(title, heads, rows)] if rows else []
+    return tables
 
 
 def _candidates(found: Json) -> list[PageTable]:

@@ -95,7 +95,7 @@ def _sure(found: Json, name: str) -> float:
 
 
 def _joined(names: Sequence[str]) -> str:
-    return " with ".join(map(effect_in_words, names))
+    return " with ".join(map(effect_in_words, names)) or "nothing"
 
 
 def as_percent(probability: float | None) -> str:
@@ -122,7 +122,8 @@ def _found(found: Json) -> str:
         named = [[effect["name"] for effect in effects]] if effects else []
         candidates = [*named, *map(effects_of, found["alternatives"])]
         names = ", or ".join(dict.fromkeys(map(_joined, candidates)))
-        return f"Something is missing, but these data do not distinguish several effects: {names}."
+        missing = "Something is" if all(candidates) else "Something may be"
+        return f"{missing} missing, but these data do not distinguish several explanations: {names}."
     if verdict == COEFFICIENTS:
         return " ".join(["The coefficients of the card explain the gap: no effect is missing.", *_refitted(found)])
     if verdict == NO_EFFECT_MISSING:
@@ -146,8 +147,10 @@ def _refitted(found: Json) -> list[str]:
     }
     most = sorted(sizes, key=sizes.__getitem__, reverse=True)[:MOVED]
     moved = ", ".join(f"{name} by {sizes[name]:.1f}" for name in most)
+    company = " with it" if found["effects"] else ""
     words = (
-        f"{len(coefficients)} coefficients of the card were fitted with it: most moved {moved} of their standard errors"
+        f"{len(coefficients)} coefficients of the card were fitted{company}: "
+        f"most moved {moved} of their standard errors"
     )
     alone = found["misfit"].get("effect_alone")
     if alone:
@@ -163,6 +166,9 @@ def _with_values(effect: Json) -> str:
         words, value, unit, _ = parameter_cells(effect, name)
         values.append(f"{words} {value}{'' if unit == '-' else f' {unit}'}")
     words = effect_in_words(effect["name"])
+    if effect.get("by_trial"):
+        speeds = [or_nan(row["speed_mps"]) for row in effect["by_trial"]]
+        values.insert(0, f"of each trial its own, {min(speeds):.2g} to {max(speeds):.2g} m/s")
     return f"{words} ({', '.join(values)})" if values else words
 
 

@@ -54,6 +54,7 @@ RESULT_TYPES = (
         "Heading control", "autopilot", ("ship", "design", "gains"), ("design", "margins.at_design.phase_margin_deg")
     ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
+    ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType("Captive tests", "reduce", ("campaign", "derivatives"), ("test.speed_mps",)),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Towed vehicle", "tow", ("tows", "methods", "mass_kg"), ("readings",)),

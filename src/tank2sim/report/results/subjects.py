@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.captive.page import reduction_page
+from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
@@ -109,6 +110,7 @@ _PAGES: Mapping[str, _Page] = {
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),
+    "Captive run": _Page(run_page, {"runs": list, "repeats": list, "notices": list}),
     "Captive tests": _Page(
         reduction_page,
         {"plots": dict, "leave_one_out": dict, "selection": dict, "prediction_errors": dict, "model": dict}

@@ -109,7 +109,7 @@ def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
         signals = set(effect.measured_as.values())
         if signals and signals <= set(trial.signals) and all(entry.name != name for entry in card.effects):
             notices.append(
-                f"{trial.path.name}: {name} was measured, and the card has no effect {name!r}: it is not used"
+                f"{trial.path.name}: {name} was measured, and the card has no effect {name!r} that would use it"
             )
     rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
     empty = 0 if rudder is None else int(np.isnan(rudder).sum())

@@ -1,0 +1,336 @@
+"""One captive run by itself, as soon as it ends: Fourier coefficients with errors, averaged cycle, repeats.
+
+Fourier coefficients of a force F over whole periods of the motion, F = mean + sum_n (cos_n cos(n omega t) + sin_n
+sin(n omega t)), with t counted from a moment at which the leading velocity (v in pure sway, else r) is greatest, are
+those in which the SIMMAN workshops compare planar motion tests; their amplitude and phase do not depend on that choice
+but by n times its angle. Standard errors include coloured noise within the run
+(:mod:`tank2sim.identification.captive.harmonics`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tank2sim.arrays import Array
+from tank2sim.identification.captive.equations import rigid_body_force
+from tank2sim.identification.captive.harmonics import ReducedRun, reduced_run
+from tank2sim.identification.captive.motion import harmonic_basis
+from tank2sim.identification.captive.oscillation import OscillationDerivatives, oscillations
+from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+
+CYCLE_BINS = 72
+"""Parts of the averaged cycle, of 5 deg each. Project choice: the fifth harmonic then has 14 points."""
+SAME_MOTION = 0.02
+"""Relative difference of frequency, amplitude and speed within which two runs are repeats, as those of a campaign
+are (:mod:`tank2sim.identification.captive.repeats`)."""
+REPEATS_DIFFER = 0.01
+"""Probability below which repeats differ by more than the noise within them. Project choice."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FourierCoefficient:
+    """A Fourier coefficient of a run.
+
+    Parameters
+    ----------
+    signal : str
+        ``X``, ``Y``, ``N`` as measured (hydrodynamic sense), ``X_water`` ... without the body's inertia, or ``v``,
+        ``r``, ``speed``, ``delta``.
+    unit : str
+        ``N``, ``N m``, ``m/s``, ``rad/s`` or ``rad``.
+    order : int
+        0 for the mean.
+    cosine, sine : float
+        Of the mean ``cosine`` is the mean and ``sine`` is 0.
+    cosine_error, sine_error : float
+        Standard errors; 0 for motions, which are fitted as the mechanism makes them.
+    """
+
+    signal: str
+    unit: str
+    order: int
+    cosine: float
+    sine: float
+    cosine_error: float
+    sine_error: float
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude; the size of the mean for order 0."""
+        return math.hypot(self.cosine, self.sine)
+
+    @property
+    def amplitude_error(self) -> float:
+        """Standard error of the amplitude, to first order."""
+        if self.amplitude == 0.0:
+            return math.hypot(self.cosine_error, self.sine_error)
+        return math.hypot(self.cosine * self.cosine_error, self.sine * self.sine_error) / self.amplitude
+
+    @property
+    def phase_rad(self) -> float:
+        """Phase by which it lags the leading velocity: a cos(n omega t - phase)."""
+        return math.atan2(self.sine, self.cosine)
+
+    @property
+    def phase_error_rad(self) -> float:
+        """Standard error of the phase, to first order; pi without an amplitude."""
+        if self.amplitude == 0.0:
+            return math.pi
+        error = math.hypot(self.sine * self.cosine_error, self.cosine * self.sine_error) / self.amplitude**2
+        return min(error, math.pi)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AveragedCycle:
+    """A force over the phase of the motion, averaged over the periods of a run.
+
+    Parameters
+    ----------
+    phase_rad : array, (bins,)
+        Middle of each bin, from the greatest leading velocity.
+    mean, deviation, fit : array, (bins,)
+        Mean, standard deviation between readings of the bin, and the harmonics; N or N m. nan in an empty bin.
+    count : array, (bins,)
+        Readings.
+    """
+
+    phase_rad: Array
+    mean: Array
+    deviation: Array
+    fit: Array
+    count: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SingleRun:
+    """One run reduced by itself.
+
+    Parameters
+    ----------
+    reduced : ReducedRun
+    coefficients : tuple of FourierCoefficient
+    cycles : mapping
+        ``X``, ``Y``, ``N`` to the averaged cycle; empty for a steady run.
+    residual_rms : mapping
+        Force to the root mean square of record less harmonics and trend, N or N m.
+    derivatives : OscillationDerivatives or None
+        Of an oscillating run whose model is known, by its first and third harmonics.
+    faults : tuple of str
+        What contradicts the record.
+    """
+
+    reduced: ReducedRun
+    coefficients: tuple[FourierCoefficient, ...]
+    cycles: Mapping[str, AveragedCycle]
+    residual_rms: Mapping[str, float]
+    derivatives: OscillationDerivatives | None
+    faults: tuple[str, ...]
+
+    def coefficient(self, signal: str, order: int) -> FourierCoefficient:
+        """The coefficient of a signal and order.
+
+        Raises
+        ------
+        KeyError
+            There is none.
+        """
+        for found in self.coefficients:
+            if (found.signal, found.order) == (signal, order):
+                return found
+        raise KeyError(f"{signal} {order}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatedCoefficient:
+    """A Fourier coefficient in repeats of a run.
+
+    Parameters
+    ----------
+    signal, unit, order, part
+        ``part`` is ``mean``, ``cos`` or ``sin``.
+    values : tuple of float
+        In the order of the runs.
+    mean, deviation : float
+        Over the runs; the standard deviation of one run.
+    expected : float
+        Deviation that the noise within the runs explains.
+    chance : float
+        Probability of a larger scatter by that noise alone.
+    """
+
+    signal: str
+    unit: str
+    order: int
+    part: str
+    values: tuple[float, ...]
+    mean: float
+    deviation: float
+    expected: float
+    chance: float
+
+
+def single_run(run: CaptiveRun, campaign: Campaign | None) -> SingleRun:
+    """Reduce one run.
+
+    Parameters
+    ----------
+    run : CaptiveRun
+    campaign : Campaign or None
+        Model and test; without them no inertia is removed and no derivatives are given.
+
+    Raises
+    ------
+    InputError
+        An oscillating run has no whole period or too few readings a period.
+    """
+    reduced = reduced_run(run)
+    faults = [*(record_faults(campaign, run) if campaign else ()), *reduced_faults(reduced)]
+    coefficients = [*_motion_coefficients(reduced)]
+    for force in FORCE_COLUMNS:
+        fit = reduced.fits[force]
+        errors = np.sqrt(np.diag(fit.covariance))
+        coefficients += _pairs(force, _unit_of(force), fit.coefficients, errors)
+    if campaign is not None:
+        inertial = rigid_body_force(campaign, reduced.motion)
+        for force in FORCE_COLUMNS:
+            fit = reduced.fits[force]
+            water = fit.coefficients.copy()
+            water[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
+            errors = np.sqrt(np.diag(fit.covariance))
+            coefficients += _pairs(f"{force}_water", _unit_of(force), water, errors)
+    return SingleRun(
+        reduced=reduced,
+        coefficients=tuple(coefficients),
+        cycles={force: averaged_cycle(reduced, force) for force in FORCE_COLUMNS} if run.oscillates else {},
+        residual_rms={force: float(np.sqrt(np.mean(reduced.fits[force].residual ** 2))) for force in FORCE_COLUMNS},
+        derivatives=oscillations(campaign, [reduced])[0] if campaign is not None and run.oscillates else None,
+        faults=tuple(str(fault) for fault in faults),
+    )
+
+
+def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
+    """A force averaged over the periods of a run, by phase.
+
+    The mean of a bin is that of the harmonics at its middle and of the residuals inside it: the curvature of the force
+    over the bin does not bias it, and a trend of the zero does not widen it.
+
+    Parameters
+    ----------
+    run : ReducedRun
+        An oscillating run.
+    force : str
+        ``X``, ``Y`` or ``N``.
+    """
+    fit = run.fits[force]
+    waves = [place for place, label in enumerate(run.labels) if label != "trend"]
+    # Phase as recorded: the time of the motion has the delay of the forces taken out, and so have the harmonics.
+    phase = np.mod(run.motion.frequency_radps * run.motion.time_s, 2 * math.pi)
+    place = np.minimum((phase / (2 * math.pi) * CYCLE_BINS).astype(int), CYCLE_BINS - 1)
+    count = np.bincount(place, minlength=CYCLE_BINS).astype(float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        residual = np.bincount(place, fit.residual, CYCLE_BINS) / count
+        square = np.bincount(place, fit.residual**2, CYCLE_BINS) / count
+        spread = np.sqrt(np.maximum(square - residual**2, 0.0) * count / (count - 1))
+    middle = (np.arange(CYCLE_BINS) + 0.5) * 2 * math.pi / CYCLE_BINS
+    harmonics = harmonic_basis(middle, 1.0, len(waves) // 2) @ fit.coefficients[waves]
+    return AveragedCycle(
+        phase_rad=middle,
+        mean=harmonics + residual,
+        deviation=np.where(np.isfinite(spread), spread, np.nan),
+        fit=harmonics,
+        count=count,
+    )
+
+
+def same_test(runs: Sequence[SingleRun]) -> bool:
+    """True for repeats of one test: motions whose Fourier coefficients are the same within :data:`SAME_MOTION`."""
+    first, *others = runs
+    for other in others:
+        if other.reduced.run.type != first.reduced.run.type:
+            return False
+        pair = first.reduced.motion, other.reduced.motion
+        frequencies = [motion.frequency_radps for motion in pair]
+        if abs(frequencies[1] - frequencies[0]) > SAME_MOTION * frequencies[0]:
+            return False
+        for signal, order, scale in (("v", 0, 0.1), ("v", 1, 0.1), ("r", 0, 0.1), ("r", 1, 0.1), ("speed", 0, 0.0)):
+            if order > 0 and not frequencies[0]:
+                continue
+            a, b = (run.coefficient(signal, order).amplitude for run in (first, other))
+            speed = pair[0].mean_speed_mps
+            if abs(b - a) > SAME_MOTION * max(a, scale * speed):
+                return False
+        if abs(first.coefficient("delta", 0).cosine - other.coefficient("delta", 0).cosine) > math.radians(0.2):
+            return False
+    return True
+
+
+def repeated_coefficients(runs: Sequence[SingleRun]) -> tuple[RepeatedCoefficient, ...]:
+    """Fourier coefficients of the forces in repeats of one run: their scatter, and what their noise explains."""
+    found = []
+    for first in runs[0].coefficients:
+        if first.signal not in FORCE_COLUMNS:
+            continue
+        same = [run.coefficient(first.signal, first.order) for run in runs]
+        parts = (("mean", "cosine"),) if first.order == 0 else (("cos", "cosine"), ("sin", "sine"))
+        for part, key in parts:
+            values = np.array([getattr(each, key) for each in same])
+            errors = np.array([getattr(each, f"{key}_error") for each in same])
+            weights = errors**-2.0
+            scatter = float(np.sum(weights * (values - np.sum(weights * values) / weights.sum()) ** 2))
+            found.append(
+                RepeatedCoefficient(
+                    signal=first.signal,
+                    unit=first.unit,
+                    order=first.order,
+                    part=part,
+                    values=tuple(values.tolist()),
+                    mean=float(values.mean()),
+                    deviation=float(values.std(ddof=1)),
+                    expected=float(np.sqrt(np.mean(errors**2))),
+                    chance=float(chdtrc(len(values) - 1, scatter)),
+                )
+            )
+    return tuple(found)
+
+
+def _unit_of(force: str) -> str:
+    return "N m" if force == "N" else "N"
+
+
+def _motion_coefficients(run: ReducedRun) -> list[FourierCoefficient]:
+    motion = run.motion
+    found = []
+    for signal, unit, values in (
+        ("v", "m/s", motion.v_mps),
+        ("r", "rad/s", motion.r_radps),
+        ("speed", "m/s", motion.speed_mps),
+        ("delta", "rad", motion.delta_rad),
+    ):
+        coefficients = run.projected(values[:, None])[:, 0]
+        found += _pairs(signal, unit, coefficients, np.zeros(len(coefficients)))
+    return found
+
+
+def _pairs(signal: str, unit: str, values: Array, errors: Array) -> list[FourierCoefficient]:
+    """Mean and pairs of cosine and sine; what follows the last pair (the trend) is left out."""
+    found = []
+    for order in range((len(values) - 1) // 2 + 1):
+        cosine, sine = (0, None) if order == 0 else (2 * order - 1, 2 * order)
+        found.append(
+            FourierCoefficient(
+                signal=signal,
+                unit=unit,
+                order=order,
+                cosine=float(values[cosine]),
+                sine=0.0 if sine is None else float(values[sine]),
+                cosine_error=float(errors[cosine]),
+                sine_error=0.0 if sine is None else float(errors[sine]),
+            )
+        )
+    return found

@@ -1,0 +1,272 @@
+"""Tables of captive runs in the files of any tank: text of any layout, MATLAB, HDF5, TDMS, with a map of columns."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError, close_name
+from tank2sim.records.binary_tables import RawColumn, binary_columns
+from tank2sim.records.campaign_form import ColumnEntry, FilesSection
+from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
+from tank2sim.records.spelt_units import unit_factor
+from tank2sim.records.text_layout import WHITESPACE, cells_of, decoded_text, text_layout
+from tank2sim.units import to_si
+
+RUN_QUANTITIES = {
+    "t": "s",
+    "y": "m",
+    "psi": "rad",
+    "v": "mps",
+    "r": "radps",
+    "speed": "mps",
+    "delta": "rad",
+    "X": "N",
+    "Y": "N",
+    "N": "Nm",
+}
+"""Quantities of a captive run, and the SI unit of each as the names of columns end with it."""
+
+_SEPARATORS = {"tab": "\t", "blanks": WHITESPACE}
+
+
+@dataclass(frozen=True)
+class _MappedColumn:
+    """A column of the file as a quantity: value in SI = factor (recorded - offset)."""
+
+    heading: str
+    quantity: str
+    factor: float
+    offset: float
+
+
+def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: FilesSection) -> CsvTable:
+    """Read the table of a captive run in SI, its columns named ``t_s``, ``Y_N`` and so on.
+
+    A CSV with commas and a column ``t_s`` needs no map. In any other file a column is known by the map, or by its name
+    if that is one of :data:`RUN_QUANTITIES` with a unit: in the name (``Y_kN``, ``Y [kN]``), in a row of units, or in
+    the property of a channel.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    columns : mapping
+        Name of a column in the file to its quantity, as ``[columns]`` of the campaign has it.
+    files : FilesSection
+        What the campaign says of the layout.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read; a column of the map is not in it, has no unit, or a unit of another kind; or two
+        columns are one quantity.
+    """
+    raw = binary_columns(path)
+    if raw is not None:
+        return _mapped(_table_of_arrays(path, raw), {column.name: column.unit for column in raw}, columns)
+    if not columns and files == FilesSection() and _is_plain(path):
+        return read_table(path).si()
+    table, units = _text_table(path, files)
+    return _mapped(table, units, columns)
+
+
+def _is_plain(path: Path) -> bool:
+    """True for the CSV that needs no map; also for a file that :func:`read_table` explains best."""
+    lines = path.read_bytes().decode("utf-8-sig", errors="replace").splitlines()
+    head = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
+    names = [name.strip() for name in head.split(",")]
+    return not head or (("t_s" in names or "t_ms" in names) and "\t" not in head and ";" not in head)
+
+
+def _table_of_arrays(path: Path, raw: Sequence[RawColumn]) -> CsvTable:
+    columns = {column.name: column.values for column in raw}
+    for name, values in columns.items():
+        if np.isinf(values).any() or (np.abs(values) > LARGEST).any():
+            raise InputError(path, f"column {name}", "has a number that is too large", f"at most {LARGEST:g} can be")
+    return CsvTable(path, columns, np.arange(1, len(raw[0].values) + 1, dtype=np.int64))
+
+
+def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, str]]:
+    """Columns by their names in the file, and the units of its row of units."""
+    text = decoded_text(path.read_bytes())[0]
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
+    separator = _SEPARATORS.get(files.separator or "", files.separator or "")
+    comma = None if files.decimal is None else files.decimal == ","
+    if files.widths:
+        ends = np.cumsum(files.widths).tolist()
+        cut = [[line[begin:end].strip() for begin, end in zip([0, *ends], ends, strict=False)] for line in lines]
+        lines = [";".join(cells) if any(cells) else "" for cells in cut]
+        separator = ";"
+    layout = text_layout(path, lines, separator, comma)
+    names = list(layout.names)
+    if files.names:
+        if len(files.names) != len(names):
+            problem = f"are {len(files.names)}, and {path.name} has {len(names)} columns"
+            raise InputError(path, "files.names", problem, "name each column")
+        names = list(files.names)
+    body = [
+        (number, line.strip(" ") if layout.separator != WHITESPACE else line)
+        for number, line in enumerate(lines, start=1)
+        if number > layout.skip and line.strip() and not line.startswith("#")
+    ]
+    rows = [_canonical(path, number, line, layout.separator, layout.comma) for number, line in body]
+    if all(row.endswith(",") for row in rows) and all(row.count(",") == len(names) for row in rows):
+        rows = [row[:-1] for row in rows]  # a separator after the last column
+    table = table_of_rows(path, names, rows, np.array([number for number, _ in body], dtype=np.int64))
+    empty = [name for name, values in table.columns.items() if np.isnan(values).all()]
+    table = replace(table, columns={name: table.columns[name] for name in names if name not in empty})
+    return table, dict(zip(names, layout.units, strict=False))
+
+
+def _canonical(path: Path, number: int, line: str, separator: str, comma: bool) -> str:
+    """A row with commas between cells and points in numbers."""
+    if comma and "." in line:
+        remedy = "write numbers with one decimal sign and nothing between thousands, or give [files] decimal"
+        raise InputError(path, f"line {number}", "has points and decimal commas", remedy)
+    if '"' in line:
+        cells = cells_of(line, separator)
+    elif separator == WHITESPACE:
+        cells = line.split()
+    else:
+        if separator == ",":
+            return line
+        return (line.replace(",", ".") if comma else line).replace(separator, ",")
+    return ",".join(cell.replace(",", ".") if comma else cell for cell in cells)
+
+
+def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, ColumnEntry | str]) -> CsvTable:
+    """The table in SI with the quantities of a run alone."""
+    found: dict[str, _MappedColumn] = {}
+    for stated, entry in columns.items():
+        heading = _heading(table, stated)
+        column = _stated(table, heading, units.get(heading, ""), entry)
+        if column.quantity in found:
+            both = f"columns {found[column.quantity].heading} and {heading}"
+            raise InputError(table.path, both, f"are both {column.quantity}", "take one out of [columns]")
+        found[column.quantity] = column
+    mapped = {column.heading for column in found.values()}
+    for heading in table.columns:
+        if heading in mapped:
+            continue
+        named = _by_name(heading, units.get(heading, ""))
+        quantity = _without_unit(_last_part(heading))
+        if named is None and quantity in RUN_QUANTITIES and quantity not in found:
+            remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
+            raise InputError(table.path, f"column {heading}", f"has no unit of {quantity}", remedy)
+        if named is not None and named.quantity not in found:
+            found[named.quantity] = named
+        elif named is not None and not columns:
+            both = f"columns {found[named.quantity].heading} and {heading}"
+            raise InputError(table.path, both, "are one quantity in two units", "delete one of them")
+    if "waveform time" in table.columns and "t" not in found:
+        found["t"] = _MappedColumn("waveform time", "t", 1.0, 0.0)
+    if not found or "t" not in found:
+        present = ", ".join(table.columns)
+        problem = "no column is known" if not found else "no column is the time"
+        raise InputError(table.path, "header", problem, f"name them in [columns] of the campaign; there are: {present}")
+    values = {_si_name(column.quantity): _in_si(table, column) for column in found.values()}
+    headings = {_si_name(column.quantity): column.heading for column in found.values()}
+    return replace(table, columns=values, headings=headings)
+
+
+def _in_si(table: CsvTable, column: _MappedColumn) -> Array:
+    values = table.columns[column.heading]
+    if column.factor == 1.0 and not column.offset:
+        return values
+    return np.asarray(column.factor * (values - column.offset))
+
+
+def _si_name(quantity: str) -> str:
+    return f"{quantity}_{RUN_QUANTITIES[quantity]}"
+
+
+def _heading(table: CsvTable, stated: str) -> str:
+    """The column that a name of the map means: the name in full, without its unit, or the end of its path."""
+    if stated in table.columns:
+        return stated
+    for bare in (lambda name: name, _without_unit):
+        matches = [name for name in table.columns if re.search(rf"(^|[/.]){re.escape(stated)}$", bare(name))]
+        if len(matches) == 1:
+            return matches[0]
+    raise InputError(table.path, "header", f"there is no column {stated}", close_name(stated, table.columns))
+
+
+def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry | str) -> _MappedColumn:
+    """A column as the map states it."""
+    place = f"columns.{heading}"
+    if isinstance(entry, str):
+        entry = ColumnEntry(quantity=entry)
+    quantity, factor = _quantity(entry.quantity)
+    if not quantity:
+        raise InputError(
+            table.path, place, f"{entry.quantity} is not a quantity", f"known are: {', '.join(RUN_QUANTITIES)}"
+        )
+    suffix = RUN_QUANTITIES[quantity]
+    in_file = unit_in_file or _unit_of_heading(heading)
+    known = unit_factor(in_file, suffix) if in_file else None
+    if entry.unit is not None:
+        factor = unit_factor(entry.unit, suffix)
+        if factor is None:
+            raise InputError(table.path, place, f"{entry.unit} is not a unit of {quantity}", f"its SI unit is {suffix}")
+    if entry.factor is not None:
+        return _MappedColumn(heading, quantity, entry.sign * entry.factor * (factor or 1.0), entry.offset)
+    if factor is not None and known is not None and not math.isclose(factor, known, rel_tol=1e-6):
+        problem = f"is in {in_file} by the file, and in another unit by the map"
+        raise InputError(table.path, place, problem, "correct the unit, or give a factor to SI")
+    if factor is None and known is None:
+        problem = f"has no unit of {quantity}" + (f" ({in_file} is none)" if in_file else "")
+        raise InputError(table.path, place, problem, f"give one in [columns]: unit = '{suffix}'")
+    return _MappedColumn(heading, quantity, entry.sign * (factor if factor is not None else known or 1.0), entry.offset)
+
+
+def _quantity(name: str) -> tuple[str, float | None]:
+    """Quantity and factor of ``Y_kN`` (1000), ``Y_N`` (1) or ``Y`` (None); an empty name if it is none."""
+    if name in RUN_QUANTITIES:
+        return name, None
+    stem, _, suffix = name.partition("_")
+    if stem not in RUN_QUANTITIES:
+        return "", None
+    renamed, angle = to_si(name, 1.0)
+    if renamed == _si_name(stem):
+        return stem, angle
+    factor = unit_factor(suffix.replace("ps", "/s") if suffix.endswith("ps") else suffix, RUN_QUANTITIES[stem])
+    return (stem, factor) if factor is not None else ("", None)
+
+
+def _by_name(heading: str, unit: str) -> _MappedColumn | None:
+    """A column that its own name shows, with a unit."""
+    last = _last_part(heading)
+    for name in dict.fromkeys((last, _without_unit(last))):
+        quantity, factor = _quantity(name)
+        if not quantity:
+            continue
+        spelt = unit or _unit_of_heading(heading)
+        known = unit_factor(spelt, RUN_QUANTITIES[quantity]) if spelt else None
+        if factor is not None and (known is None or math.isclose(known, factor, rel_tol=1e-6)):
+            return _MappedColumn(heading, quantity, factor, 0.0)
+        if factor is None and known is not None:
+            return _MappedColumn(heading, quantity, known, 0.0)
+    return None
+
+
+def _last_part(heading: str) -> str:
+    """The end of a path such as ``group/channel [m/s]``, whose unit is not a part of it."""
+    bare = _without_unit(heading)
+    return re.split(r"[/.]", bare)[-1] + heading[len(bare) :]
+
+
+def _without_unit(heading: str) -> str:
+    return re.sub(r"\s*[\[(][^\[(]*[\])]\s*$", "", heading).strip()
+
+
+def _unit_of_heading(heading: str) -> str:
+    match = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$", heading)
+    return match[1] if match else ""

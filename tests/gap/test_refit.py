@@ -1,0 +1,79 @@
+"""Coefficients fitted together with an effect: card and covariance in the conventions of the card's own file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.api.gap import identified_from, improved_files
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.reading import changed_text
+from tank2sim.dynamics import build
+from tank2sim.gap.inference.fit import CoefficientEstimates
+from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
+from tank2sim.gap.outcome.refit import refit_coefficients
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tests.records.motions import motion, trial
+
+ESTIMATES = CoefficientEstimates(
+    ("derivatives.Yv", "derivatives.Yd", "steering.max_rate", "derivatives.Nr"),
+    np.array([-1e-4, 2e-5, 0.01, 5e-5]),
+    np.array(
+        [
+            [4e-8, 1e-8, 0.0, 0.0],
+            [1e-8, 9e-8, 0.0, -3e-9],
+            [0.0, 0.0, 1e-6, 0.0],
+            [0.0, -3e-9, 0.0, 1e-8],
+        ]
+    ),
+)
+"""Rudder positive to starboard."""
+
+
+def test_the_covariance_of_refitted_coefficients_is_written_with_the_sign_of_the_file(
+    tmp_path: Path, mariner_card: ManoeuvringCard
+) -> None:
+    port = changed_text(mariner_card.text, "ship.toml", {"model.rudder_sign": "port"})
+    path = tmp_path / "ship.toml"
+    path.write_text(port)
+    card = read_card(path)
+    assert isinstance(card, ManoeuvringCard)
+    refitted, base = refit_coefficients(card, build(card), ESTIMATES)
+    assert [entry.name for entry in refitted] == ["Yv", "Yd", "Nr"]  # the gear is not written
+    assert abs(refitted[1].value - card.derivatives["Yd"] - 2e-5) < 1e-6
+    effect = [("rudder_bias", {"angle_rad": 0.02}, {"angle_rad": 0.001})]
+    text = card_with_effects_text(add_effects_to_card(base, effect), effect, ["turn"], refitted=len(refitted))
+    assert text.splitlines()[0].startswith("# rudder_bias added, 3 coefficients refitted")
+    files, notices = improved_files(base, text, tmp_path / "improved.toml")
+    assert not notices
+    for file, content in files.items():
+        file.write_text(str(content))
+    improved = read_card(tmp_path / "improved.toml")
+    found = read_covariance(improved)
+    assert found is not None and found.names == ("derivatives.Yv", "derivatives.Yd", "derivatives.Nr")
+    signs = np.array([1.0, -1.0, 1.0])
+    rows = [0, 1, 3]
+    np.testing.assert_allclose(found.matrix, ESTIMATES.covariance[np.ix_(rows, rows)] * np.outer(signs, signs))
+    assert isinstance(improved, ManoeuvringCard)
+    np.testing.assert_allclose(improved.standard_error("Yd"), 3e-4, rtol=2e-3)
+
+
+def test_a_card_with_refitted_coefficients_alone_says_so(mariner_card: ManoeuvringCard) -> None:
+    _, base = refit_coefficients(mariner_card, build(mariner_card), ESTIMATES)
+    text = card_with_effects_text(base, [], ["turn20", "zigzag"], refitted=3)
+    assert text.splitlines()[0] == "# 3 coefficients refitted by tank2sim gap from turn20, zigzag"
+    assert card_with_effects_text(mariner_card, [], ["turn20"]) == mariner_card.text
+
+
+def test_a_card_identified_from_the_same_trials_is_noticed(mariner_card: ManoeuvringCard) -> None:
+    turn, zigzag = (trial(motion(kind)) for kind in ("turn", "zigzag"))
+    seen = parse_card(with_fitted_trials(mariner_card.text, "ship.toml", [turn]), "ship.toml")
+    assert isinstance(seen, ManoeuvringCard)
+    both = Measured((replace(turn, path=Path("renamed.csv")), zigzag), "order", ())
+    (notice,) = identified_from(seen, both)
+    assert "renamed" in notice and zigzag.name not in notice
+    assert identified_from(mariner_card, both) == []
