@@ -123,7 +123,10 @@ def _is_steady(run: Trajectory, length: float) -> bool:
     if before < run.t[0]:
         return False
     then = int(np.searchsorted(run.t, before))
-    same = [abs(run[name][-1] - run[name][then]) < STEADY_SHARE * abs(run[name][-1]) for name in ("motion.r", "motion.speed")]
+    same = [
+        abs(run[name][-1] - run[name][then]) < STEADY_SHARE * abs(run[name][-1])
+        for name in ("motion.r", "motion.speed")
+    ]
     return all(same)
 
 

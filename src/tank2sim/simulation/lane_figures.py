@@ -133,7 +133,7 @@ class LaneManoeuvres:
         else:
             figures = self._zigzag(found, p, starts, (manoeuvre, plan.limit))
         fine = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
-        for number in np.flatnonzero(found.ended == UNKNOWN):
+        for number in np.flatnonzero(found.ended == UNKNOWN).tolist():
             fine[number] = self._by_itself(manoeuvre, p[number], duration_s, figures, number)
         for values in figures.values():
             values[~fine] = np.nan
@@ -200,9 +200,7 @@ class LaneManoeuvres:
             "time_180_s": half,
         } | {name: np.where(steady, values, np.nan) for name, values in at_last.items()}
 
-    def _zigzag(
-        self, found: LaneResults, p: Array, starts: Array, asked: tuple[Zigzag, int]
-    ) -> dict[str, Array]:
+    def _zigzag(self, found: LaneResults, p: Array, starts: Array, asked: tuple[Zigzag, int]) -> dict[str, Array]:
         (zigzag, limit), count = asked, len(p)
         side, length = math.copysign(1.0, zigzag.rudder), p[:, self.model.parameter_names.index("ship.length")]
         course = self._column(starts, "motion.psi")

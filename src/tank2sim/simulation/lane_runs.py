@@ -228,7 +228,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           found->speeds[k * 4 + 2] = LANE(fastest, l);
           found->speeds[k * 4 + 3] = LANE(speed, l);
           /* The sample two lengths before the end: samples are on the grid, but for the last. */
-          const double velocity = LANE(speed, l), earlier = t_next - 2 * lengths[k] / (velocity > 1e-9 ? velocity : 1e-9);
+          const double earlier = t_next - 2 * lengths[k] / fmax(LANE(speed, l), 1e-9);
           if (plan->most == 1 && earlier >= 0) {{
             long at = (long) ceil(earlier / h);
             while (at > 0 && (at - 1) * h >= earlier) --at;

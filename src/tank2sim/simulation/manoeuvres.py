@@ -37,8 +37,8 @@ SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -
 """Rudder angles of a direct spiral on its way to port, deg; it returns through the same angles."""
 
 LONGEST_LENGTHS = 150.0
-"""Longest run of a turning circle or zigzag without a given duration, L/u0. Project choice: three times what a slow ship
-needs."""
+"""Longest run of a turning circle or zigzag without a given duration, L/u0. Project choice: some three times what slow
+ships need."""
 
 FULL_ASTERN = 0.7
 """Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. Project choice;

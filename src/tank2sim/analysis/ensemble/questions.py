@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.stability.imo import imo_criteria
@@ -16,12 +18,14 @@ from tank2sim.cards.reading import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import study_model
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.ship import mass_fault
+from tank2sim.dynamics.ship import mass_fault, mass_faults
 from tank2sim.errors import InputError
+from tank2sim.native.lanes import NoLanesError
 from tank2sim.simulation.card_range import Numbers, single_figures
-from tank2sim.simulation.ensemble import Ask, MemberResult
-from tank2sim.simulation.figures import Figures, figures_of
+from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult
+from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.lane_figures import LaneManoeuvres, runs_in_lanes
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
@@ -43,8 +47,8 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 EVERY = 10
 """Steps between two kept samples: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
-_LONGEST = 200_000
-"""Most steps of a run in a joint batch: the batch then takes some 40 MB (project choice)."""
+LANE_BATCH = 256
+"""Members of a batch that is run in lanes: with its crossings and histories it takes 10 MB (project choice)."""
 
 # Only the outputs that the figures need: the others would take longer than the motion itself.
 _READ_OFF: Mapping[type, tuple[str, ...]] = {
@@ -82,20 +86,22 @@ class OfManoeuvre:
     duration_s: float | None
     times: Array
 
-    def prepared(self) -> Ask:
-        """See :class:`tank2sim.simulation.ensemble.Question`."""
-        model = _reading_off(study_model(self.ship.card()), *_READ_OFF.get(type(self.manoeuvre), ()))
-        integrator = Integrator(model, every=EVERY)
-        steps = (self.duration_s or math.inf) / model.step_s
-        whole = steps <= _LONGEST and abs(steps - round(steps)) < 1e-9 * steps
-        if isinstance(self.manoeuvre, Turn) and whole:
-            return self._held(integrator, self.manoeuvre, round(steps))
-        return _each(self._driven(integrator))
+    @property
+    def batch(self) -> int:
+        """Members of a batch."""
+        return LANE_BATCH if runs_in_lanes(self.manoeuvre) else BATCH
 
-    def _driven(self, integrator: Integrator) -> AskOne:
-        """Single runs of the members, for a manoeuvre with events."""
-        model = integrator.model
-        defaults = _parameters(model)
+    def prepared(self) -> Ask | AskTogether:
+        """See :class:`tank2sim.simulation.ensemble.Question`."""
+        model = study_model(self.ship.card())
+        if runs_in_lanes(self.manoeuvre) and {name for name, _ in ENSEMBLE_SIGNALS.values()} <= set(model.state_names):
+            with contextlib.suppress(NoLanesError):
+                return AskTogether(self._in_lanes(model, LaneManoeuvres(model)))
+        return _each(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
+
+    def _driven(self, model: Model) -> AskOne:
+        """Single runs of the members, for a manoeuvre or a model without lanes."""
+        integrator, defaults = Integrator(model), _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(defaults | dict(values)):
@@ -109,27 +115,24 @@ class OfManoeuvre:
 
         return ask
 
-    def _held(self, integrator: Integrator, turn: Turn, steps: int) -> Ask:
-        """Joint runs of members with a constant rudder, in a single call of the compiled loop."""
-        model, h = integrator.model, integrator.model.step_s
-        defaults, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
-        t = np.append(np.arange(0, steps, EVERY), steps) * h
-        inputs = np.tile(u, (len(t), 1))
+    def _in_lanes(self, model: Model, lanes: LaneManoeuvres) -> Callable[[int, Mapping[str, Array], bool], BatchResult]:
+        """Joint runs of the members of a batch."""
+        assert isinstance(self.manoeuvre, Turn | Zigzag)
+        manoeuvre, rows = self.manoeuvre, [model.state_names.index(name) for name, _ in ENSEMBLE_SIGNALS.values()]
+        factors = np.array([factor for _, factor in ENSEMBLE_SIGNALS.values()])
 
-        def ask(members: Sequence[Mapping[str, float]]) -> list[MemberResult]:
-            whole = [defaults | dict(values) for values in members]
-            p = np.array([list(values.values()) for values in whole])
-            states = integrator.rollouts(np.array(model.initial(p.T)).T, u, p, (h, steps))
-            found = []
-            for values, parameters, x in zip(whole, p, states, strict=True):
-                run = Trajectory(model, t, x, inputs, integrator.outputs(x, inputs, parameters))
-                fault = mass_fault(values) or ("" if run.is_finite() else RUNAWAY)
-                if fault:
-                    found.append(MemberResult({}, trouble=fault))
-                    continue
-                figures = figures_of(turn, run, defaults["ship.length"])
-                found.append(MemberResult(_numbers(figures), _sampled(run, self.times)))
-            return found
+        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+            p, troubles = _ships(model, count, values)
+            found = lanes.run(manoeuvre, p, self.duration_s, self.times if kept else ())
+            troubles = _with_runaways(troubles, found.fine)
+            bad = [number for number, trouble in enumerate(troubles) if trouble]
+            for figure in found.figures.values():
+                figure[bad] = np.nan
+            if not kept:
+                return BatchResult(found.figures, None, troubles)
+            histories = (found.states[:, :, rows] * factors).transpose(0, 2, 1).astype(np.float32)
+            histories[bad] = np.nan
+            return BatchResult(found.figures, histories, troubles)
 
         return ask
 
@@ -185,6 +188,21 @@ class OfCriteria:
             )
 
         return _each(ask)
+
+
+def _ships(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Array, list[str]]:
+    """Parameters (n, np) of n members with `values` (n,) by name, without those that the model lacks; and the fault of
+    the mass matrix of each, empty without one."""
+    p = np.tile(model.parameter_values(), (count, 1))
+    places = {name: place for place, name in enumerate(model.parameter_names)}
+    for name, value in values.items():
+        if name in places:
+            p[:, places[name]] = value
+    return p, mass_faults(dict(zip(model.parameter_names, p.T, strict=True)))
+
+
+def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bool_]) -> list[str]:
+    return [trouble or ("" if well else RUNAWAY) for trouble, well in zip(troubles, fine, strict=True)]
 
 
 def _each(ask: AskOne) -> Ask:
