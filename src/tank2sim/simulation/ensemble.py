@@ -208,7 +208,7 @@ def ensemble(
 ) -> Ensemble:
     """Evaluate `members` ships in batches of `batch`, in this process or by an executor, with the same result."""
     sent = pickle.dumps(question)
-    size: int = batch or getattr(question, "batch", BATCH)
+    size = batch or int(getattr(question, "batch", BATCH))
     tasks = [_Task(sent, draws, first, min(size, members - first)) for first in range(0, members, size)]
     figures: dict[str, Array] = {}
     histories: Histories | None = None
@@ -250,7 +250,7 @@ def _answers(task: _Task) -> BatchResult:
         values = np.array([list(draw.values.values()) for draw in drawn]).reshape(task.count, len(task.draws.names))
         answer = ask.function(task.count, dict(zip(task.draws.names, values.T, strict=True)), kept)
     else:
-        answer = _gathered(ask([draw.values for draw in drawn]), kept)
+        answer = gathered(ask([draw.values for draw in drawn]), kept=kept)
     outside = [number for number, draw in enumerate(drawn) if draw.trouble]
     troubles = [draw.trouble or trouble for draw, trouble in zip(drawn, answer.troubles, strict=True)]
     for figure in answer.figures.values():
@@ -261,8 +261,8 @@ def _answers(task: _Task) -> BatchResult:
     return answer._replace(troubles=troubles, beyond=beyond)
 
 
-def _gathered(answers: Sequence[MemberResult], kept: bool) -> BatchResult:
-    """The results of single members as those of a batch."""
+def gathered(answers: Sequence[MemberResult], *, kept: bool = False) -> BatchResult:
+    """The results of single members as those of a batch, with histories if they are `kept`."""
     figures: dict[str, Array] = {}
     histories: Histories | None = None
     for number, answer in enumerate(answers):

@@ -101,6 +101,7 @@ class LaneManoeuvres:
         p: Array,
         duration_s: float | None = None,
         times: Sequence[float] | Array = (),
+        inputs: Mapping[str, float] | None = None,
     ) -> LaneFigures:
         """Figures of ships with parameters `p` (n, np), and their states at `times`.
 
@@ -114,41 +115,49 @@ class LaneManoeuvres:
             As for :func:`tank2sim.simulation.run.simulate`.
         times : array (m,)
             Times at which states are kept, s.
+        inputs : mapping, optional
+            Values in place of the model's, by name.
         """
+        u = self.model.input_values(inputs)
         p = np.ascontiguousarray(p, dtype=float)
         starts = np.ascontiguousarray(np.array(self.model.initial(p.T)).T)
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
         ends = LONGEST_LENGTHS * ship_times if duration_s is None else np.full(len(p), duration_s)
-        plan = _plan(manoeuvre, timed=duration_s is not None)
+        plan = _plan(manoeuvre, u, times, timed=duration_s is not None)
         side = math.copysign(1.0, manoeuvre.rudder)
         heading = starts[:, [self.model.state_names.index("motion.psi")]]
         if isinstance(manoeuvre, Turn):
             levels = heading + side * np.array([math.pi / 2, math.pi])
         else:
             levels = np.hstack([heading, np.zeros_like(heading)])
-        found = self._runner.runs(plan, p, starts, ends, levels, times)
+        found = self._runner.runs(plan, p, starts, ends, levels)
         if isinstance(manoeuvre, Turn):
-            figures = self._turn(found, p, starts, manoeuvre)
+            figures = self._turn(found, (u, p), starts, manoeuvre)
         else:
-            figures = self._zigzag(found, p, starts, (manoeuvre, plan.limit))
+            figures = self._zigzag(found, (u, p), starts, (manoeuvre, plan.limit))
         fine = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
         for number in np.flatnonzero(found.ended == UNKNOWN).tolist():
-            fine[number] = self._by_itself(manoeuvre, p[number], duration_s, figures, number)
+            fine[number] = self._by_itself((manoeuvre, duration_s, inputs), p[number], figures, number)
         for values in figures.values():
             values[~fine] = np.nan
         return LaneFigures(figures, found.states, fine)
 
     def _by_itself(
-        self, manoeuvre: Turn | Zigzag, p: Array, duration_s: float | None, figures: dict[str, Array], number: int
+        self,
+        asked: tuple[Turn | Zigzag, float | None, Mapping[str, float] | None],
+        p: Array,
+        figures: dict[str, Array],
+        number: int,
     ) -> bool:
         """The figures of a single ship with more events than lanes keep; whether it could be run."""
-        parameters = dict(zip(self.model.parameter_names, p.tolist(), strict=True))
+        (manoeuvre, duration, inputs), model = asked, self.model
+        parameters = dict(zip(model.parameter_names, p.tolist(), strict=True))
         count = len(next(iter(figures.values())))
         for values in figures.values():
             values[number] = np.nan
         try:
-            run = simulate(self.model, manoeuvre, duration_s=duration_s, parameters=parameters)
+            run = simulate(model, manoeuvre, duration_s=duration, inputs=inputs, parameters=parameters)
         except InputError:
             return False
         for name, value in single_figures(run.figures).items():
@@ -159,14 +168,16 @@ class LaneManoeuvres:
         values: Array = rows[..., self.model.state_names.index(name)]
         return values
 
-    def _reading(self, name: str, x: Array, rudder: Array, p: Array) -> Array:
-        """An output (m,) at states `x` (m, nx) with rudder orders (m,) and parameters (m, np)."""
-        u = np.tile(self.model.input_values(), (len(x), 1))
+    def _reading(self, name: str, x: Array, rudder: Array, others: tuple[Array, Array]) -> Array:
+        """An output (m,) at states `x` (m, nx) with rudder orders (m,), other inputs (nu,) and parameters (m, np)."""
+        inputs, p = others
+        u = np.tile(inputs, (len(x), 1))
         u[:, self.model.input_names.index("rudder.command")] = rudder
         (found,) = self._read[name](x, u, p)
         return found[:, 0]
 
-    def _turn(self, found: LaneResults, p: Array, starts: Array, turn: Turn) -> dict[str, Array]:
+    def _turn(self, found: LaneResults, others: tuple[Array, Array], starts: Array, turn: Turn) -> dict[str, Array]:
+        p = others[1]
         side, length = math.copysign(1.0, turn.rudder), p[:, self.model.parameter_names.index("ship.length")]
         places = []
         for watch, change in enumerate((math.pi / 2, math.pi)):
@@ -178,7 +189,7 @@ class LaneManoeuvres:
             places.append((time, *self._ahead_and_aside(_through(window, time), starts, side)))
         (quarter, advance, transfer), (half, _, tactical) = places
         speed, rate = found.speeds[:, 3], self._column(found.last, "motion.r")
-        drift = self._reading("motion.beta", found.last, np.full(len(p), turn.rudder), p)
+        drift = self._reading("motion.beta", found.last, np.full(len(p), turn.rudder), others)
         with np.errstate(invalid="ignore", divide="ignore"):
             steady = np.isfinite(half)
             for now, then in ((rate, found.then[:, 0]), (speed, found.then[:, 1])):
@@ -200,8 +211,10 @@ class LaneManoeuvres:
             "time_180_s": half,
         } | {name: np.where(steady, values, np.nan) for name, values in at_last.items()}
 
-    def _zigzag(self, found: LaneResults, p: Array, starts: Array, asked: tuple[Zigzag, int]) -> dict[str, Array]:
-        (zigzag, limit), count = asked, len(p)
+    def _zigzag(
+        self, found: LaneResults, others: tuple[Array, Array], starts: Array, asked: tuple[Zigzag, int]
+    ) -> dict[str, Array]:
+        (zigzag, limit), p, count = asked, others[1], len(starts)
         side, length = math.copysign(1.0, zigzag.rudder), p[:, self.model.parameter_names.index("ship.length")]
         course = self._column(starts, "motion.psi")
         # The change at which a run ends is of no order any more.
@@ -212,7 +225,7 @@ class LaneManoeuvres:
         returns = _crossing(found.windows[:, 0, ..., 0], offset, self._column(windows[:, 0], "motion.r"))
         returns = _sorted_after(returns, executes[:, 0])
         turns = _crossing(
-            found.windows[:, 1, ..., 0], self._column(windows[:, 1], "motion.r"), self._yaw_accelerations(found, p)
+            found.windows[:, 1, ..., 0], self._column(windows[:, 1], "motion.r"), self._yaw_accelerations(found, others)
         )
         headings = self._column(_through(found.windows[:, 1], turns), "motion.psi")
         figures: dict[str, Array] = {}
@@ -236,7 +249,7 @@ class LaneManoeuvres:
             "speed_loss_percent": _speed_loss(found, found.speeds[:, 1]),
         }
 
-    def _yaw_accelerations(self, found: LaneResults, p: Array) -> Array:
+    def _yaw_accelerations(self, found: LaneResults, others: tuple[Array, Array]) -> Array:
         """dr/dt (n, crossings, samples) about the crossings of zero rate, at the two samples between which they are."""
         windows = found.windows[:, 1]
         slopes = np.full(windows.shape[:-1], np.nan)
@@ -244,7 +257,9 @@ class LaneManoeuvres:
         for sample in (1, 2):
             rows = windows[member, number, sample]
             if len(rows):
-                slopes[member, number, sample] = self._reading("motion.rdot", rows[:, 2:], rows[:, 1], p[member])
+                slopes[member, number, sample] = self._reading(
+                    "motion.rdot", rows[:, 2:], rows[:, 1], (others[0], others[1][member])
+                )
         return slopes
 
     def _ahead_and_aside(self, states: Array, starts: Array, side: float) -> tuple[Array, Array]:
@@ -255,13 +270,14 @@ class LaneManoeuvres:
         return north * cos + east * sin, side * (east * cos - north * sin)
 
 
-def _plan(manoeuvre: Turn | Zigzag, *, timed: bool) -> LanePlan:
+def _plan(manoeuvre: Turn | Zigzag, inputs: Array, times: Sequence[float] | Array, *, timed: bool) -> LanePlan:
     if isinstance(manoeuvre, Turn):
-        watched = ("motion.psi", "motion.psi")
-        return LanePlan((manoeuvre.rudder, manoeuvre.rudder), TURN_HEADING, 0 if timed else 1, watched, 1)
+        orders = (manoeuvre.rudder, manoeuvre.rudder)
+        return LanePlan(orders, TURN_HEADING, 0 if timed else 1, ("motion.psi", "motion.psi"), 1, inputs, times)
     opposite = -manoeuvre.rudder if manoeuvre.opposite is None else manoeuvre.opposite
-    limit, watched = -1 if timed else ZIGZAG_EXECUTES, ("motion.psi", "motion.r")
-    return LanePlan((manoeuvre.rudder, opposite), manoeuvre.heading, limit, watched, CROSSINGS)
+    orders, watched = (manoeuvre.rudder, opposite), ("motion.psi", "motion.r")
+    limit = -1 if timed else ZIGZAG_EXECUTES
+    return LanePlan(orders, manoeuvre.heading, limit, watched, CROSSINGS, inputs, times)
 
 
 def _crossing(times: Array, offset: Array, slope: Array) -> Array:

@@ -114,13 +114,13 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
     g.before = g.states[0]; g.x = g.states[1]; g.next = g.states[2];
     for (int l = 0; l < LANES; ++l) {{
       const long k = begin + l < members ? begin + l : members - 1;
+      if (begin + l >= members) LANE(active, l) = 0; /* to fill the lanes: nothing is kept of it */
       member[l] = k; due[l] = events[l] = 0;
       open[l][0][0] = open[l][0][1] = open[l][1][0] = open[l][1][1] = 0;
       for (int i = 0; i < NP; ++i) LANE(g.p[i], l) = p[k * NP + i];
       for (int i = 0; i < NX; ++i) LANE(g.x[i], l) = starts[k * NX + i];
       LANE(end, l) = ends[k];
       for (int w = 0; w < plan->watches; ++w) LANE(level[w], l) = levels[k * plan->watches + w];
-      found->ended[k] = {fine};
       if (plan->times) LANE(soon, l) = plan->at[0];
     }}
     for (int i = 0; i < NU; ++i) g.u[i] = all(plan->inputs[i]);
@@ -279,7 +279,7 @@ class _Found(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_void_p) for name in _FOUND)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LanePlan:
     """A manoeuvre of two rudder orders that take turns.
 
@@ -296,6 +296,10 @@ class LanePlan:
         At most two states whose crossings of levels are kept.
     most : int
         Crossings of each that are kept: 1, with the motion two lengths before the end, or up to :data:`CROSSINGS`.
+    inputs : array (nu,)
+        Inputs of the model; the rudder order among them is not used.
+    times : array (m,)
+        Times at which states are kept, s, rising.
     """
 
     orders: tuple[float, float]
@@ -303,6 +307,8 @@ class LanePlan:
     limit: int
     watched: tuple[str, ...]
     most: int
+    inputs: Array
+    times: Sequence[float] | Array = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,16 +375,14 @@ class LaneRunner:
             raise NoLanesError("there is no C compiler, or the model is not that of a ship")
         self._run = self._compiled()
 
-    def runs(
-        self, plan: LanePlan, p: Array, starts: Array, ends: Array, levels: Array, times: Sequence[float] | Array = ()
-    ) -> LaneResults:
+    def runs(self, plan: LanePlan, p: Array, starts: Array, ends: Array, levels: Array) -> LaneResults:
         """Runs of n ships with parameters `p` (n, np) from `starts` (n, nx), each at most to its time in `ends` (n,).
 
-        `levels` (n, watches) are those of the watched states; at `times` (m,) the states are kept.
+        `levels` (n, watches) are those of the watched states.
         """
         model, n, nx = self.model, len(starts), len(self.model.states)
-        at = np.ascontiguousarray(times, dtype=float)
-        inputs = model.input_values()
+        at = np.ascontiguousarray(plan.times, dtype=float)
+        inputs = np.ascontiguousarray(plan.inputs, dtype=float)
         limits = TIMES_BEYOND * np.array([UNITS[state.unit].extent for state in model.states])
         first, second = plan.orders
         watched = np.array([model.state_names.index(name) for name in plan.watched], dtype=np.int32)
@@ -437,7 +441,6 @@ class LaneRunner:
             crossings=CROSSINGS,
             samples=SAMPLES,
             remembered=_REMEMBERED,
-            fine=FINE,
             runaway=RUNAWAY_LANE,
             unknown=UNKNOWN,
         )

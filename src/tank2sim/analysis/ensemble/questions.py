@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.stability.imo import imo_criteria
+from tank2sim.analysis.influence.figures import TURN, ZIGZAG, InfluenceFigure, parse_figure
+from tank2sim.analysis.stability.imo import (
+    TRACK_REACH,
+    imo_criteria,
+    largest_trial_rudder,
+    manoeuvring_trials,
+    stopping,
+)
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import study_model
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault, mass_faults
 from tank2sim.errors import InputError
 from tank2sim.native.lanes import NoLanesError
 from tank2sim.simulation.card_range import Numbers, single_figures
-from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult
+from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult, gathered
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.lane_figures import LaneManoeuvres, runs_in_lanes
@@ -94,9 +101,10 @@ class OfManoeuvre:
     def prepared(self) -> Ask | AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = study_model(self.ship.card())
-        if runs_in_lanes(self.manoeuvre) and {name for name, _ in ENSEMBLE_SIGNALS.values()} <= set(model.state_names):
-            with contextlib.suppress(NoLanesError):
-                return AskTogether(self._in_lanes(model, LaneManoeuvres(model)))
+        signals = {name for name, _ in ENSEMBLE_SIGNALS.values()}
+        lanes = _lanes_of(model) if runs_in_lanes(self.manoeuvre) and signals <= set(model.state_names) else None
+        if lanes is not None:
+            return AskTogether(self._in_lanes(model, lanes))
         return _each(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
 
     def _driven(self, model: Model) -> AskOne:
@@ -125,14 +133,12 @@ class OfManoeuvre:
             p, troubles = _ships(model, count, values)
             found = lanes.run(manoeuvre, p, self.duration_s, self.times if kept else ())
             troubles = _with_runaways(troubles, found.fine)
-            bad = [number for number, trouble in enumerate(troubles) if trouble]
-            for figure in found.figures.values():
-                figure[bad] = np.nan
+            answer = _usable(dict(found.figures), troubles)
             if not kept:
-                return BatchResult(found.figures, None, troubles)
+                return answer
             histories = (found.states[:, :, rows] * factors).transpose(0, 2, 1).astype(np.float32)
-            histories[bad] = np.nan
-            return BatchResult(found.figures, histories, troubles)
+            histories[[bool(trouble) for trouble in troubles]] = np.nan
+            return answer._replace(histories=histories)
 
         return ask
 
@@ -144,25 +150,49 @@ class OfFigures:
     ship: ShipText
     figures: tuple[str, ...]
 
-    def prepared(self) -> Ask:
+    batch = LANE_BATCH
+
+    def prepared(self) -> AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         # It takes python-control with it, slow to load: processes that run manoeuvres do without.
         from tank2sim.analysis.influence.study import Study
 
-        study = Study(self.ship.card(), [parse_figure(text) for text in self.figures])
+        card, asked = self.ship.card(), [parse_figure(text) for text in self.figures]
+        study = Study(card, asked)
+        lanes = _lanes_of(study.model) if any(_lane_figure(figure) for figure in asked) else None
+        joint = [figure for figure in asked if lanes and _lane_figure(figure)]
+        single = [figure for figure in asked if figure not in joint]
+        one_by_one = Study(card, single) if joint and single else study
         names, defaults = [parameter.name for parameter in study.parameters], _parameters(study.model)
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
+        def ask_one(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
             try:
-                found = study.figures_at(np.array([given[name] for name in names]))
+                found = one_by_one.figures_at(np.array([given[name] for name in names]))
             except InputError as error:
                 return MemberResult({}, trouble=error.problem)
-            return MemberResult(dict(zip(self.figures, found.tolist(), strict=True)))
+            return MemberResult(dict(zip([figure.text for figure in one_by_one.figures], found.tolist(), strict=True)))
 
-        return _each(ask)
+        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+            p, troubles = _ships(study.model, count, values)
+            found: dict[str, Array] = {}
+            for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in joint):
+                assert lanes is not None and manoeuvre is not None
+                runs = lanes.run(manoeuvre, p)
+                troubles = _with_runaways(troubles, runs.fine)
+                for figure in joint:
+                    if figure.manoeuvre == manoeuvre:
+                        found[figure.text] = runs.figures.get(_lane_figure(figure), np.full(count, np.nan))
+            if single or not joint:
+                members = _members_of(count, values)
+                answer = gathered([ask_one(member) for member in members])
+                found |= answer.figures
+                troubles = [first or other for first, other in zip(troubles, answer.troubles, strict=True)]
+            return _usable({text: found[text] for text in self.figures if text in found}, troubles)
+
+        return AskTogether(ask)
 
 
 @dataclass(frozen=True)
@@ -171,23 +201,80 @@ class OfCriteria:
 
     ship: ShipText
 
-    def prepared(self) -> Ask:
+    batch = LANE_BATCH
+
+    def prepared(self) -> Ask | AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        integrator, parameters = Integrator(model, every=EVERY), _parameters(model)
+        integrator, each_step, parameters = Integrator(model, every=EVERY), Integrator(model), _parameters(model)
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
+        def ask_one(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
             given = {name: value for name, value in values.items() if name in parameters}
             if fault := mass_fault(parameters | given):
                 return MemberResult({}, trouble=fault)
-            criteria = imo_criteria(model, given, integrator)
+            criteria = imo_criteria(model, given, each_step)
             return MemberResult(
                 {criterion.name: math.nan if criterion.found is None else criterion.found for criterion in criteria}
             )
 
-        return _each(ask)
+        lanes = _lanes_of(whole)
+        if lanes is None:
+            return _each(ask_one)
+        trials = manoeuvring_trials(largest_trial_rudder(parameters))
+
+        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+            members = _members_of(count, values)
+            p, troubles = _ships(model, count, values)
+            rudders = {largest_trial_rudder(parameters | member) for member in members}
+            if rudders != {largest_trial_rudder(parameters)}:  # the gear's stops are uncertain
+                return gathered([ask_one(member) for member in members])
+            figures: dict[str, Array] = {}
+            for trial in trials:
+                sides = [lanes.run(manoeuvre, p, inputs=undisturbed_inputs(model)) for manoeuvre in trial.manoeuvres]
+                for name, figure in trial.criteria.items():
+                    shown = [side.figures.get(figure, np.full(count, np.nan)) for side in sides]
+                    figures[name] = np.maximum(*shown)
+            if "propeller.speed" in model.input_names:
+                given = ({name: value for name, value in member.items() if name in parameters} for member in members)
+                reaches = [
+                    None if trouble else stopping(model, member, integrator)
+                    for member, trouble in zip(given, troubles, strict=True)
+                ]
+                figures[TRACK_REACH] = np.array([math.nan if reach is None else reach for reach in reaches])
+            return _usable(figures, troubles)
+
+        return AskTogether(ask)
+
+
+def _lanes_of(model: Model) -> LaneManoeuvres | None:
+    try:
+        return LaneManoeuvres(model)
+    except NoLanesError:
+        return None
+
+
+def _lane_figure(figure: InfluenceFigure) -> str:
+    """Name of a figure of a turning circle or zigzag among those of runs; empty for others."""
+    if figure.kind.family not in (TURN, ZIGZAG):
+        return ""
+    spelt = {"initial_turning_m": "initial_turning_distance_m", "initial_turning_s": "initial_turning_time_s"}
+    return re.sub(r"^overshoot(\d)", r"overshoot_\1", spelt.get(figure.kind.name, figure.kind.name))
+
+
+def _members_of(count: int, values: Mapping[str, Array]) -> list[dict[str, float]]:
+    """The parameters of each of n members by name."""
+    columns = [value.tolist() for value in values.values()]
+    return [dict(zip(values, row, strict=True)) for row in zip(*columns, strict=True)] if columns else [{}] * count
+
+
+def _usable(figures: dict[str, Array], troubles: Sequence[str]) -> BatchResult:
+    """The figures of a batch, nan for unusable members."""
+    bad = [number for number, trouble in enumerate(troubles) if trouble]
+    for figure in figures.values():
+        figure[bad] = np.nan
+    return BatchResult(figures, None, troubles)
 
 
 def _ships(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Array, list[str]]:
