@@ -24,9 +24,9 @@ Histories = NDArray[np.float32]
 BATCH = 32
 """Members of a batch: large against the cost of its transfer, small against the whole (project choice)."""
 
-KEPT = 10_000
+KEPT = 2000
 """Number of members, the first, whose histories are kept for bands of tracks, 4 bytes a sample. The share below a
-quantile is known to 0.2 %; figures are those of all members (project choice)."""
+quantile is known to 0.5 %; figures are those of all members (project choice)."""
 
 
 DRAWS = 1000
