@@ -126,10 +126,6 @@ def test_of_many_steps_every_tenth_and_the_last_are_kept(mariner, compiled: bool
     each = whole.rollout(x, u, p, 0.1, 123)
     kept = thin.rollout(x, u, p, 0.1, 123, every=10)
     np.testing.assert_array_equal(kept, each[[*range(0, 123, 10), 123]])
-    heavier = mariner.parameter_values({"ship.mass": 1.1 * p[mariner.parameter_names.index("ship.mass")]})
-    both = thin.rollouts(np.array([x, x]), u, np.array([p, heavier]), (0.1, 123))
-    np.testing.assert_array_equal(both[0], kept)
-    np.testing.assert_array_equal(both[1], thin.rollout(x, u, heavier, 0.1, 123, every=10))
 
 
 def test_events_are_as_exact_where_only_every_tenth_step_is_kept(mariner) -> None:

@@ -16,7 +16,7 @@ from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import Means, Tuned, tuned_text
 from tank2sim.analysis.tuning.targets import TARGET_OPTION, Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
-from tank2sim.api.ensemble import EnsembleOptions, band_table
+from tank2sim.api.ensemble import FEW_IN_LANES, EnsembleOptions, band_table
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
@@ -311,7 +311,7 @@ def _bands(ship: Ship, study: Study, ensemble: EnsembleOptions) -> FigureBands |
     if not ensemble.members:
         return None
     names = [figure.text for figure in study.figures]
-    with ensemble.computing() as executor:
+    with ensemble.computing(FEW_IN_LANES) as executor:
         return named_bands(ship.manoeuvring(), names, EnsembleRequest(ensemble.members, ensemble.seed), executor)
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.files import write_together
 from tank2sim.simulation.card_range import entry_name, single_figures
@@ -144,9 +144,10 @@ def simulate_manoeuvre(
     bands = None
     if ensemble.members:
         from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
+        from tank2sim.simulation.lane_figures import runs_in_lanes
 
         length = duration_s, float(run.trajectory.t[-1])
         request = EnsembleRequest(ensemble.members, ensemble.seed)
-        with ensemble.computing() as executor:
+        with ensemble.computing(FEW_IN_LANES if runs_in_lanes(manoeuvre) else FEW) as executor:
             bands = manoeuvre_bands(ship.manoeuvring(), manoeuvre, length, request, executor)
     return ManoeuvreResult(ship, words, run, bands)

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.cli.overrides import parse_changes
 from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
 
@@ -65,8 +66,11 @@ def ensemble_options(command: Command) -> Command:
             "--ensemble",
             "members",
             type=click.IntRange(2, 10_000_000),
+            is_flag=False,
+            flag_value=DEFAULT_MEMBERS,
             metavar="N",
-            help="Also N ships drawn from the card's errors and their covariance: bands (5, 50, 95 %).",
+            help="Also N ships drawn from the card's errors and their covariance, 2000 if N is left out: bands (5, 50, "
+            "95 %).",
         ),
         click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the ensemble."),
         executor_option,

@@ -5,7 +5,11 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
+
+from tank2sim.arrays import Array
 from tank2sim.cards.card import OPPOSITE, ManoeuvringCard, MmgCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
@@ -142,23 +146,34 @@ def _refuse_singular_mass(card: ManoeuvringCard) -> None:
 
 def mass_fault(p: Mapping[str, float]) -> str:
     """Why a ship with the parameters `p` (all, by name) has no mass matrix that can be used; empty if it has one."""
-    scales = Scales(p["ship.water_density"], p["ship.length"], p["ship.speed"])
-    added = {name: p[f"derivatives.{name}"] for name in ACCELERATION_TERMS}
-    mass, yaw_inertia = p["ship.mass"] / scales.mass, p["ship.yaw_inertia"] / scales.inertia
-    matrix = inertia(mass, p["ship.x_G"] / p["ship.length"], yaw_inertia, added)
+    matrix = _mass_matrix(p)
     if _is_singular(matrix):
         return SINGULAR
     return "" if _is_positive(matrix) else NOT_POSITIVE
 
 
-def _is_singular(matrix: Inertia) -> bool:
+def mass_faults(p: Mapping[str, Array]) -> list[str]:
+    """As :func:`mass_fault` for many ships, with parameters (n,) each."""
+    matrix = _mass_matrix(p)
+    singular, positive = np.broadcast_arrays(_is_singular(matrix), _is_positive(matrix))
+    return [str(fault) for fault in np.where(singular, SINGULAR, np.where(positive, "", NOT_POSITIVE))]
+
+
+def _mass_matrix(p: Mapping[str, Any]) -> Inertia:
+    scales = Scales(p["ship.water_density"], p["ship.length"], p["ship.speed"])
+    added = {name: p[f"derivatives.{name}"] for name in ACCELERATION_TERMS}
+    mass, yaw_inertia = p["ship.mass"] / scales.mass, p["ship.yaw_inertia"] / scales.inertia
+    return inertia(mass, p["ship.x_G"] / p["ship.length"], yaw_inertia, added)
+
+
+def _is_singular(matrix: Inertia) -> Any:
     scale = abs(matrix.sway * matrix.yaw) + abs(matrix.sway_yaw * matrix.yaw_sway)
     rounding = 1e-12  # of the two products whose difference f4 is
-    return bool(abs(matrix.determinant) <= rounding * scale)
+    return abs(matrix.determinant) <= rounding * scale
 
 
-def _is_positive(matrix: Inertia) -> bool:
-    return bool(matrix.surge > 0 and matrix.sway > 0 and matrix.yaw > 0 and matrix.determinant > 0)
+def _is_positive(matrix: Inertia) -> Any:
+    return (matrix.surge > 0) & (matrix.sway > 0) & (matrix.yaw > 0) & (matrix.determinant > 0)
 
 
 def _step(card: ManoeuvringCard) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pickle
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -24,9 +24,9 @@ Histories = NDArray[np.float32]
 BATCH = 32
 """Members of a batch: large against the cost of its transfer, small against the whole (project choice)."""
 
-KEPT = 10_000
+KEPT = 2000
 """Number of members, the first, whose histories are kept for bands of tracks, 4 bytes a sample. The share below a
-quantile is known to 0.2 %; figures are those of all members (project choice)."""
+quantile is known to 0.5 %; figures are those of all members (project choice)."""
 
 
 DRAWS = 1000
@@ -99,22 +99,47 @@ class Drawn(NamedTuple):
 
 class MemberResult(NamedTuple):
     """Result of a member: figures by name, histories (signals, times), nan where absent; the reason of an unusable
-    member; and, set by :func:`ensemble`, the parameters for which it was drawn again."""
+    member."""
 
     figures: Mapping[str, float]
     histories: Histories | None = None
     trouble: str = ""
-    beyond: tuple[str, ...] = ()
 
 
 Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[MemberResult]]
 """Function from the parameters of members, with the same names, to the independent result of each."""
 
 
-class Question(Protocol):
-    """Evaluation of every member; it is sent to other processes."""
+class BatchResult(NamedTuple):
+    """Results of n members: figures by name (n,), nan where absent; histories (n, signals, times), if any; why a member
+    is unusable, empty for others; and the parameters for which members were drawn again, by their number."""
 
-    def prepared(self) -> Ask:
+    figures: Mapping[str, Array]
+    histories: Histories | None
+    troubles: Sequence[str]
+    beyond: Mapping[int, tuple[str, ...]] = {}
+
+
+@dataclass(frozen=True)
+class AskTogether:
+    """Evaluation of a batch at once.
+
+    Parameters
+    ----------
+    function : callable
+        Takes the number n of members, their parameters by name, (n,) each, and whether histories are kept.
+    """
+
+    function: Callable[[int, Mapping[str, Array], bool], BatchResult]
+
+
+class Question(Protocol):
+    """Evaluation of every member; it is sent to other processes.
+
+    It may have an attribute ``batch``, the number of members of a batch if not :data:`BATCH`.
+    """
+
+    def prepared(self) -> Ask | AskTogether:
         """Return the evaluating function, once in each process."""
 
 
@@ -179,27 +204,28 @@ class Ensemble:
 
 
 def ensemble(
-    question: Question, draws: Draws, members: int, executor: Executor | None = None, *, batch: int = BATCH
+    question: Question, draws: Draws, members: int, executor: Executor | None = None, *, batch: int | None = None
 ) -> Ensemble:
     """Evaluate `members` ships in batches of `batch`, in this process or by an executor, with the same result."""
     sent = pickle.dumps(question)
-    tasks = [_Task(sent, draws, first, min(batch, members - first)) for first in range(0, members, batch)]
+    size = batch or int(getattr(question, "batch", BATCH))
+    tasks = [_Task(sent, draws, first, min(size, members - first)) for first in range(0, members, size)]
     figures: dict[str, Array] = {}
     histories: Histories | None = None
     unusable: Counter[str] = Counter()
     beyond: list[tuple[str, ...]] = []
-    for number, answer in enumerate(_in_order(tasks, executor)):
-        beyond.append(answer.beyond)
-        if answer.trouble:
-            unusable[answer.trouble] += 1
-        for name, value in answer.figures.items():
+    for task, answer in zip(tasks, _in_order(tasks, executor), strict=True):
+        rows = slice(task.first, task.first + task.count)
+        beyond += answer.beyond.values()
+        unusable.update(trouble for trouble in answer.troubles if trouble)
+        for name, values in answer.figures.items():
             if name not in figures:
                 figures[name] = np.full(members, np.nan)
-            figures[name][number] = value
-        if answer.histories is not None and number < KEPT:
+            figures[name][rows] = values
+        if answer.histories is not None and task.first < KEPT:
             if histories is None:
-                histories = np.full((min(members, KEPT), *answer.histories.shape), np.nan, dtype=np.float32)
-            histories[number] = answer.histories
+                histories = np.full((min(members, KEPT), *answer.histories.shape[1:]), np.nan, dtype=np.float32)
+            histories[rows] = answer.histories[: KEPT - task.first]
     return Ensemble(members, draws.seed, figures, histories, dict(sorted(unusable.items())), Redrawn.of(beyond))
 
 
@@ -213,25 +239,43 @@ class _Task:
     count: int
 
 
-def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterator[MemberResult]:
-    batches = map(_answers, tasks) if executor is None else executor.map(_answers, tasks)
-    for batch in batches:
-        yield from batch
+def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterable[BatchResult]:
+    return map(_answers, tasks) if executor is None else executor.map(_answers, tasks)
 
 
-def _answers(task: _Task) -> list[MemberResult]:
-    ask = _prepared(task.question)
-    numbers = range(task.first, task.first + task.count)
-    drawn = [task.draws.drawn(number) for number in numbers]
-    found = []
-    for number, draw, answer in zip(numbers, drawn, ask([draw.values for draw in drawn]), strict=True):
-        result = MemberResult({}, trouble=draw.trouble) if draw.trouble else answer
-        histories = result.histories if number < KEPT else None
-        found.append(result._replace(histories=histories, beyond=draw.beyond))
-    return found
+def _answers(task: _Task) -> BatchResult:
+    ask, kept = _prepared(task.question), task.first < KEPT
+    drawn = [task.draws.drawn(number) for number in range(task.first, task.first + task.count)]
+    if isinstance(ask, AskTogether):
+        values = np.array([list(draw.values.values()) for draw in drawn]).reshape(task.count, len(task.draws.names))
+        answer = ask.function(task.count, dict(zip(task.draws.names, values.T, strict=True)), kept)
+    else:
+        answer = gathered(ask([draw.values for draw in drawn]), kept=kept)
+    outside = [number for number, draw in enumerate(drawn) if draw.trouble]
+    troubles = [draw.trouble or trouble for draw, trouble in zip(drawn, answer.troubles, strict=True)]
+    for figure in answer.figures.values():
+        figure[outside] = np.nan
+    if answer.histories is not None:
+        answer.histories[outside] = np.nan
+    beyond = {task.first + number: draw.beyond for number, draw in enumerate(drawn) if draw.beyond}
+    return answer._replace(troubles=troubles, beyond=beyond)
+
+
+def gathered(answers: Sequence[MemberResult], *, kept: bool = False) -> BatchResult:
+    """The results of single members as those of a batch, with histories if they are `kept`."""
+    figures: dict[str, Array] = {}
+    histories: Histories | None = None
+    for number, answer in enumerate(answers):
+        for name, value in answer.figures.items():
+            figures.setdefault(name, np.full(len(answers), np.nan))[number] = value
+        if kept and answer.histories is not None:
+            if histories is None:
+                histories = np.full((len(answers), *answer.histories.shape), np.nan, dtype=np.float32)
+            histories[number] = answer.histories
+    return BatchResult(figures, histories, [answer.trouble for answer in answers])
 
 
 @lru_cache(maxsize=2)
-def _prepared(question: bytes) -> Ask:
+def _prepared(question: bytes) -> Ask | AskTogether:
     made: Question = pickle.loads(question)
     return made.prepared()

@@ -21,6 +21,10 @@ LOOP_HEIGHT = 0.05
 """Difference of two yaw rates at a rudder angle of a spiral, as a share of the largest rate, from which they are two
 steady turns; smaller ones are residuals of the waiting time."""
 
+STEADY_SHARE = 0.01
+"""Change of yaw rate and speed over two ship lengths, relative to themselves, below which a turn is steady. Project
+choice."""
+
 REST_SPEED = 1e-6
 """Share of the run's largest speed below which a speed counts as zero: project choice, above rounding."""
 
@@ -119,7 +123,10 @@ def _is_steady(run: Trajectory, length: float) -> bool:
     if before < run.t[0]:
         return False
     then = int(np.searchsorted(run.t, before))
-    same = [abs(run[name][-1] - run[name][then]) < 0.01 * abs(run[name][-1]) for name in ("motion.r", "motion.speed")]
+    same = [
+        abs(run[name][-1] - run[name][then]) < STEADY_SHARE * abs(run[name][-1])
+        for name in ("motion.r", "motion.speed")
+    ]
     return all(same)
 
 

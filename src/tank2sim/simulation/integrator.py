@@ -45,11 +45,6 @@ _LOOP = """
     }}
   }}
 }}
-{export}void rollouts(long members, long n, long every, double h, const double* u, const double* p, double* x) {{
-  const long rows = (n + every - 1) / every + 1;
-  long k;
-  for (k = 0; k < members; ++k, p += {np}, x += rows * {nx}) rollout(n, every, h, u, p, x);
-}}
 {export}void outputs(long n, const double* u, const double* p, const double* x, double* y) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
@@ -88,13 +83,13 @@ class Integrator:
         self.compiled = find_compiler() is not None if compiled is None else compiled
         if self.compiled:
             try:
-                self._rollout, self._rollouts, self._outputs = self._in_machine_code()
+                self._rollout, self._outputs = self._in_machine_code()
                 return
             except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
                 if compiled:
                     raise
                 self.compiled = False
-        self._rollout, self._rollouts, self._outputs = self._in_casadi()
+        self._rollout, self._outputs = self._in_casadi()
 
     def rollout(self, x: Array, u: Array, p: Array, h: float, n: int, *, every: int = 1) -> Array:
         """States (ceil(n / every) + 1, nx) at the start `x` (nx,), then after each `every` steps, and at the end.
@@ -104,18 +99,6 @@ class Integrator:
         states = np.empty((-(-n // every) + 1, len(x)))
         states[0] = x
         self._rollout(n, every, h, u, p, states)
-        return states
-
-    def rollouts(self, starts: Array, u: Array, p: Array, steps: tuple[float, int]) -> Array:
-        """States (m, ceil(n / every) + 1, nx) of m ships from `starts` (m, nx), each with its parameters `p` (m, np).
-
-        `steps` are their length, s, and their number n; the inputs `u` (nu,) are constant. Each result is as in
-        :meth:`rollout`.
-        """
-        h, n = steps
-        states = np.empty((len(starts), -(-n // self.every) + 1, starts.shape[1]))
-        states[:, 0] = starts
-        self._rollouts(len(starts), n, self.every, h, u, np.ascontiguousarray(p), states)
         return states
 
     def step(self, x: Array, u: Array, p: Array, h: float) -> Array:
@@ -129,14 +112,13 @@ class Integrator:
         self._outputs(len(x), np.ascontiguousarray(u), p, np.ascontiguousarray(x), y)
         return y
 
-    def _in_machine_code(self) -> tuple[Loop, Loop, Loop]:
+    def _in_machine_code(self) -> tuple[Loop, Loop]:
         step, constants = step_and_constants(self.model)
         functions = (step, constants, self.model.output)
         sizes = {
             name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")
         }
         lengths = {
-            "np": step.size1_in(2),
             "nx": step.size1_in(0),
             "nu": step.size1_in(1),
             "nc": max(1, constants.size1_out(0)),
@@ -147,11 +129,10 @@ class Integrator:
         array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
         library.rollout.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, array, array, array]
         library.outputs.argtypes = [ctypes.c_long, array, array, array, array]
-        library.rollouts.argtypes = [*[ctypes.c_long] * 3, ctypes.c_double, array, array, array]
-        library.rollout.restype = library.rollouts.restype = library.outputs.restype = None
-        return library.rollout, library.rollouts, library.outputs
+        library.rollout.restype = library.outputs.restype = None
+        return library.rollout, library.outputs
 
-    def _in_casadi(self) -> tuple[Loop, Loop, Loop]:
+    def _in_casadi(self) -> tuple[Loop, Loop]:
         loops: dict[int, ca.Function] = {}
         step = runge_kutta_step(self.model)
 
@@ -167,12 +148,7 @@ class Integrator:
                 done += length
             kept[:] = x[np.minimum(np.arange(len(kept)) * every, n)]
 
-        def rollouts(members: int, n: int, every: int, h: float, *arrays: Array) -> None:
-            u, parameters, states = arrays
-            for p, kept in zip(parameters, states, strict=True):
-                rollout(n, every, h, u, p, kept)
-
         def outputs(n: int, u: Array, p: Array, x: Array, y: Array) -> None:
             y[:] = np.array(self.model.output(x.T, u.T, ca.repmat(p, 1, n))).T
 
-        return rollout, rollouts, outputs
+        return rollout, outputs

@@ -36,6 +36,10 @@ ZIGZAG_EXECUTES = 5
 SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -10, -15, -20)
 """Rudder angles of a direct spiral on its way to port, deg; it returns through the same angles."""
 
+LONGEST_LENGTHS = 150.0
+"""Longest run of a turning circle or zigzag without a given duration, L/u0. Project choice: some three times what slow
+ships need."""
+
 FULL_ASTERN = 0.7
 """Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. Project choice;
 ``stop:RPM`` states another."""
@@ -99,7 +103,7 @@ class Turn:
             return
         side = math.copysign(1.0, self.rudder)
         goal = running.state("motion.psi") + side * TURN_HEADING
-        running.run_until("motion.psi", goal, rising=side > 0, at_most=150 * ship_time)
+        running.run_until("motion.psi", goal, rising=side > 0, at_most=LONGEST_LENGTHS * ship_time)
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,7 @@ class Zigzag:
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
         begin = running.state("motion.psi") if self.course is None else self.course
-        end = 150 * ship_time if duration is None else duration
+        end = LONGEST_LENGTHS * ship_time if duration is None else duration
         side = math.copysign(1.0, self.rudder)
         angles = cycle((self.rudder, -self.rudder if self.opposite is None else self.opposite))
         executes = 0

@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.stability.imo import imo_criteria
+from tank2sim.analysis.influence.figures import TURN, ZIGZAG, InfluenceFigure, parse_figure
+from tank2sim.analysis.stability.imo import (
+    TRACK_REACH,
+    imo_criteria,
+    largest_trial_rudder,
+    manoeuvring_trials,
+    stopping,
+)
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import study_model
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.ship import mass_fault
+from tank2sim.dynamics.ship import mass_fault, mass_faults
 from tank2sim.errors import InputError
+from tank2sim.native.lanes import NoLanesError
 from tank2sim.simulation.card_range import Numbers, single_figures
-from tank2sim.simulation.ensemble import Ask, MemberResult
-from tank2sim.simulation.figures import Figures, figures_of
+from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult, gathered
+from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.lane_figures import LaneManoeuvres, runs_in_lanes
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
@@ -43,8 +54,8 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 EVERY = 10
 """Steps between two kept samples: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
-_LONGEST = 200_000
-"""Most steps of a run in a joint batch: the batch then takes some 40 MB (project choice)."""
+LANE_BATCH = 256
+"""Members of a batch that is run in lanes: with its crossings and histories it takes 10 MB (project choice)."""
 
 # Only the outputs that the figures need: the others would take longer than the motion itself.
 _READ_OFF: Mapping[type, tuple[str, ...]] = {
@@ -82,20 +93,23 @@ class OfManoeuvre:
     duration_s: float | None
     times: Array
 
-    def prepared(self) -> Ask:
-        """See :class:`tank2sim.simulation.ensemble.Question`."""
-        model = _reading_off(study_model(self.ship.card()), *_READ_OFF.get(type(self.manoeuvre), ()))
-        integrator = Integrator(model, every=EVERY)
-        steps = (self.duration_s or math.inf) / model.step_s
-        whole = steps <= _LONGEST and abs(steps - round(steps)) < 1e-9 * steps
-        if isinstance(self.manoeuvre, Turn) and whole:
-            return self._held(integrator, self.manoeuvre, round(steps))
-        return _each(self._driven(integrator))
+    @property
+    def batch(self) -> int:
+        """Members of a batch."""
+        return LANE_BATCH if runs_in_lanes(self.manoeuvre) else BATCH
 
-    def _driven(self, integrator: Integrator) -> AskOne:
-        """Single runs of the members, for a manoeuvre with events."""
-        model = integrator.model
-        defaults = _parameters(model)
+    def prepared(self) -> Ask | AskTogether:
+        """See :class:`tank2sim.simulation.ensemble.Question`."""
+        model = study_model(self.ship.card())
+        signals = {name for name, _ in ENSEMBLE_SIGNALS.values()}
+        lanes = _lanes_of(model) if runs_in_lanes(self.manoeuvre) and signals <= set(model.state_names) else None
+        if lanes is not None:
+            return AskTogether(self._in_lanes(model, lanes))
+        return _each(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
+
+    def _driven(self, model: Model) -> AskOne:
+        """Single runs of the members, for a manoeuvre or a model without lanes."""
+        integrator, defaults = Integrator(model), _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(defaults | dict(values)):
@@ -109,27 +123,22 @@ class OfManoeuvre:
 
         return ask
 
-    def _held(self, integrator: Integrator, turn: Turn, steps: int) -> Ask:
-        """Joint runs of members with a constant rudder, in a single call of the compiled loop."""
-        model, h = integrator.model, integrator.model.step_s
-        defaults, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
-        t = np.append(np.arange(0, steps, EVERY), steps) * h
-        inputs = np.tile(u, (len(t), 1))
+    def _in_lanes(self, model: Model, lanes: LaneManoeuvres) -> Callable[[int, Mapping[str, Array], bool], BatchResult]:
+        """Joint runs of the members of a batch."""
+        assert isinstance(self.manoeuvre, Turn | Zigzag)
+        manoeuvre, rows = self.manoeuvre, [model.state_names.index(name) for name, _ in ENSEMBLE_SIGNALS.values()]
+        factors = np.array([factor for _, factor in ENSEMBLE_SIGNALS.values()])
 
-        def ask(members: Sequence[Mapping[str, float]]) -> list[MemberResult]:
-            whole = [defaults | dict(values) for values in members]
-            p = np.array([list(values.values()) for values in whole])
-            states = integrator.rollouts(np.array(model.initial(p.T)).T, u, p, (h, steps))
-            found = []
-            for values, parameters, x in zip(whole, p, states, strict=True):
-                run = Trajectory(model, t, x, inputs, integrator.outputs(x, inputs, parameters))
-                fault = mass_fault(values) or ("" if run.is_finite() else RUNAWAY)
-                if fault:
-                    found.append(MemberResult({}, trouble=fault))
-                    continue
-                figures = figures_of(turn, run, defaults["ship.length"])
-                found.append(MemberResult(_numbers(figures), _sampled(run, self.times)))
-            return found
+        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+            p, troubles = _ships(model, count, values)
+            found = lanes.run(manoeuvre, p, self.duration_s, self.times if kept else ())
+            troubles = _with_runaways(troubles, found.fine)
+            answer = _usable(dict(found.figures), troubles)
+            if not kept:
+                return answer
+            histories = (found.states[:, :, rows] * factors).transpose(0, 2, 1).astype(np.float32)
+            histories[[bool(trouble) for trouble in troubles]] = np.nan
+            return answer._replace(histories=histories)
 
         return ask
 
@@ -141,25 +150,49 @@ class OfFigures:
     ship: ShipText
     figures: tuple[str, ...]
 
-    def prepared(self) -> Ask:
+    batch = LANE_BATCH
+
+    def prepared(self) -> AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         # It takes python-control with it, slow to load: processes that run manoeuvres do without.
         from tank2sim.analysis.influence.study import Study
 
-        study = Study(self.ship.card(), [parse_figure(text) for text in self.figures])
+        card, asked = self.ship.card(), [parse_figure(text) for text in self.figures]
+        study = Study(card, asked)
+        lanes = _lanes_of(study.model) if any(_lane_figure(figure) for figure in asked) else None
+        joint = [figure for figure in asked if lanes and _lane_figure(figure)]
+        single = [figure for figure in asked if figure not in joint]
+        one_by_one = Study(card, single) if joint and single else study
         names, defaults = [parameter.name for parameter in study.parameters], _parameters(study.model)
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
+        def ask_one(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
             try:
-                found = study.figures_at(np.array([given[name] for name in names]))
+                found = one_by_one.figures_at(np.array([given[name] for name in names]))
             except InputError as error:
                 return MemberResult({}, trouble=error.problem)
-            return MemberResult(dict(zip(self.figures, found.tolist(), strict=True)))
+            return MemberResult(dict(zip([figure.text for figure in one_by_one.figures], found.tolist(), strict=True)))
 
-        return _each(ask)
+        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+            p, troubles = _ships(study.model, count, values)
+            found: dict[str, Array] = {}
+            for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in joint):
+                assert lanes is not None and manoeuvre is not None
+                runs = lanes.run(manoeuvre, p)
+                troubles = _with_runaways(troubles, runs.fine)
+                for figure in joint:
+                    if figure.manoeuvre == manoeuvre:
+                        found[figure.text] = runs.figures.get(_lane_figure(figure), np.full(count, np.nan))
+            if single or not joint:
+                members = _members_of(count, values)
+                answer = gathered([ask_one(member) for member in members])
+                found |= answer.figures
+                troubles = [first or other for first, other in zip(troubles, answer.troubles, strict=True)]
+            return _usable({text: found[text] for text in self.figures if text in found}, troubles)
+
+        return AskTogether(ask)
 
 
 @dataclass(frozen=True)
@@ -168,23 +201,95 @@ class OfCriteria:
 
     ship: ShipText
 
-    def prepared(self) -> Ask:
+    batch = LANE_BATCH
+
+    def prepared(self) -> Ask | AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        integrator, parameters = Integrator(model, every=EVERY), _parameters(model)
+        integrator, each_step, parameters = Integrator(model, every=EVERY), Integrator(model), _parameters(model)
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
+        def ask_one(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
             given = {name: value for name, value in values.items() if name in parameters}
             if fault := mass_fault(parameters | given):
                 return MemberResult({}, trouble=fault)
-            criteria = imo_criteria(model, given, integrator)
+            criteria = imo_criteria(model, given, each_step)
             return MemberResult(
                 {criterion.name: math.nan if criterion.found is None else criterion.found for criterion in criteria}
             )
 
-        return _each(ask)
+        lanes = _lanes_of(whole)
+        if lanes is None:
+            return _each(ask_one)
+        trials = manoeuvring_trials(largest_trial_rudder(parameters))
+
+        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+            members = _members_of(count, values)
+            p, troubles = _ships(model, count, values)
+            rudders = {largest_trial_rudder(parameters | member) for member in members}
+            if rudders != {largest_trial_rudder(parameters)}:  # the gear's stops are uncertain
+                return gathered([ask_one(member) for member in members])
+            figures: dict[str, Array] = {}
+            for trial in trials:
+                sides = [lanes.run(manoeuvre, p, inputs=undisturbed_inputs(model)) for manoeuvre in trial.manoeuvres]
+                for name, figure in trial.criteria.items():
+                    shown = [side.figures.get(figure, np.full(count, np.nan)) for side in sides]
+                    figures[name] = np.maximum(*shown)
+            if "propeller.speed" in model.input_names:
+                given = ({name: value for name, value in member.items() if name in parameters} for member in members)
+                reaches = [
+                    None if trouble else stopping(model, member, integrator)
+                    for member, trouble in zip(given, troubles, strict=True)
+                ]
+                figures[TRACK_REACH] = np.array([math.nan if reach is None else reach for reach in reaches])
+            return _usable(figures, troubles)
+
+        return AskTogether(ask)
+
+
+def _lanes_of(model: Model) -> LaneManoeuvres | None:
+    try:
+        return LaneManoeuvres(model)
+    except NoLanesError:
+        return None
+
+
+def _lane_figure(figure: InfluenceFigure) -> str:
+    """Name of a figure of a turning circle or zigzag among those of runs; empty for others."""
+    if figure.kind.family not in (TURN, ZIGZAG):
+        return ""
+    spelt = {"initial_turning_m": "initial_turning_distance_m", "initial_turning_s": "initial_turning_time_s"}
+    return re.sub(r"^overshoot(\d)", r"overshoot_\1", spelt.get(figure.kind.name, figure.kind.name))
+
+
+def _members_of(count: int, values: Mapping[str, Array]) -> list[dict[str, float]]:
+    """The parameters of each of n members by name."""
+    columns = [value.tolist() for value in values.values()]
+    return [dict(zip(values, row, strict=True)) for row in zip(*columns, strict=True)] if columns else [{}] * count
+
+
+def _usable(figures: dict[str, Array], troubles: Sequence[str]) -> BatchResult:
+    """The figures of a batch, nan for unusable members."""
+    bad = [number for number, trouble in enumerate(troubles) if trouble]
+    for figure in figures.values():
+        figure[bad] = np.nan
+    return BatchResult(figures, None, troubles)
+
+
+def _ships(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Array, list[str]]:
+    """Parameters (n, np) of n members with `values` (n,) by name, without those that the model lacks; and the fault of
+    the mass matrix of each, empty without one."""
+    p = np.tile(model.parameter_values(), (count, 1))
+    places = {name: place for place, name in enumerate(model.parameter_names)}
+    for name, value in values.items():
+        if name in places:
+            p[:, places[name]] = value
+    return p, mass_faults(dict(zip(model.parameter_names, p.T, strict=True)))
+
+
+def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bool_]) -> list[str]:
+    return [trouble or ("" if well else RUNAWAY) for trouble, well in zip(troubles, fine, strict=True)]
 
 
 def _each(ask: AskOne) -> Ask:

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, entry_name
-from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbers, entry_name, single_figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import FULL_ASTERN, Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
@@ -33,6 +32,43 @@ _SCALE = (
 
 _TURNED = math.radians(90.0)
 """Turn against the rudder from which a ship responds the wrong way, not late. Project choice."""
+
+
+ADVANCE, TACTICAL = "advance", "tactical diameter"
+INITIAL = "initial turning, 10 deg rudder to 10 deg heading"
+FIRST_OF_TEN, SECOND_OF_TEN = "10/10 zigzag, first overshoot", "10/10 zigzag, second overshoot"
+FIRST_OF_TWENTY, TRACK_REACH = "20/20 zigzag, first overshoot", "stopping, full astern, track reach"
+
+
+@dataclass(frozen=True)
+class ManoeuvringTrial:
+    """Trials to both sides, and the figure of each criterion: the larger of the two sides."""
+
+    manoeuvres: tuple[Turn, Turn] | tuple[Zigzag, Zigzag]
+    criteria: Mapping[str, str]
+
+
+def largest_trial_rudder(parameters: Mapping[str, float]) -> float:
+    """Rudder of the turning circles of a ship with parameters by name, rad."""
+    return min(TRIAL_RUDDER, parameters.get("steering.max_angle", TRIAL_RUDDER))
+
+
+def manoeuvring_trials(rudder: float) -> tuple[ManoeuvringTrial, ...]:
+    """Turning circles at `rudder`, 10/10 and 20/20 zigzags, with their criteria."""
+    ten, twenty = math.radians(10.0), math.radians(20.0)
+    of_turn = {ADVANCE: "advance_lengths", TACTICAL: "tactical_diameter_lengths"}
+    of_ten = {
+        INITIAL: "initial_turning_lengths",
+        FIRST_OF_TEN: entry_name("overshoots_deg", 0),
+        SECOND_OF_TEN: entry_name("overshoots_deg", 1),
+    }
+    return (
+        ManoeuvringTrial((Turn(rudder), Turn(-rudder)), of_turn),
+        ManoeuvringTrial((Zigzag(ten, ten), Zigzag(-ten, ten)), of_ten),
+        ManoeuvringTrial(
+            (Zigzag(twenty, twenty), Zigzag(-twenty, twenty)), {FIRST_OF_TWENTY: entry_name("overshoots_deg", 0)}
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -87,18 +123,17 @@ class _Trials:
             run = simulate(self.model, manoeuvre, inputs=calm, parameters=defaults, integrator=integrator)
         except InputError as error:
             return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem)
-        return _Trial(run.figures, _wrong_way(manoeuvre, run.trajectory), run.reading)
+        return _Trial(single_figures(run.figures), _wrong_way(manoeuvre, run.trajectory), run.reading)
 
-    def worst(self, manoeuvres: Sequence[Manoeuvre], *places: tuple[str, int | None]) -> list[_Worse]:
+    def worst(self, manoeuvres: Sequence[Manoeuvre], *names: str) -> list[_Worse]:
         """The larger of each figure over the trials, with a remark on its absence or validity."""
         runs = [self.run(manoeuvre) for manoeuvre in manoeuvres]
         trouble = next((run.trouble for run in runs if run.trouble), "")
         found: list[_Worse] = []
-        for name, number in places:
-            values = [_number(run.figures.get(name), number) for run in runs]
+        for name in names:
+            values = [run.figures.get(name) for run in runs]
             shown = [value for value in values if value is not None]
-            single = name if number is None else entry_name(name, number)
-            outside = next((run.reading.message for run in runs if run.reading.outside(single)), "")
+            outside = next((run.reading.message for run in runs if run.reading.outside(name)), "")
             if len(shown) == len(values):
                 found.append(_Worse(max(shown), outside))
             else:
@@ -111,7 +146,7 @@ class _Trials:
 class _Trial:
     """Figures of a trial, the reason without any, and the names of those outside the card's range."""
 
-    figures: Figures
+    figures: Numbers
     trouble: str
     reading: CardRangeReading = NOTHING_READ
 
@@ -162,51 +197,51 @@ def imo_criteria(
     parameters = dict(zip(model.parameter_names, model.parameter_values(changed).tolist(), strict=True))
     time = parameters["ship.length"] / parameters["ship.speed"]
     scale = _SCALE if parameters["ship.length"] < SHORTEST_SHIP_M else ""
-    rudder = min(TRIAL_RUDDER, parameters.get("steering.max_angle", TRIAL_RUDDER))
-    advance, tactical = trials.worst(
-        [Turn(rudder), Turn(-rudder)], ("advance_lengths", None), ("tactical_diameter_lengths", None)
-    )
-    ten, twenty = math.radians(10.0), math.radians(20.0)
-    initial, first, second = trials.worst(
-        [Zigzag(ten, ten), Zigzag(-ten, ten)],
-        ("initial_turning_lengths", None),
-        ("overshoots_deg", 0),
-        ("overshoots_deg", 1),
-    )
-    (of_twenty,) = trials.worst([Zigzag(twenty, twenty), Zigzag(-twenty, twenty)], ("overshoots_deg", 0))
+    worst: dict[str, _Worse] = {}
+    for trial in manoeuvring_trials(largest_trial_rudder(parameters)):
+        found = trials.worst(trial.manoeuvres, *trial.criteria.values())
+        worst |= dict(zip(trial.criteria, found, strict=True))
 
-    def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
-        text = "; ".join(text_part for text_part in (found.remark, remark) if text_part)
-        return ImoCriterion(name, found.value, allowed, unit, text, found.beyond)
+    def criterion(name: str, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
+        text = "; ".join(text_part for text_part in (worst[name].remark, remark) if text_part)
+        return ImoCriterion(name, worst[name].value, allowed, unit, text, worst[name].beyond)
 
     return (
-        criterion("advance", advance, 4.5, "L"),
-        criterion("tactical diameter", tactical, 5.0, "L"),
-        criterion("initial turning, 10 deg rudder to 10 deg heading", initial, 2.5, "L"),
-        criterion("10/10 zigzag, first overshoot", first, min(max(5 + 0.5 * time, 10.0), 20.0), "deg", scale),
-        criterion("10/10 zigzag, second overshoot", second, min(max(17.5 + 0.75 * time, 25.0), 40.0), "deg", scale),
-        criterion("20/20 zigzag, first overshoot", of_twenty, 25.0, "deg"),
+        criterion(ADVANCE, 4.5, "L"),
+        criterion(TACTICAL, 5.0, "L"),
+        criterion(INITIAL, 2.5, "L"),
+        criterion(FIRST_OF_TEN, min(max(5 + 0.5 * time, 10.0), 20.0), "deg", scale),
+        criterion(SECOND_OF_TEN, min(max(17.5 + 0.75 * time, 25.0), 40.0), "deg", scale),
+        criterion(FIRST_OF_TWENTY, 25.0, "deg"),
         _stopping(trials),
     )
 
 
+def stopping(model: Model, changed: Mapping[str, float], integrator: Integrator) -> float | None:
+    """Track reach of full astern stopping, L, of a ship with propulsion; None where its trial does not show it.
+
+    Parameters
+    ----------
+    model : Model
+        The ship.
+    changed : mapping
+        Parameters in place of the model's, by name.
+    integrator : Integrator
+        An existing integrator of this model.
+    """
+    return _stopping(_Trials(model, integrator, changed)).found
+
+
 def _stopping(trials: _Trials) -> ImoCriterion:
     """Track reach of full astern stopping, for a card with propulsion."""
-    name = "stopping, full astern, track reach"
+    name = TRACK_REACH
     if "propeller.speed" not in trials.model.input_names:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
         return ImoCriterion(name, None, STOPPING, "L", remark)
-    (worse,) = trials.worst([Stop()], ("track_reach_lengths", None))
+    (worse,) = trials.worst([Stop()], "track_reach_lengths")
     found = worse.value
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
     remark = "; ".join(text_part for text_part in (worse.remark, remark if found is not None else "") if text_part)
     return ImoCriterion(name, found, STOPPING, "L", remark, worse.beyond)
-
-
-def _number(figure: object, place: int | None) -> float | None:
-    """A figure, or the one at a place of a list of them; None if the trial did not show it."""
-    if isinstance(figure, list):
-        figure = figure[place] if place is not None and place < len(figure) else None
-    return figure if isinstance(figure, float) else None

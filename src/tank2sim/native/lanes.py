@@ -1,0 +1,300 @@
+"""C code that evaluates a CasADi function for several ships at once, each in a lane of a vector register.
+
+Every operation acts on all lanes by itself and in the order of the function, without fused operations, and the sine is
+a polynomial of this file: a lane has the same bits for any number of lanes, on any processor. Conditions are masks.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+
+import casadi as ca
+
+from tank2sim.errors import InputError
+from tank2sim.native.compiler import find_compiler
+from tank2sim.native.library import cached_library
+
+FLAGS_OF_LANES = {8: ("-mavx512f", "-mavx512dq"), 4: ("-mavx2",), 2: (), 1: ()}
+"""Flags of the compiler for a number of lanes: AVX-512, AVX2, SSE2 or NEON, plain C."""
+
+# The widest vectors of doubles that processor and operating system offer, asked when run: a cache of libraries may be
+# shared by machines.
+_WIDEST = """
+#if defined(_WIN32)
+__declspec(dllexport)
+#else
+__attribute__((visibility("default")))
+#endif
+int widest(void) {
+#if (defined(__x86_64__) || defined(_M_X64)) && defined(__GNUC__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return 8;
+  if (__builtin_cpu_supports("avx2")) return 4;
+  return 2;
+#elif defined(__aarch64__) && defined(__GNUC__)
+  return 2;
+#else
+  return 1;
+#endif
+}
+"""
+
+# The sine and cosine are those of fdlibm (Sun Microsystems 1993, k_sin.c, k_cos.c and e_rem_pio2.c: their coefficients
+# and the three parts of pi/2), within 1e-15 of the exact ones where the reduction is exact, and the C library's beyond.
+VECTORS = """
+#include <math.h>
+#include <string.h>
+#if LANES > 1
+typedef double V __attribute__((vector_size(8 * LANES), may_alias));
+typedef long long M __attribute__((vector_size(8 * LANES), may_alias));
+#if defined(__AVX512F__) || defined(__AVX__) || defined(__SSE2__)
+#include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#endif
+#define BITS(x) ((M) (x))
+#define REALS(m) ((V) (m))
+static inline V all(double x) { V v; for (int i = 0; i < LANES; ++i) v[i] = x; return v; }
+static inline V lane_sqrt(V x) {
+#if LANES == 8 && defined(__AVX512F__)
+  return (V) _mm512_sqrt_pd((__m512d) x);
+#elif LANES == 4 && defined(__AVX__)
+  return (V) _mm256_sqrt_pd((__m256d) x);
+#elif LANES == 2 && defined(__SSE2__)
+  return (V) _mm_sqrt_pd((__m128d) x);
+#elif LANES == 2 && defined(__ARM_NEON)
+  return (V) vsqrtq_f64((float64x2_t) x);
+#else
+  V y;
+  for (int i = 0; i < LANES; ++i) y[i] = sqrt(x[i]);
+  return y;
+#endif
+}
+static inline int some(M m) { long long any = 0; for (int i = 0; i < LANES; ++i) any |= m[i]; return any != 0; }
+#define LANE(x, i) ((x)[i])
+#else
+typedef double V;
+typedef long long M;
+static inline M BITS(V x) { M m; memcpy(&m, &x, sizeof m); return m; }
+static inline V REALS(M m) { V x; memcpy(&x, &m, sizeof x); return x; }
+static inline V all(double x) { return x; }
+static inline V lane_sqrt(V x) { return sqrt(x); }
+static inline int some(M m) { return m != 0; }
+#define LANE(x, i) (*(&(x) + (i)))
+#endif
+#if LANES > 1
+#define LT(a, b) ((M) ((a) < (b)))
+#define LE(a, b) ((M) ((a) <= (b)))
+#define EQ(a, b) ((M) ((a) == (b)))
+#define NE(a, b) ((M) ((a) != (b)))
+#else
+#define LT(a, b) (-(M) ((a) < (b)))
+#define LE(a, b) (-(M) ((a) <= (b)))
+#define EQ(a, b) (-(M) ((a) == (b)))
+#define NE(a, b) (-(M) ((a) != (b)))
+#endif
+#define WHERE(m, a, b) REALS(((m) & BITS(a)) | (~(m) & BITS(b)))
+#define WHERE0(m, a) REALS((m) & BITS(a))
+#define TRUTH(m) WHERE0(m, all(1.0))
+#define NOT_ZERO(a) NE(a, all(0.0))
+static inline V lane_fabs(V x) { return REALS(BITS(x) & ~BITS(all(-0.0))); }
+static inline V lane_fmin(V x, V y) { const M m = LT(x, y) | NE(y, y); return WHERE(m, x, y); }
+static inline V lane_fmax(V x, V y) { const M m = LT(y, x) | NE(y, y); return WHERE(m, x, y); }
+static inline V lane_sign(V x) {
+  const V zero = all(0.0);
+  return WHERE(LT(x, zero), all(-1.0), WHERE(LT(zero, x), all(1.0), x));
+}
+#define EACH(name, call)                                        \\
+  static inline V lane_##name(V x) {                            \\
+    V y = x;                                                    \\
+    for (int i = 0; i < LANES; ++i) LANE(y, i) = call(LANE(x, i)); \\
+    return y;                                                   \\
+  }
+#define EACH_OF_TWO(name, call)                                 \\
+  static inline V lane_##name(V a, V b) {                       \\
+    V y = a;                                                    \\
+    for (int i = 0; i < LANES; ++i) LANE(y, i) = call(LANE(a, i), LANE(b, i)); \\
+    return y;                                                   \\
+  }
+EACH(tan, tan) EACH(asin, asin) EACH(acos, acos) EACH(atan, atan) EACH(exp, exp) EACH(log, log) EACH(floor, floor)
+EACH(ceil, ceil) EACH(sinh, sinh) EACH(cosh, cosh) EACH(tanh, tanh) EACH(erf, erf) EACH(log1p, log1p)
+EACH(expm1, expm1) EACH(asinh, asinh) EACH(acosh, acosh) EACH(atanh, atanh)
+EACH_OF_TWO(pow, pow) EACH_OF_TWO(atan2, atan2) EACH_OF_TWO(fmod, fmod) EACH_OF_TWO(hypot, hypot)
+EACH_OF_TWO(copysign, copysign)
+static inline void lane_sincos(V x, V *sine, V *cosine) {
+  const V shift = all(6755399441055744.0); /* 1.5 * 2^52: adding it rounds to an integer, in the lowest bits */
+  const V shifted = x * all(6.36619772367581382433e-01) + shift;
+  const V n = shifted - shift;
+  const V r = ((x - n * all(1.57079632673412561417e+00)) - n * all(6.07710050630396597660e-11))
+      - n * all(2.02226624871116645580e-21);
+  const V z = r * r;
+  const V s = r + (z * r) * (all(-1.66666666666666324348e-01) + z * (all(8.33333333332248946124e-03)
+      + z * (all(-1.98412698298579493134e-04) + z * (all(2.75573137070700676789e-06)
+      + z * (all(-2.50507602534068634195e-08) + z * all(1.58969099521155010221e-10))))));
+  const V p = z * (all(4.16666666666666019037e-02) + z * (all(-1.38888888888741095749e-03)
+      + z * (all(2.48015872894767294178e-05) + z * (all(-2.75573143513906633035e-07)
+      + z * (all(2.08757232129817482790e-09) + z * all(-1.13596475577881948265e-11))))));
+  const V half = all(0.5) * z, w = all(1.0) - half;
+  const V c = w + (((all(1.0) - w) - half) + z * p);
+  const M one = BITS(all(0.0)) - (-1), quadrant = BITS(shifted);
+  const M odd = -(quadrant & one), low = (quadrant >> 1) & one, up = ((quadrant + one) >> 1) & one;
+  *sine = REALS(BITS(WHERE(odd, c, s)) ^ (low << 63));
+  *cosine = REALS(BITS(WHERE(odd, s, c)) ^ (up << 63));
+  const M far = ~LE(lane_fabs(x), all(1e5)); /* beyond it the reduction is not exact; so for nan */
+  if (some(far))
+    for (int i = 0; i < LANES; ++i)
+      if (!(fabs(LANE(x, i)) <= 1e5)) { LANE(*sine, i) = sin(LANE(x, i)); LANE(*cosine, i) = cos(LANE(x, i)); }
+}
+"""
+"""C of vectors of LANES doubles (``V``), their masks (``M``), and the functions of them."""
+
+_OF_TWO = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
+_COMPARISONS = {ca.OP_LT: "LT", ca.OP_LE: "LE", ca.OP_EQ: "EQ", ca.OP_NE: "NE"}
+_NAMED = {
+    ca.OP_SQRT: "sqrt",
+    ca.OP_FABS: "fabs",
+    ca.OP_SIGN: "sign",
+    ca.OP_FMIN: "fmin",
+    ca.OP_FMAX: "fmax",
+    ca.OP_TAN: "tan",
+    ca.OP_ASIN: "asin",
+    ca.OP_ACOS: "acos",
+    ca.OP_ATAN: "atan",
+    ca.OP_EXP: "exp",
+    ca.OP_LOG: "log",
+    ca.OP_FLOOR: "floor",
+    ca.OP_CEIL: "ceil",
+    ca.OP_SINH: "sinh",
+    ca.OP_COSH: "cosh",
+    ca.OP_TANH: "tanh",
+    ca.OP_ERF: "erf",
+    ca.OP_LOG1P: "log1p",
+    ca.OP_EXPM1: "expm1",
+    ca.OP_ASINH: "asinh",
+    ca.OP_ACOSH: "acosh",
+    ca.OP_ATANH: "atanh",
+    ca.OP_POW: "pow",
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_ATAN2: "atan2",
+    ca.OP_FMOD: "fmod",
+    ca.OP_HYPOT: "hypot",
+    ca.OP_COPYSIGN: "copysign",
+}
+
+
+class NoLanesError(Exception):
+    """A function has an operation that cannot be evaluated in lanes."""
+
+
+@cache
+def widest_lanes() -> int:
+    """Number of doubles in a vector register of this machine; 1 without vectors, 0 without a C compiler."""
+    if find_compiler() is None:
+        return 0
+    try:
+        library = ctypes.CDLL(str(cached_library({"widest.c": _WIDEST})))
+    except (InputError, OSError):
+        return 0
+    except RuntimeError:  # a compiler that has no words for what a processor has
+        return 1
+    return int(library.widest())
+
+
+def lane_function(function: ca.Function, name: str) -> str:
+    """C of ``static void name(const V *const *arg, V *const *res)``, a function of scalar operations in lanes.
+
+    Arguments and results are dense vectors of lanes, in the function's order. It needs :data:`VECTORS` before it.
+
+    Raises
+    ------
+    NoLanesError
+        An operation cannot be evaluated in lanes.
+    """
+    return _Lanes(function).code(name)
+
+
+class _Lanes:
+    """The instructions of a function, each a C variable that is assigned once."""
+
+    def __init__(self, function: ca.Function):
+        self.function = function
+        self.lines: list[str] = []
+        self.at: dict[int, str] = {}  # place in CasADi's work vector, to the variable that it holds now
+        self.masks: set[str] = set()
+        self.circular: dict[str, tuple[str, str]] = {}  # an angle's sine and cosine
+
+    def code(self, name: str) -> str:
+        for function in (self.function,):
+            if not function.is_a("SXFunction"):
+                raise NoLanesError(f"{function.name()} is not of scalar operations")
+        for k in range(self.function.n_instructions()):
+            self._add(k)
+        body = "\n".join(f"  {line}" for line in self.lines)
+        return f"static void {name}(const V *const *arg, V *const *res) {{\n{body}\n}}\n"
+
+    def _add(self, k: int) -> None:
+        f = self.function
+        operation, to = f.instruction_id(k), f.instruction_output(k)
+        if operation == ca.OP_OUTPUT:
+            source = self._real(self.at[f.instruction_input(k)[0]])
+            self.lines.append(f"res[{to[0]}][{to[1]}] = {source};")
+            return
+        variable = f"a{k}"
+        if operation == ca.OP_INPUT:
+            place = f.instruction_input(k)
+            self._set(to[0], variable, f"arg[{place[0]}][{place[1]}]")
+            return
+        if operation == ca.OP_CONST:
+            self._set(to[0], variable, f"all({f.instruction_constant(k)!r})")
+            return
+        sources = [self.at[place] for place in f.instruction_input(k)]
+        text, mask = self._operation(operation, sources, k)
+        self._set(to[0], variable, text, mask=mask)
+
+    def _set(self, place: int, variable: str, text: str, *, mask: bool = False) -> None:
+        self.lines.append(f"const {'M' if mask else 'V'} {variable} = {text};")
+        self.at[place] = variable
+        if mask:
+            self.masks.add(variable)
+
+    def _real(self, variable: str) -> str:
+        return f"TRUTH({variable})" if variable in self.masks else variable
+
+    def _mask(self, variable: str) -> str:
+        return variable if variable in self.masks else f"NOT_ZERO({variable})"
+
+    def _operation(self, operation: int, sources: list[str], k: int) -> tuple[str, bool]:
+        """The expression of an operation, and whether it is a mask."""
+        if operation in (ca.OP_AND, ca.OP_OR):
+            sign = "&" if operation == ca.OP_AND else "|"
+            return f"{self._mask(sources[0])} {sign} {self._mask(sources[1])}", True
+        if operation == ca.OP_NOT:
+            return f"~{self._mask(sources[0])}", True
+        if operation == ca.OP_IF_ELSE_ZERO:
+            return f"WHERE0({self._mask(sources[0])}, {self._real(sources[1])})", False
+        real = [self._real(source) for source in sources]
+        if operation in _COMPARISONS:
+            return f"{_COMPARISONS[operation]}({real[0]}, {real[1]})", True
+        if operation in _OF_TWO:
+            return f"{real[0]} {_OF_TWO[operation]} {real[1]}", False
+        if operation in (ca.OP_SIN, ca.OP_COS):
+            return self._sine_or_cosine(real[0], k)[operation == ca.OP_COS], False
+        simple = {
+            ca.OP_ASSIGN: "{0}",
+            ca.OP_NEG: "-{0}",
+            ca.OP_SQ: "{0} * {0}",
+            ca.OP_TWICE: "all(2.0) * {0}",
+            ca.OP_INV: "all(1.0) / {0}",
+        }
+        if operation in simple:
+            return simple[operation].format(*real), False
+        if operation in _NAMED:
+            return f"lane_{_NAMED[operation]}({', '.join(real)})", False
+        raise NoLanesError(f"operation {operation} of {self.function.name()}")
+
+    def _sine_or_cosine(self, angle: str, k: int) -> tuple[str, str]:
+        if angle not in self.circular:
+            self.lines.append(f"V s{k}, c{k}; lane_sincos({angle}, &s{k}, &c{k});")
+            self.circular[angle] = f"s{k}", f"c{k}"
+        return self.circular[angle]

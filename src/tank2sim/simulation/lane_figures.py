@@ -1,0 +1,329 @@
+"""Figures of turns and zigzags of many ships, from what their runs in lanes keep.
+
+They are those of :mod:`tank2sim.simulation.figures` for a trajectory with a sample at each step, to rounding: the same
+Hermite cubics at crossings, the same cubics through four samples, for all ships at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.native.lanes import NoLanesError
+from tank2sim.simulation.card_range import entry_name, single_figures
+from tank2sim.simulation.figures import REST_SPEED, STEADY_SHARE
+from tank2sim.simulation.lane_runs import CROSSINGS, FINE, UNKNOWN, LanePlan, LaneResults, LaneRunner
+from tank2sim.simulation.manoeuvres import (
+    LONGEST_LENGTHS,
+    TURN_HEADING,
+    ZIGZAG_EXECUTES,
+    Manoeuvre,
+    Turn,
+    Zigzag,
+)
+from tank2sim.simulation.rows import RowFunction
+from tank2sim.simulation.run import simulate
+
+_HALVINGS = 60
+"""Halvings of a step in the search of a crossing: to rounding."""
+
+_BEGINS = "motion.x", "motion.y", "motion.psi"
+
+
+@dataclass(frozen=True, eq=False)
+class LaneFigures:
+    """Figures of n ships in a manoeuvre.
+
+    Parameters
+    ----------
+    figures : mapping
+        Name with unit to the figure of each ship (n,), nan where its run does not show it; entries of lists by their
+        own names (``overshoot_1_deg``).
+    states : array (n, times, nx)
+        States at the requested times; nan after the end.
+    fine : array (n,)
+        False for a ship whose motion left all bounds.
+    """
+
+    figures: Mapping[str, Array]
+    states: Array
+    fine: NDArray[np.bool_]
+
+
+def runs_in_lanes(manoeuvre: Manoeuvre) -> bool:
+    """Whether lanes have this manoeuvre: a turn or a zigzag without delays of helm and gear."""
+    if isinstance(manoeuvre, Turn):
+        return manoeuvre.wait_s == 0
+    simple = isinstance(manoeuvre, Zigzag) and manoeuvre.lag_s == manoeuvre.wait_s == 0 and manoeuvre.course is None
+    return simple and isinstance(manoeuvre, Zigzag) and manoeuvre.heading > 0
+
+
+class LaneManoeuvres:
+    """Runs turns and zigzags of a model in lanes.
+
+    Parameters
+    ----------
+    model : Model
+        A ship that begins where its parameters say, without a trim.
+    lanes : int, optional
+        As for :class:`tank2sim.simulation.lane_runs.LaneRunner`.
+
+    Raises
+    ------
+    NoLanesError
+        The model cannot be run in lanes.
+    """
+
+    def __init__(self, model: Model, lanes: int | None = None):
+        self.model = model
+        if "initial.trim" in model and model.parameter_values()[model.parameter_names.index("initial.trim")]:
+            raise NoLanesError("a ship that is trimmed first is not run in lanes")
+        if not {*_BEGINS, "motion.u", "motion.v", "motion.r"} <= set(model.state_names):
+            raise NoLanesError("the model is not that of a ship")
+        self._runner = LaneRunner(model, lanes)
+        arguments = [model.x, model.u, model.p]
+        self._read = {
+            name: RowFunction(ca.Function("read", arguments, [model.expand(model.symbol(name))], {"cse": True}))
+            for name in ("motion.beta", "motion.rdot")
+        }
+
+    def run(
+        self,
+        manoeuvre: Turn | Zigzag,
+        p: Array,
+        duration_s: float | None = None,
+        times: Sequence[float] | Array = (),
+        inputs: Mapping[str, float] | None = None,
+    ) -> LaneFigures:
+        """Figures of ships with parameters `p` (n, np), and their states at `times`.
+
+        Parameters
+        ----------
+        manoeuvre : Turn or Zigzag
+            One of those for which :func:`runs_in_lanes` is true.
+        p : array (n, np)
+            Parameters of the model.
+        duration_s : float, optional
+            As for :func:`tank2sim.simulation.run.simulate`.
+        times : array (m,)
+            Times at which states are kept, s.
+        inputs : mapping, optional
+            Values in place of the model's, by name.
+        """
+        u = self.model.input_values(inputs)
+        p = np.ascontiguousarray(p, dtype=float)
+        starts = np.ascontiguousarray(np.array(self.model.initial(p.T)).T)
+        place = self.model.parameter_names.index
+        ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
+        ends = LONGEST_LENGTHS * ship_times if duration_s is None else np.full(len(p), duration_s)
+        plan = _plan(manoeuvre, u, times, timed=duration_s is not None)
+        side = math.copysign(1.0, manoeuvre.rudder)
+        heading = starts[:, [self.model.state_names.index("motion.psi")]]
+        if isinstance(manoeuvre, Turn):
+            levels = heading + side * np.array([math.pi / 2, math.pi])
+        else:
+            levels = np.hstack([heading, np.zeros_like(heading)])
+        found = self._runner.runs(plan, p, starts, ends, levels)
+        if isinstance(manoeuvre, Turn):
+            figures = self._turn(found, (u, p), starts, manoeuvre)
+        else:
+            figures = self._zigzag(found, (u, p), starts, (manoeuvre, plan.limit))
+        fine = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
+        for number in np.flatnonzero(found.ended == UNKNOWN).tolist():
+            fine[number] = self._by_itself((manoeuvre, duration_s, inputs), p[number], figures, number)
+        for values in figures.values():
+            values[~fine] = np.nan
+        return LaneFigures(figures, found.states, fine)
+
+    def _by_itself(
+        self,
+        asked: tuple[Turn | Zigzag, float | None, Mapping[str, float] | None],
+        p: Array,
+        figures: dict[str, Array],
+        number: int,
+    ) -> bool:
+        """The figures of a single ship with more events than lanes keep; whether it could be run."""
+        (manoeuvre, duration, inputs), model = asked, self.model
+        parameters = dict(zip(model.parameter_names, p.tolist(), strict=True))
+        count = len(next(iter(figures.values())))
+        for values in figures.values():
+            values[number] = np.nan
+        try:
+            run = simulate(model, manoeuvre, duration_s=duration, inputs=inputs, parameters=parameters)
+        except InputError:
+            return False
+        for name, value in single_figures(run.figures).items():
+            figures.setdefault(name, np.full(count, np.nan))[number] = value
+        return True
+
+    def _column(self, rows: Array, name: str) -> Array:
+        values: Array = rows[..., self.model.state_names.index(name)]
+        return values
+
+    def _reading(self, name: str, x: Array, rudder: Array, others: tuple[Array, Array]) -> Array:
+        """An output (m,) at states `x` (m, nx) with rudder orders (m,), other inputs (nu,) and parameters (m, np)."""
+        inputs, p = others
+        u = np.tile(inputs, (len(x), 1))
+        u[:, self.model.input_names.index("rudder.command")] = rudder
+        (found,) = self._read[name](x, u, p)
+        return found[:, 0]
+
+    def _turn(self, found: LaneResults, others: tuple[Array, Array], starts: Array, turn: Turn) -> dict[str, Array]:
+        p = others[1]
+        side, length = math.copysign(1.0, turn.rudder), p[:, self.model.parameter_names.index("ship.length")]
+        places = []
+        for watch, change in enumerate((math.pi / 2, math.pi)):
+            window = found.windows[:, watch, 0]
+            level = self._column(starts, "motion.psi") + side * change
+            states = window[..., 2:]
+            offset = self._column(states, "motion.psi") - level[:, None]
+            time = _crossing(window[..., 0], offset, self._column(states, "motion.r"))
+            places.append((time, *self._ahead_and_aside(_through(window, time), starts, side)))
+        (quarter, advance, transfer), (half, _, tactical) = places
+        speed, rate = found.speeds[:, 3], self._column(found.last, "motion.r")
+        drift = self._reading("motion.beta", found.last, np.full(len(p), turn.rudder), others)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            steady = np.isfinite(half)
+            for now, then in ((rate, found.then[:, 0]), (speed, found.then[:, 1])):
+                steady &= np.abs(now - then) < STEADY_SHARE * np.abs(now)
+            at_last = {
+                "steady_diameter_m": 2 * speed / np.abs(rate),
+                "steady_drift_deg": np.degrees(drift),
+                "steady_rate_degps": np.degrees(rate),
+                "steady_speed_mps": speed,
+                "speed_loss_percent": _speed_loss(found, speed),
+            }
+        return {
+            "advance_m": advance,
+            "transfer_m": transfer,
+            "tactical_diameter_m": tactical,
+            "advance_lengths": advance / length,
+            "tactical_diameter_lengths": tactical / length,
+            "time_90_s": quarter,
+            "time_180_s": half,
+        } | {name: np.where(steady, values, np.nan) for name, values in at_last.items()}
+
+    def _zigzag(
+        self, found: LaneResults, others: tuple[Array, Array], starts: Array, asked: tuple[Zigzag, int]
+    ) -> dict[str, Array]:
+        (zigzag, limit), p, count = asked, others[1], len(starts)
+        side, length = math.copysign(1.0, zigzag.rudder), p[:, self.model.parameter_names.index("ship.length")]
+        course = self._column(starts, "motion.psi")
+        # The change at which a run ends is of no order any more.
+        changes = np.minimum(found.orders - (found.orders == limit), CROSSINGS)
+        executes = np.where(np.arange(CROSSINGS) < changes[:, None], found.order_times, np.nan)
+        windows = found.windows[..., 2:]
+        offset = self._column(windows[:, 0], "motion.psi") - course[:, None, None]
+        returns = _crossing(found.windows[:, 0, ..., 0], offset, self._column(windows[:, 0], "motion.r"))
+        returns = _sorted_after(returns, executes[:, 0])
+        turns = _crossing(
+            found.windows[:, 1, ..., 0], self._column(windows[:, 1], "motion.r"), self._yaw_accelerations(found, others)
+        )
+        headings = self._column(_through(found.windows[:, 1], turns), "motion.psi")
+        figures: dict[str, Array] = {}
+        for number in range(int(changes.max(initial=0))):
+            after = np.where(turns > executes[:, [number]], turns, np.inf)
+            first = np.argmin(after, axis=1)
+            peak = after[np.arange(count), first]
+            shown = np.isfinite(peak)
+            swung = side * (-1) ** number * (headings[np.arange(count), first] - course) - zigzag.heading
+            figures[entry_name("overshoots_deg", number)] = np.where(shown, np.degrees(swung), np.nan)
+            figures[entry_name("overshoot_times_s", number)] = np.where(shown, peak - executes[:, number], np.nan)
+            figures[entry_name("execute_times_s", number)] = executes[:, number].copy()
+        ahead, aside = self._ahead_and_aside(found.order_states[:, 0], starts, 1.0)
+        distance = np.where(np.isfinite(executes[:, 0]), np.hypot(ahead, aside), np.nan)
+        return figures | {
+            "initial_turning_time_s": executes[:, 0].copy(),
+            "initial_turning_distance_m": distance,
+            "initial_turning_lengths": distance / length,
+            "reach_s": returns[:, 0].copy(),
+            "period_s": returns[:, 2] - returns[:, 0],
+            "speed_loss_percent": _speed_loss(found, found.speeds[:, 1]),
+        }
+
+    def _yaw_accelerations(self, found: LaneResults, others: tuple[Array, Array]) -> Array:
+        """dr/dt (n, crossings, samples) about the crossings of zero rate, at the two samples between which they are."""
+        windows = found.windows[:, 1]
+        slopes = np.full(windows.shape[:-1], np.nan)
+        member, number = np.nonzero(np.isfinite(windows[:, :, 1, 0]))
+        for sample in (1, 2):
+            rows = windows[member, number, sample]
+            if len(rows):
+                slopes[member, number, sample] = self._reading(
+                    "motion.rdot", rows[:, 2:], rows[:, 1], (others[0], others[1][member])
+                )
+        return slopes
+
+    def _ahead_and_aside(self, states: Array, starts: Array, side: float) -> tuple[Array, Array]:
+        """Distances ahead and to the side of the turn of states (n, nx) from those at the execute, m."""
+        x, y, heading = (self._column(starts, name) for name in _BEGINS)
+        north, east = self._column(states, "motion.x") - x, self._column(states, "motion.y") - y
+        cos, sin = np.cos(heading), np.sin(heading)
+        return north * cos + east * sin, side * (east * cos - north * sin)
+
+
+def _plan(manoeuvre: Turn | Zigzag, inputs: Array, times: Sequence[float] | Array, *, timed: bool) -> LanePlan:
+    if isinstance(manoeuvre, Turn):
+        orders = (manoeuvre.rudder, manoeuvre.rudder)
+        return LanePlan(orders, TURN_HEADING, 0 if timed else 1, ("motion.psi", "motion.psi"), 1, inputs, times)
+    opposite = -manoeuvre.rudder if manoeuvre.opposite is None else manoeuvre.opposite
+    orders, watched = (manoeuvre.rudder, opposite), ("motion.psi", "motion.r")
+    limit = -1 if timed else ZIGZAG_EXECUTES
+    return LanePlan(orders, manoeuvre.heading, limit, watched, CROSSINGS, inputs, times)
+
+
+def _crossing(times: Array, offset: Array, slope: Array) -> Array:
+    """Times (...) at which the Hermite cubics between the middle two of four samples (..., 4) cross zero."""
+    begin, step = times[..., 1], times[..., 2] - times[..., 1]
+    low, high = offset[..., 1], offset[..., 2]
+    rise = (high - low) / step
+    square = (3 * rise - 2 * slope[..., 1] - slope[..., 2]) / step
+    cube = (slope[..., 1] + slope[..., 2] - 2 * rise) / step**2
+    before, after = np.zeros_like(step), step.copy()
+    below = low < 0
+    for _ in range(_HALVINGS):
+        middle = (before + after) / 2
+        value = low + middle * (slope[..., 1] + middle * (square + middle * cube))
+        same = (value < 0) == below
+        before, after = np.where(same, middle, before), np.where(same, after, middle)
+    found: Array = begin + (before + after) / 2
+    return found
+
+
+def _through(windows: Array, times: Array) -> Array:
+    """States (..., nx) at `times` (...) of the polynomials through the samples (..., 4, 2 + nx) that are not nan."""
+    at = windows[..., 0]
+    known = np.isfinite(at)
+    found = np.zeros((*at.shape[:-1], windows.shape[-1] - 2))
+    for k in range(at.shape[-1]):
+        weight = np.ones(at.shape[:-1])
+        for other in range(at.shape[-1]):
+            if other != k:
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    factor = (times - at[..., other]) / (at[..., k] - at[..., other])
+                weight = weight * np.where(known[..., other], factor, 1.0)
+        part = weight[..., None] * windows[..., k, 2:]
+        found += np.where(known[..., k, None], part, 0.0)
+    found[~np.isfinite(times)] = np.nan
+    return found
+
+
+def _sorted_after(times: Array, begin: Array) -> Array:
+    """Times (n, m) after `begin` (n,) in their order, then nan."""
+    with np.errstate(invalid="ignore"):
+        kept = np.where(times > begin[:, None], times, np.nan)
+    return np.sort(kept, axis=1)
+
+
+def _speed_loss(found: LaneResults, speed: Array) -> Array:
+    before, largest = found.speeds[:, 0], found.speeds[:, 2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(before > REST_SPEED * largest, 100 * (1 - speed / before), np.nan)

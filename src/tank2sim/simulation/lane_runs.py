@@ -1,0 +1,467 @@
+"""Manoeuvres of many ships at once, each in a lane of vector registers, without their tracks.
+
+The runs take the steps of :mod:`tank2sim.simulation.running`: a grid of whole steps, and a sample at each change of the
+rudder order. Of the motion only what figures need is kept: the samples around crossings of watched levels, the changes
+of order, the ends, and on request the states at given times.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
+from tank2sim.native.library import cached_library
+from tank2sim.simulation.rows import EXPORT
+from tank2sim.simulation.scheme import step_and_constants
+from tank2sim.simulation.trajectory import TIMES_BEYOND
+from tank2sim.units import UNITS
+
+FINE, RUNAWAY_LANE, UNKNOWN = 0, 1, 2
+"""How a run of a lane ended: well; beyond all bounds; with more events than are kept."""
+
+CROSSINGS = 12
+"""Most crossings of a watched level, and most changes of order, that are kept: a zigzag to its fifth execute has seven
+(project choice)."""
+
+SAMPLES = 4
+"""Samples about a crossing: two before it and two after it, for a cubic."""
+
+_REMEMBERED = 4096
+"""Steps of yaw rate and speed that are remembered for the judgement of a steady turn: with 200 in a length at the
+approach speed, two lengths at a tenth of it (project choice)."""
+
+# See Running.run_until and bracketed_root for the steps to an event. A lane that has ended takes steps of zero length.
+_RUNS = """
+enum {{ NX = {nx}, NU = {nu}, NP = {np}, NC = {nc}, PSI = {psi}, R = {r}, RUDDER = {rudder} }};
+enum {{ CROSSINGS = {crossings}, SAMPLES = {samples}, REMEMBERED = {remembered}, ROW = 2 + NX }};
+typedef struct {{
+  double h, first, second, heading;
+  long limit, watches, most, times;
+  const double *inputs, *limits, *at;
+}} Plan;
+typedef struct {{
+  double *end, *last, *then, *speeds, *order_times, *order_states, *windows, *states;
+  int *ended, *orders, *crossings;
+}} Found;
+typedef struct {{
+  V states[3][NX], *before, *x, *next, u[NU], p[NP], c[NC], h[1], t_before, t, t_next;
+}} Group;
+static void take(Group *g, V *to) {{
+  const V *const arg[5] = {{g->x, g->u, g->p, g->c, g->h}};
+  V *const res[1] = {{to}};
+  step(arg, res);
+}}
+static V speed_at(const Group *g, const V *x) {{
+  V speed[1];
+  const V *const arg[3] = {{x, g->u, g->p}};
+  V *const res[1] = {{speed}};
+  speed_of(arg, res);
+  return speed[0];
+}}
+/* The states of a lane after a step of a length; by how much it is beyond the goal. */
+static double beyond_after(Group *g, V *to, int lane, double length, double side, double goal) {{
+  LANE(g->h[0], lane) = length;
+  take(g, to);
+  return side * (LANE(to[PSI], lane) - goal);
+}}
+/* The step to a goal, by the method of Ridders, as bracketed_root. */
+static double step_to(Group *g, V *to, int lane, double high, double side, double goal) {{
+  double low = 0.0, best = INFINITY, f_low = beyond_after(g, to, lane, low, side, goal);
+  double f_high = beyond_after(g, to, lane, high, side, goal);
+  if (f_low == 0) return low;
+  if (f_high == 0) return high;
+  for (int k = 0; k < 200; ++k) {{
+    const double middle = (low + high) / 2, f_middle = beyond_after(g, to, lane, middle, side, goal);
+    const double root = sqrt(f_middle * f_middle - f_low * f_high), before = best;
+    if (!(root != 0)) return middle;
+    best = middle + (middle - low) * copysign(1.0, f_low - f_high) * f_middle / root;
+    const double f_best = beyond_after(g, to, lane, best, side, goal);
+    if (f_best == 0 || fabs(best - before) <= 1e-13) return best;
+    double x[4] = {{low, middle, best, high}}, f[4] = {{f_low, f_middle, f_best, f_high}};
+    if (best < middle) {{ x[1] = best; f[1] = f_best; x[2] = middle; f[2] = f_middle; }}
+    int at = 0;
+    while (at < 2 && !(f[at] * f[at + 1] <= 0)) ++at;
+    low = x[at]; f_low = f[at]; high = x[at + 1]; f_high = f[at + 1];
+    if (fabs(high - low) <= 1e-13) return (low + high) / 2;
+  }}
+  return best;
+}}
+static void keep_sample(double *row, double t, double order, const V *x, int lane) {{
+  row[0] = t;
+  row[1] = order;
+  for (int i = 0; i < NX; ++i) row[2 + i] = LANE(x[i], lane);
+}}
+{export}void run_lanes(long members, const Plan *plan, const double *p, const double *starts, const double *ends,
+    const double *levels, const double *lengths, const int *watched, const Found *found) {{
+  static const M none = {{0}};
+  V rates[REMEMBERED], velocities[REMEMBERED];
+  const double h = plan->h, tolerance = 1e-9 * h, side = plan->first < 0 ? -1.0 : 1.0;
+  for (long begin = 0; begin < members; begin += LANES) {{
+    Group g;
+    long member[LANES], due[LANES], events[LANES], open[LANES][2][2];
+    V goal, sides = all(side), end, level[2] = {{all(0), all(0)}}, steps = all(0), soon = all(INFINITY);
+    V approach, slowest, fastest;
+    M active = ~none, waiting = none;
+    g.before = g.states[0]; g.x = g.states[1]; g.next = g.states[2];
+    for (int l = 0; l < LANES; ++l) {{
+      const long k = begin + l < members ? begin + l : members - 1;
+      if (begin + l >= members) LANE(active, l) = 0; /* to fill the lanes: nothing is kept of it */
+      member[l] = k; due[l] = events[l] = 0;
+      open[l][0][0] = open[l][0][1] = open[l][1][0] = open[l][1][1] = 0;
+      for (int i = 0; i < NP; ++i) LANE(g.p[i], l) = p[k * NP + i];
+      for (int i = 0; i < NX; ++i) LANE(g.x[i], l) = starts[k * NX + i];
+      LANE(end, l) = ends[k];
+      for (int w = 0; w < plan->watches; ++w) LANE(level[w], l) = levels[k * plan->watches + w];
+      if (plan->times) LANE(soon, l) = plan->at[0];
+    }}
+    for (int i = 0; i < NU; ++i) g.u[i] = all(plan->inputs[i]);
+    g.u[RUDDER] = all(plan->first);
+    {{ const V *const arg[1] = {{g.p}}; V *const res[1] = {{g.c}}; constants(arg, res); }}
+    g.t = g.t_before = all(0);
+    goal = g.x[PSI] + sides * all(plan->heading);
+    approach = slowest = fastest = speed_at(&g, g.x);
+    rates[0] = g.x[R]; velocities[0] = slowest;
+    for (long n = 1; some(active); ++n) {{
+      const V grid = steps * all(h);
+      V after = steps + all(1);
+      g.t_next = after * all(h);
+      g.h[0] = WHERE(LT(grid + all(tolerance), g.t), g.t_next - g.t, all(h));
+      const M late = LT(end + all(tolerance), g.t_next);
+      g.h[0] = WHERE0(active, WHERE(late, end - g.t, g.h[0]));
+      g.t_next = WHERE(late, end, g.t_next);
+      take(&g, g.next);
+      M event = none, crossed[2] = {{none, none}}, bad = none;
+      const V before_rudder = g.u[RUDDER];
+      if (plan->limit) {{
+        event = active & LE(all(0), sides * (g.next[PSI] - goal));
+        if (some(event)) {{
+          V to[NX];
+          const V tried = g.h[0];
+          for (int l = 0; l < LANES; ++l) {{
+            if (!LANE(event, l)) continue;
+            const double direction = LANE(sides, l), aim = LANE(goal, l);
+            const double length = step_to(&g, to, l, LANE(tried, l), direction, aim);
+            beyond_after(&g, to, l, length, direction, aim);
+            for (int i = 0; i < NX; ++i) LANE(g.next[i], l) = LANE(to[i], l);
+            LANE(g.t_next, l) = LANE(g.t, l) + length;
+            LANE(after, l) = LANE(steps, l);
+          }}
+        }}
+      }}
+      for (int i = 0; i < NX; ++i) bad |= ~LE(lane_fabs(g.next[i]), all(plan->limits[i]));
+      bad &= active;
+      const V speed = speed_at(&g, g.next);
+      slowest = WHERE(active & LT(speed, slowest), speed, slowest);
+      fastest = WHERE(active & LT(fastest, speed), speed, fastest);
+      rates[n & (REMEMBERED - 1)] = g.next[R];
+      velocities[n & (REMEMBERED - 1)] = speed;
+      for (int w = 0; w < plan->watches; ++w)
+        crossed[w] = active & (LT(g.x[watched[w]], level[w]) ^ LT(g.next[watched[w]], level[w]));
+      const M over = active & LE(end - g.t_next, all(tolerance)), now = active & LE(soon, g.t_next);
+      if (some(event | bad | crossed[0] | crossed[1] | over | now | waiting)) {{
+        for (int l = 0; l < LANES; ++l) {{
+          const long k = member[l];
+          if (!LANE(active, l)) continue;
+          const double t = LANE(g.t, l), t_next = LANE(g.t_next, l), old = LANE(before_rudder, l);
+          int finished = LANE(over, l) != 0;
+          for (; due[l] < plan->times && plan->at[due[l]] <= t_next; ++due[l]) {{
+            double *row = found->states + (k * plan->times + due[l]) * NX;
+            const double share = t_next > t ? (plan->at[due[l]] - t) / (t_next - t) : 0.0;
+            for (int i = 0; i < NX; ++i) row[i] = LANE(g.x[i], l) + share * (LANE(g.next[i], l) - LANE(g.x[i], l));
+          }}
+          if (plan->times) LANE(soon, l) = due[l] < plan->times ? plan->at[due[l]] : INFINITY;
+          if (LANE(bad, l)) {{
+            found->ended[k] = {runaway};
+            LANE(active, l) = 0;
+            continue;
+          }}
+          if (LANE(event, l)) {{
+            if (events[l] < CROSSINGS) {{
+              found->order_times[k * CROSSINGS + events[l]] = t_next;
+              for (int i = 0; i < NX; ++i)
+                found->order_states[(k * CROSSINGS + events[l]) * NX + i] = LANE(g.next[i], l);
+            }} else found->ended[k] = {unknown};
+            events[l] += 1;
+            finished |= events[l] == plan->limit;
+            if (!finished) {{
+              LANE(sides, l) = -LANE(sides, l);
+              LANE(g.u[RUDDER], l) = events[l] & 1 ? plan->second : plan->first;
+              LANE(goal, l) = starts[k * NX + PSI] + LANE(sides, l) * plan->heading;
+            }}
+          }}
+          LANE(waiting, l) = 0;
+          for (int w = 0; w < plan->watches; ++w) {{
+            int *count = found->crossings + k * plan->watches + w;
+            double *windows = found->windows + (k * plan->watches + w) * CROSSINGS * SAMPLES * ROW;
+            if (open[l][w][0]) {{
+              keep_sample(windows + ((open[l][w][1] * SAMPLES) + 3) * ROW, t_next, LANE(g.u[RUDDER], l), g.next, l);
+              open[l][w][0] = 0;
+            }}
+            if (!LANE(crossed[w], l)) continue;
+            if (*count < plan->most) {{
+              double *row = windows + *count * SAMPLES * ROW;
+              if (n > 1) keep_sample(row, LANE(g.t_before, l), old, g.before, l);
+              keep_sample(row + ROW, t, old, g.x, l);
+              keep_sample(row + 2 * ROW, t_next, LANE(g.u[RUDDER], l), g.next, l);
+              open[l][w][0] = 1; open[l][w][1] = *count;
+              LANE(waiting, l) = -1;
+              *count += 1;
+            }} else if (plan->most > 1) found->ended[k] = {unknown};
+          }}
+          if (!finished) continue;
+          LANE(active, l) = 0;
+          LANE(waiting, l) = 0;
+          found->end[k] = t_next;
+          for (int i = 0; i < NX; ++i) found->last[k * NX + i] = LANE(g.next[i], l);
+          found->orders[k] = (int) events[l];
+          found->speeds[k * 4] = LANE(approach, l);
+          found->speeds[k * 4 + 1] = LANE(slowest, l);
+          found->speeds[k * 4 + 2] = LANE(fastest, l);
+          found->speeds[k * 4 + 3] = LANE(speed, l);
+          /* The sample two lengths before the end: samples are on the grid, but for the last. */
+          const double earlier = t_next - 2 * lengths[k] / fmax(LANE(speed, l), 1e-9);
+          if (plan->most == 1 && earlier >= 0) {{
+            long at = (long) ceil(earlier / h);
+            while (at > 0 && (at - 1) * h >= earlier) --at;
+            while (at * h < earlier) ++at;
+            if (at > n) at = n;
+            if (n - at >= REMEMBERED) found->ended[k] = {unknown};
+            else {{
+              found->then[k * 2] = LANE(rates[at & (REMEMBERED - 1)], l);
+              found->then[k * 2 + 1] = LANE(velocities[at & (REMEMBERED - 1)], l);
+            }}
+          }}
+        }}
+      }}
+      V *freed = g.before;
+      g.before = g.x; g.x = g.next; g.next = freed;
+      g.t_before = g.t; g.t = g.t_next;
+      steps = after;
+    }}
+  }}
+}}
+"""
+
+
+class _Plan(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_double) for name in ("h", "first", "second", "heading")),
+        *((name, ctypes.c_long) for name in ("limit", "watches", "most", "times")),
+        *((name, ctypes.c_void_p) for name in ("inputs", "limits", "at")),
+    )
+
+
+_FOUND = (
+    "end",
+    "last",
+    "then",
+    "speeds",
+    "order_times",
+    "order_states",
+    "windows",
+    "states",
+    "ended",
+    "orders",
+    "crossings",
+)
+
+
+class _Found(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_void_p) for name in _FOUND)
+
+
+@dataclass(frozen=True, eq=False)
+class LanePlan:
+    """A manoeuvre of two rudder orders that take turns.
+
+    Parameters
+    ----------
+    orders : tuple of float
+        Rudder at the execute and, after the first change, the other one, rad to starboard.
+    heading : float
+        Change of heading from the start at which the order changes, rad, first to the side of the first order, then to
+        the other.
+    limit : int
+        Changes of order at which a run ends; 0: none, the order is held to the end; -1: no limit.
+    watched : tuple of str
+        At most two states whose crossings of levels are kept.
+    most : int
+        Crossings of each that are kept: 1, with the motion two lengths before the end, or up to :data:`CROSSINGS`.
+    inputs : array (nu,)
+        Inputs of the model; the rudder order among them is not used.
+    times : array (m,)
+        Times at which states are kept, s, rising.
+    """
+
+    orders: tuple[float, float]
+    heading: float
+    limit: int
+    watched: tuple[str, ...]
+    most: int
+    inputs: Array
+    times: Sequence[float] | Array = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LaneResults:
+    """What is kept of the runs of n ships; nan where there is none.
+
+    Parameters
+    ----------
+    end, last : arrays (n,), (n, nx)
+        Time, s, and states at the end.
+    then : array (n, 2)
+        Yaw rate (rad/s) and speed (m/s) two lengths before the end.
+    speeds : array (n, 4)
+        First, lowest, highest and last speed, m/s.
+    order_times, order_states : arrays (n, :data:`CROSSINGS`), (n, :data:`CROSSINGS`, nx)
+        Times and states at the changes of order.
+    windows : array (n, watches, :data:`CROSSINGS`, :data:`SAMPLES`, 2 + nx)
+        Time, rudder order from then on, and states about each crossing.
+    states : array (n, times, nx)
+        At the requested times.
+    ended : array (n,)
+        :data:`FINE`, :data:`RUNAWAY_LANE` or :data:`UNKNOWN`.
+    orders : array (n,)
+        Number of changes of order.
+    crossings : array (n, watches)
+        Number of crossings.
+    """
+
+    end: Array
+    last: Array
+    then: Array
+    speeds: Array
+    order_times: Array
+    order_states: Array
+    windows: Array
+    states: Array
+    ended: NDArray[np.int32]
+    orders: NDArray[np.int32]
+    crossings: NDArray[np.int32]
+
+
+class LaneRunner:
+    """Runs manoeuvres of a model for many ships at once.
+
+    Parameters
+    ----------
+    model : Model
+        A ship.
+    lanes : int, optional
+        Ships at a time: 8, 4, 2 or 1; by default what this machine's vectors hold. No result depends on it.
+
+    Raises
+    ------
+    NoLanesError
+        The model cannot be run in lanes: there is no C compiler, an operation has no lanes, or the model lacks one of
+        the states of a ship.
+    """
+
+    def __init__(self, model: Model, lanes: int | None = None):
+        self.model = model
+        self.lanes = widest_lanes() if lanes is None else lanes
+        needed = {"motion.psi", "motion.r", "rudder.angle"} - set(model.state_names)
+        if not self.lanes or needed or "rudder.command" not in model.input_names:
+            raise NoLanesError("there is no C compiler, or the model is not that of a ship")
+        self._run = self._compiled()
+
+    def runs(self, plan: LanePlan, p: Array, starts: Array, ends: Array, levels: Array) -> LaneResults:
+        """Runs of n ships with parameters `p` (n, np) from `starts` (n, nx), each at most to its time in `ends` (n,).
+
+        `levels` (n, watches) are those of the watched states.
+        """
+        model, n, nx = self.model, len(starts), len(self.model.states)
+        at = np.ascontiguousarray(plan.times, dtype=float)
+        inputs = np.ascontiguousarray(plan.inputs, dtype=float)
+        limits = TIMES_BEYOND * np.array([UNITS[state.unit].extent for state in model.states])
+        first, second = plan.orders
+        watched = np.array([model.state_names.index(name) for name in plan.watched], dtype=np.int32)
+        limit = np.iinfo(np.int32).max if plan.limit < 0 else plan.limit
+        shape = (n, len(watched))
+        found = LaneResults(
+            end=np.full(n, np.nan),
+            last=np.full((n, nx), np.nan),
+            then=np.full((n, 2), np.nan),
+            speeds=np.full((n, 4), np.nan),
+            order_times=np.full((n, CROSSINGS), np.nan),
+            order_states=np.full((n, CROSSINGS, nx), np.nan),
+            windows=np.full((*shape, CROSSINGS, SAMPLES, 2 + nx), np.nan),
+            states=np.full((n, len(at), nx), np.nan),
+            ended=np.zeros(n, dtype=np.int32),
+            orders=np.zeros(n, dtype=np.int32),
+            crossings=np.zeros(shape, dtype=np.int32),
+        )
+        lengths = p[:, model.parameter_names.index("ship.length")]
+        numbers = [np.ascontiguousarray(values, dtype=float) for values in (p, starts, ends, levels, lengths)]
+        asked = _Plan(
+            model.step_s,
+            first,
+            second,
+            plan.heading,
+            limit,
+            len(watched),
+            plan.most,
+            len(at),
+            inputs.ctypes.data,
+            limits.ctypes.data,
+            at.ctypes.data,
+        )
+        kept = _Found(*(getattr(found, name).ctypes.data for name in _FOUND))
+        self._run(n, asked, *(values.ctypes.data for values in numbers), watched.ctypes.data, kept)
+        return found
+
+    def _compiled(self) -> ctypes._NamedFuncPointer:
+        model = self.model
+        step, constants = step_and_constants(model)
+        arguments = [model.x, model.u, model.p]
+        speed = ca.Function("speed", arguments, [model.expand(model.symbol("motion.speed"))], {"cse": True})
+        codes = [
+            lane_function(function, name)
+            for function, name in ((step, "step"), (constants, "constants"), (speed, "speed_of"))
+        ]
+        runs = _RUNS.format(
+            export=EXPORT,
+            nx=step.size1_in(0),
+            nu=step.size1_in(1),
+            np=step.size1_in(2),
+            nc=max(1, constants.size1_out(0)),
+            psi=model.state_names.index("motion.psi"),
+            r=model.state_names.index("motion.r"),
+            rudder=model.input_names.index("rudder.command"),
+            crossings=CROSSINGS,
+            samples=SAMPLES,
+            remembered=_REMEMBERED,
+            runaway=RUNAWAY_LANE,
+            unknown=UNKNOWN,
+        )
+        try:
+            library = _library([VECTORS, *codes, runs], self.lanes)
+        except (InputError, OSError) as error:  # a compiler that does not work, or compiles for another machine
+            raise NoLanesError(str(error)) from error
+        pointers = [ctypes.c_void_p] * 5
+        structures = ctypes.POINTER(_Plan), ctypes.POINTER(_Found)
+        library.run_lanes.argtypes = [ctypes.c_long, structures[0], *pointers, ctypes.c_void_p, structures[1]]
+        library.run_lanes.restype = None
+        function: ctypes._NamedFuncPointer = library.run_lanes
+        return function
+
+
+def _library(parts: Sequence[str], lanes: int) -> ctypes.CDLL:
+    """The compiled library; plain C where the compiler has no vectors."""
+    try:
+        source = "\n".join([f"#define LANES {lanes}", *parts])
+        return ctypes.CDLL(str(cached_library({"lanes.c": source}, flags=FLAGS_OF_LANES[lanes])))
+    except RuntimeError:
+        if lanes == 1:
+            raise
+        return _library(parts, 1)

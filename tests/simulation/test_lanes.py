@@ -1,0 +1,172 @@
+"""Runs in lanes against single runs with a sample at each step, for any number of lanes; the sine against mpmath."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tank2sim.analysis.ensemble.draws import draws_of
+from tank2sim.arrays import Array
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
+from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
+from tank2sim.native.library import cached_library
+from tank2sim.simulation import lane_runs
+from tank2sim.simulation.card_range import single_figures
+from tank2sim.simulation.lane_figures import LaneManoeuvres, runs_in_lanes
+from tank2sim.simulation.manoeuvres import PullOut, Turn, Zigzag
+from tank2sim.simulation.rows import EXPORT
+from tank2sim.simulation.run import simulate
+
+pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
+
+WIDTHS = [lanes for lanes in (1, 2, 4, 8) if lanes <= widest_lanes()]
+
+TEN, TWENTY, LARGE = (math.radians(angle) for angle in (10.0, 20.0, 35.0))
+
+MANOEUVRES = [
+    (Turn(LARGE), 600.0),
+    (Turn(-LARGE), None),
+    (Turn(TEN), 251.13),
+    (Zigzag(TEN, TEN), None),
+    (Zigzag(-TWENTY, TWENTY), None),
+    (Zigzag(TWENTY, TEN, opposite=-TEN), 300.05),
+]
+
+
+def ships(card: ManoeuvringCard, model: Model, count: int) -> tuple[list[dict[str, float]], Array]:
+    """Members with errors of a tenth of what is assumed, and their parameters."""
+    draws, _ = draws_of(card, 3)
+    members = [draws.member(number) for number in range(count)]
+    return members, np.array([model.parameter_values(member) for member in members])
+
+
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+@pytest.mark.parametrize(("manoeuvre", "duration"), MANOEUVRES)
+def test_figures_in_lanes_are_those_of_single_runs(name: str, manoeuvre, duration) -> None:
+    card = read_card(name)
+    assert isinstance(card, ManoeuvringCard)
+    model = build(card)
+    members, p = ships(card, model, 3)
+    times = np.linspace(0.0, 240.0, 7)
+    found = LaneManoeuvres(model).run(manoeuvre, p, duration, times)
+    assert found.fine.all()
+    for number, member in enumerate(members):
+        run = simulate(model, manoeuvre, duration_s=duration, parameters=member)
+        expected = single_figures(run.figures)
+        shown = {name for name, values in found.figures.items() if np.isfinite(values[number])}
+        assert shown == set(expected)
+        for figure, value in expected.items():
+            assert found.figures[figure][number] == pytest.approx(value, rel=1e-12), figure
+        for place, state in enumerate(model.state_names):
+            values = np.interp(times, run.trajectory.t, run.trajectory[state])
+            np.testing.assert_allclose(found.states[number, :, place], values, rtol=1e-11, atol=1e-10)
+
+
+@pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])
+def test_no_bit_depends_on_the_number_of_lanes_or_on_neighbours(mariner_card, mariner, manoeuvre) -> None:
+    _, p = ships(mariner_card, mariner, 11)
+    results = [LaneManoeuvres(mariner, lanes).run(manoeuvre, p, None, [10.0, 50.0]) for lanes in WIDTHS]
+    results.append(LaneManoeuvres(mariner).run(manoeuvre, p[3:8], None, [10.0, 50.0]))
+    for result in results[1:]:
+        part = slice(3, 8) if len(result.states) == 5 else slice(None)
+        np.testing.assert_array_equal(result.states, results[0].states[part])
+        for figure, values in result.figures.items():
+            np.testing.assert_array_equal(values, results[0].figures[figure][part], err_msg=figure)
+
+
+def test_a_runaway_is_marked_and_disturbs_no_other_ship(mariner_card, mariner) -> None:
+    _, p = ships(mariner_card, mariner, 4)
+    wild = p.copy()
+    wild[1, mariner.parameter_names.index("derivatives.Yv")] = 0.5
+    calm, both = (LaneManoeuvres(mariner).run(Turn(LARGE), values, 300.0) for values in (p, wild))
+    assert both.fine.tolist() == [True, False, True, True] and calm.fine.all()
+    for figure, values in both.figures.items():
+        assert math.isnan(values[1])
+        np.testing.assert_array_equal(np.delete(values, 1), np.delete(calm.figures[figure], 1))
+
+
+def test_a_zigzag_with_more_executes_than_are_kept_is_run_by_itself(mariner_card, mariner) -> None:
+    members, p = ships(mariner_card, mariner, 2)
+    zigzag, duration = Zigzag(TWENTY, math.radians(1.0)), 900.0
+    found = LaneManoeuvres(mariner).run(zigzag, p, duration)
+    run = simulate(mariner, zigzag, duration_s=duration, parameters=members[1])
+    expected = single_figures(run.figures)
+    assert f"execute_time_{lane_runs.CROSSINGS + 2}_s" in expected
+    for figure, value in expected.items():
+        assert found.figures[figure][1] == pytest.approx(value, rel=1e-9), figure
+
+
+def test_what_lanes_do_not_have_is_left_to_single_runs(mariner) -> None:
+    assert runs_in_lanes(Turn(TEN)) and runs_in_lanes(Zigzag(TEN, TEN))
+    assert not runs_in_lanes(PullOut(TEN)) and not runs_in_lanes(Zigzag(TEN, TEN, lag_s=1.0))
+    assert not runs_in_lanes(Turn(TEN, wait_s=2.0)) and not runs_in_lanes(Zigzag(TEN, TEN, course=0.1))
+    with pytest.raises(NoLanesError):
+        LaneManoeuvres(mariner.with_values({"initial.trim": 1.0}))
+    x = ca.MX.sym("x")
+    with pytest.raises(NoLanesError):
+        lane_function(ca.Function("f", [x], [x]), "f")
+
+
+def evaluated(function: ca.Function, columns: list[Array], lanes: int) -> Array:
+    """A function of scalars at each row (n,) of its arguments, in lanes; its outputs (n_out, n)."""
+    loop = f"""
+{EXPORT}void each(long n, const double *in, double *out) {{
+  for (long k = 0; k < n; k += LANES) {{
+    V x[{len(columns)}][1], y[{function.n_out()}][1];
+    for (int l = 0; l < LANES; ++l)
+      for (int i = 0; i < {len(columns)}; ++i) LANE(x[i][0], l) = in[i * n + k + l];
+    const V *arg[{len(columns)}];
+    V *res[{function.n_out()}];
+    for (int i = 0; i < {len(columns)}; ++i) arg[i] = x[i];
+    for (int i = 0; i < {function.n_out()}; ++i) res[i] = y[i];
+    f(arg, res);
+    for (int l = 0; l < LANES; ++l)
+      for (int i = 0; i < {function.n_out()}; ++i) out[i * n + k + l] = LANE(y[i][0], l);
+  }}
+}}
+"""
+    source = f"#define LANES {lanes}\n{VECTORS}{lane_function(function, 'f')}{loop}"
+    library = ctypes.CDLL(str(cached_library({"f.c": source}, flags=FLAGS_OF_LANES[lanes])))
+    given = np.ascontiguousarray(columns)
+    found = np.empty((function.n_out(), given.shape[1]))
+    library.each(
+        ctypes.c_long(given.shape[1]), given.ctypes.data_as(ctypes.c_void_p), found.ctypes.data_as(ctypes.c_void_p)
+    )
+    return found
+
+
+@pytest.mark.parametrize("lanes", WIDTHS)
+def test_sine_and_cosine_are_exact_to_the_last_places(lanes: int) -> None:
+    rng = np.random.default_rng(2)
+    angles = np.concatenate([rng.uniform(-r, r, 4000) for r in (1.0, 10.0, 1e3, 9.9e4, 1e7)])
+    angles = np.concatenate([angles, np.pi / 4 * np.arange(-16, 16), [0.0, 1e-300, np.inf, np.nan] * 2])
+    x = ca.SX.sym("x")
+    sine, cosine = evaluated(ca.Function("f", [x], [ca.sin(x), ca.cos(x)]), [angles], lanes)
+    with np.errstate(invalid="ignore"):
+        for values, expected in ((sine, np.sin(angles)), (cosine, np.cos(angles))):
+            # Absolute: near a multiple of pi the last bit is of the reduced angle.
+            np.testing.assert_allclose(values, expected, rtol=4e-16, atol=2e-16)
+
+
+@pytest.mark.parametrize("lanes", WIDTHS)
+def test_operations_have_the_values_of_casadi_to_the_bit(lanes: int) -> None:
+    rng = np.random.default_rng(5)
+    a, b = rng.normal(size=(2, 400)).round(1)  # with ties and zeros
+    a[:8], b[4:12] = 0.0, 0.0
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    both = ca.logic_and(x < y, y <= 1)
+    values = [
+        *(x + y, x - y, x * y, x / (y + 7), -x, x * x, 2 * x, 1 / (y + 9), ca.sqrt(ca.fabs(x)), ca.fabs(y)),
+        *(ca.fmin(x, y), ca.fmax(x, y), ca.sign(x), x < y, x <= y, x == y, x != y, both, ca.logic_or(x < y, y > 1)),
+        *(ca.logic_not(x < y), ca.if_else(x < y, x, y), ca.if_else(x, y, 3.0), ca.if_else(both, x, -y) + (x < 0)),
+        *(ca.atan2(x, y), ca.tanh(x), ca.exp(x), ca.floor(x), ca.fabs(x) ** (y + 0.1)),
+    ]
+    function = ca.Function("f", [x, y], [ca.SX(value) for value in values])
+    expected = np.array([np.array(part).ravel() for part in function.map(400)(a[None], b[None])])
+    np.testing.assert_array_equal(evaluated(function, [a, b], lanes), expected)
