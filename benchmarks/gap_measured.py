@@ -32,11 +32,12 @@ from identify_esso_osaka import FIXED, spans
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.diagnosis.residuals import estimates
+from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.export import joined
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, in_short
+from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.gap.result import Gap, Passed
 from tank2sim.gap.search.explanations import search
@@ -136,6 +137,17 @@ def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None
     """What is said when the wind is taken away, and what closes the gap."""
     calm = _calm(windy)
     blind = replace(whole, trials=tuple(_unmeasured(trial) for trial in whole.trials))
+    begin = time.perf_counter()
+    gap = run_gap_workflow(
+        calm,
+        replace(whole, trials=whole.trials[:-1]),
+        replace(whole, trials=whole.trials[-1:]),
+        GapOptions(workers=workers),
+    )
+    print("   with the record of the wind, and a card without:")
+    _show(gap, time.perf_counter() - begin)
+    misfits = [gap.misfit(version, held_out=held) for held in (False, True) for version in ("before", "after")]
+    print("   misfit fitted {:.3g} -> {:.3g}, held out {:.3g} -> {:.3g}; without the record:".format(*misfits))
     fitted, held = replace(blind, trials=blind.trials[:-1]), replace(blind, trials=blind.trials[-1:])
     begin = time.perf_counter()
     gap = run_gap_workflow(calm, fitted, held, GapOptions(workers=workers))
@@ -147,7 +159,15 @@ def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None
     )
     found = estimates(alone)
     values = found[0][1]
-    print(f"   wind fitted alone: {_polar(values['speed_mps'] * np.exp(1j * values['direction_rad']))}")
+    if "speed_mps" in values:
+        print(f"   wind fitted alone: {_polar(values['speed_mps'] * np.exp(1j * values['direction_rad']))}")
+    else:
+        by_trial = surroundings_by_trial(alone, [trial.name for trial in fitted.trials])["wind"]
+        each = [_polar(one.speed_mps * np.exp(1j * one.direction_rad)) for one in by_trial.values()]
+        print(f"   wind fitted alone, of each run its own: {', '.join(each)}")
+        found = [("wind", {"speed_mps": 0.0, "direction_rad": 0.0, **values}, found[0][2])]
+        own = with_surroundings(fitted, {"wind": by_trial})
+        blind = replace(blind, trials=(*own.trials, *held.trials))
     models = {
         "without wind": (calm, []),
         **_named(gap, fitted),
