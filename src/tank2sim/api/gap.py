@@ -205,6 +205,16 @@ class GapResult(Result):
             for title, effects in ((found, self._results["effects"]), ("What the others would be", candidates))
             if (rows := [row for effect in effects for row in _parameter_rows(effect)])
         ]
+        tables += [
+            ResultTable(
+                f"{effect['name'].replace('_', ' ').capitalize()} of each trial",
+                ("trial", "set", "speed", "standard error", "direction", "standard error "),
+                [_by_trial_row(row) for row in effect["by_trial"]],
+                wide=True,
+            )
+            for effect in self._results["effects"]
+            if effect["by_trial"]
+        ]
         heads = ("trial", "set", "before", "after")
         title = "Misfit in units of the noise (1 is noise)"
         return (*tables, ResultTable(title, heads, self._misfit_rows(), wide=True))
@@ -320,6 +330,14 @@ def _parameter_rows(effect: Mapping[str, Any]) -> list[list[object]]:
         words, unit = in_words(key)
         rows.append([effect["name"], words, value, None if error is None else float(f"{error:.2g}"), unit or "-"])
     return rows
+
+
+def _by_trial_row(row: Mapping[str, Any]) -> list[object]:
+    errors = row["standard_errors"]
+    numbers = [row["speed_mps"], errors["speed_mps"], row["direction_deg"], errors["direction_deg"]]
+    speed, speed_error, direction, direction_error = (float(f"{number:.3g}") for number in numbers)
+    which = "held out" if row["held_out"] else "fitted"
+    return [row["trial"], which, f"{speed:g} m/s", speed_error, f"{direction:g} deg", direction_error]
 
 
 def find_gap(

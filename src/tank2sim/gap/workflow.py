@@ -230,7 +230,7 @@ def _assemble_gap(
     noise = _noise(found, decision.best, fitted)
     sigmas = {name: sigma for name, (sigma, _) in noise.items()}
     judged = _judge_by_simulation(card, trials, found, decision, sigmas, share)
-    decision, estimated, proof, withheld = judged.decision, judged.estimated, judged.proof, judged.withheld
+    decision, estimated, proof = judged.decision, judged.estimated, judged.proof
     if decision.verdict == NO_EFFECT_MISSING:
         before, after = (_misfit_of(proof.results, version) for version in ("before", "after"))
         if (
@@ -271,7 +271,7 @@ def _assemble_gap(
         could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
         agreement=agreement,
         next_test=_next(card, found, decision, sigmas),
-        notices=_notices(card, decision, results, agreement, (fitted, held), withheld),
+        notices=_notices(card, replace(judged, decision=decision), agreement, (fitted, held)),
     )
     return gap, proof.trials
 
@@ -507,18 +507,23 @@ def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> E
 
 def _notices(
     card: ManoeuvringCard,
-    decision: Decision,
-    results: Sequence[Passed],
+    judged: _Judged,
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
-    withheld: Sequence[str],
 ) -> tuple[str, ...]:
+    decision, results, withheld = judged.decision, judged.proof.results, judged.withheld
+    own_surroundings = tuple(judged.proof.by_trial) if trials[1].trials else ()
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(strange) for strange in decision.strange]
     notices += [
         f"{names}: fits best from instant to instant, but a simulation with it is not closer: not named"
         for names in withheld
     ]
+    if own_surroundings:
+        notices.append(
+            f"{' and '.join(own_surroundings)} of the trials held out: fitted to each of them, two numbers to a "
+            "record; all else is as the fitting trials have it"
+        )
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
         notices.append(f"{have}: kept as on the card, and not sought")
