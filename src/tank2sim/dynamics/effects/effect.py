@@ -244,7 +244,7 @@ class Effect:
 
     def changes_on(self, card: ManoeuvringCard) -> tuple[str, ...]:
         """Derivatives as in `changes`; none where they are the rudder's and the card has an MMG rudder instead."""
-        by_rudder = all(known_term(name).d for name in self.changes)
+        by_rudder = bool(self.changes) and all(known_term(name).d for name in self.changes)
         return () if by_rudder and card.model.kind == "mmg" else self.changes
 
     def model_names(self) -> dict[str, str]:
