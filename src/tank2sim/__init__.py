@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
     from tank2sim.api.gap import GapResult, find_gap
     from tank2sim.api.glide import GlideResult
+    from tank2sim.api.guess import GuessResult, guess
     from tank2sim.api.identification import IdentificationResult, identify
     from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.log import LogResult, log
@@ -49,6 +50,7 @@ _HOMES = {
     "ExportResult": "api.fmu",
     "GapResult": "api.gap",
     "GlideResult": "api.glide",
+    "GuessResult": "api.guess",
     "IdentificationResult": "api.identification",
     "InfluenceResult": "api.influence",
     "InputError": "errors",
@@ -76,6 +78,7 @@ _HOMES = {
     "check_fmu": "api.fmu",
     "compare": "api.comparison",
     "find_gap": "api.gap",
+    "guess": "api.guess",
     "identify": "api.identification",
     "json_schema": "api.schemas",
     "load": "api.ship",
@@ -102,6 +105,7 @@ __all__ = [
     "ExportResult",
     "GapResult",
     "GlideResult",
+    "GuessResult",
     "IdentificationResult",
     "InfluenceResult",
     "InputError",
@@ -129,6 +133,7 @@ __all__ = [
     "check_fmu",
     "compare",
     "find_gap",
+    "guess",
     "identify",
     "json_schema",
     "load",

@@ -39,6 +39,9 @@ SURPRISE = 4.0
 """Standard deviations by which a figure lies outside what ships of these dimensions show, or by which the ships found
 miss it, from which it is refused. Project choice: by chance it happens to one in 16 000."""
 
+_LONGEST = 40.0
+"""Longest run, L/u0: posters are of ships that have turned half round, and swung twice, long before. Project choice."""
+
 _TEN, _TWENTY, _HARD = (math.radians(angle) for angle in (10.0, 20.0, 35.0))
 
 MANOEUVRES: Mapping[str, Turn | Zigzag] = {
@@ -120,7 +123,7 @@ class PosterFigures:
     def __init__(self, card: ManoeuvringCard, names: Sequence[str]):
         require_compiler("guessing a ship by thousands of simulations")
         self._model = study_model(card)
-        self._lanes = LaneManoeuvres(self._model)
+        self._lanes = LaneManoeuvres(self._model, longest=_LONGEST)
         self._places = [self._model.parameter_names.index(name) for name in names]
 
     def at(self, values: Array) -> dict[str, Array]:
@@ -159,6 +162,7 @@ def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: in
     before = figures
     for figure in given:
         _refuse_impossible(figure, before[figure.key])
+    _refuse_contradiction(given, before, only_beyond=SURPRISE)
     wanted = np.log([figure.value for figure in given])
     errors = np.array([figure.standard_error / figure.value for figure in given])
     stream = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(members, STEPS)))
@@ -212,8 +216,13 @@ def _refuse_impossible(figure: GivenFigure, prior: Array) -> None:
     raise InputError(f"--{figure.manoeuvre}", figure.text, "is no figure of a ship of these dimensions", remedy)
 
 
-def _refuse_contradiction(given: Sequence[GivenFigure], before: Mapping[str, Array]) -> None:
-    """Name the figure that the others expect least, by the joint distribution of figures of the prior."""
+def _refuse_contradiction(
+    given: Sequence[GivenFigure], before: Mapping[str, Array], *, only_beyond: float = 0.0
+) -> None:
+    """Refuse the figure that the others expect least, by the joint distribution of figures of the prior, if it is
+    further off than so many standard deviations."""
+    if len(given) < 2 and only_beyond:
+        return
     logs = np.log(np.column_stack([before[figure.key] for figure in given]))
     errors = np.array([figure.standard_error / figure.value for figure in given])
     wanted = np.log([figure.value for figure in given]) - logs.mean(axis=0)
@@ -222,6 +231,8 @@ def _refuse_contradiction(given: Sequence[GivenFigure], before: Mapping[str, Arr
     # Conditional on the others: residual (precision @ wanted)_i / precision_ii, variance 1 / precision_ii.
     off = (precision @ wanted) / np.sqrt(np.diag(precision))
     worst = int(np.argmax(np.abs(off)))
+    if abs(off[worst]) <= only_beyond:
+        return
     centre = float(logs.mean(axis=0)[worst] + wanted[worst] - (precision @ wanted)[worst] / precision[worst, worst])
     half = 2 / math.sqrt(precision[worst, worst])
     figure = given[worst]

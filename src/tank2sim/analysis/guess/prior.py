@@ -1,9 +1,9 @@
 """What is known of a ship by her main dimensions alone: a card of published estimates with wide standard errors.
 
-Linear and acceleration derivatives are those of :mod:`tank2sim.identification.estimates`. The rudder is one of the area
-that rules of classification require, in the slipstream of its propeller. For all other numbers there is no regression
-that would hold here: their means and standard errors enclose what was identified or measured on the bundled KVLCC2, Esso
-Osaka and Mariner, three ships, and so are uncertain themselves.
+Linear and acceleration derivatives are those of :mod:`tank2sim.identification.estimates`. The rudder is one of the
+area that rules of classification require, in the slipstream of its propeller. For all other numbers there is no
+regression that would hold here: their means and standard errors enclose what was identified or measured on the bundled
+KVLCC2, Esso Osaka and Mariner, three ships, and so are uncertain themselves.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ KNOT_MPS = 1852 / 3600
 _THREE_SHIPS = "ESTIMATED: about what KVLCC2, Esso Osaka and Mariner have"
 
 _RUDDER_SLOPE = 6.13 * 1.5 / (1.5 + 2.25)
-"""Normal force coefficient by angle of attack of a rudder of aspect ratio 1.5: Fujii's 6.13 A/(A + 2.25), as in Yasukawa
-and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52."""
+"""Normal force coefficient by angle of attack of a rudder of aspect ratio 1.5: Fujii's 6.13 A/(A + 2.25), as in
+Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52."""
 
 _HULL_FORCE = 1.3
 """1 + a_H: side force of rudder and hull by that of the rudder (KVLCC2 1.31, Yasukawa and Yoshimura 2015)."""
@@ -70,7 +70,8 @@ _EFFECTS: Mapping[str, Mapping[str, tuple[float, float]]] = {
 """The same of effects. Project choice."""
 
 _GEAR_RATE, _GEAR_ANGLE = 65.0 / 28.0, 35.0
-"""Rate (deg/s) and largest angle (deg) of the steering gear: 35 deg to 30 deg on the other side in 28 s (SOLAS II-1/29)."""
+"""Rate (deg/s) and largest angle (deg) of the steering gear: 35 deg to 30 deg on the other side in 28 s (SOLAS
+II-1/29)."""
 
 _LIMITS: Mapping[str, tuple[float, float]] = {
     "length": (20.0, 500.0),
