@@ -35,9 +35,10 @@ STEPS = 4
 LEAST_MEMBERS = 100
 """Members below which nothing is said. Project choice: four for each number that moves."""
 
-SURPRISE = 4.0
-"""Standard deviations by which a figure lies outside what ships of these dimensions show, or by which the ships found
-miss it, from which it is refused. Project choice: by chance it happens to one in 16 000."""
+SURPRISE = 3.5
+"""Standard deviations by which a figure lies outside what ships of these dimensions show, alone or with the other
+figures, or by which the ships found miss it, from which it is refused. Project choice: by chance it happens to one in
+2000."""
 
 _LONGEST = 40.0
 """Longest run, L/u0: posters are of ships that have turned half round, and swung twice, long before. Project choice."""

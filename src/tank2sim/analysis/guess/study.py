@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import tomlkit
@@ -184,9 +185,10 @@ def _card_of(prior: ManoeuvringCard, found: Found) -> ManoeuvringCard:
     matrix: Array = np.cov(found.posterior.T)
     for parameter, mean, variance in zip(chosen, found.posterior.mean(axis=0), np.diag(matrix), strict=True):
         section, *rest = parameter.key.split(".")
-        at, errors = document[section], document["uncertainty"] if section == "derivatives" else None
+        at: Any = document[section]
+        errors: Any = document["uncertainty"]
         if section == "effects":
-            effect = document["effects"][int(rest[0])]
+            effect = at[int(rest[0])]
             at, errors, rest = effect["parameters"], effect["uncertainty"], rest[2:]
         comment = at[rest[0]].trivia.comment
         at[rest[0]] = float(f"{mean * parameter.factor:.6g}")
