@@ -42,7 +42,8 @@ int widest(void) {
 """
 
 # Sine, cosine and atan2 are those of fdlibm (Sun Microsystems 1993, k_sin.c, k_cos.c, e_rem_pio2.c, s_atan.c: their
-# coefficients and the three parts of pi/2), within 1e-15 of the exact ones where the reduction is exact, and the C library's beyond.
+# coefficients and the three parts of pi/2), within 1e-15 of the exact ones where the reduction is exact, and the C
+# library's beyond.
 VECTORS = """
 #include <math.h>
 #include <string.h>
