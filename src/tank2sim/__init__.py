@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
     from tank2sim.api.gap import GapResult, find_gap
     from tank2sim.api.glide import GlideResult
+    from tank2sim.api.guess import GuessResult, guess
     from tank2sim.api.identification import IdentificationResult, identify
     from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.log import LogResult, log
@@ -52,6 +53,7 @@ _HOMES = {
     "ExportResult": "api.fmu",
     "GapResult": "api.gap",
     "GlideResult": "api.glide",
+    "GuessResult": "api.guess",
     "IdentificationResult": "api.identification",
     "InfluenceResult": "api.influence",
     "InputError": "errors",
@@ -80,6 +82,7 @@ _HOMES = {
     "compare": "api.comparison",
     "convert": "api.conversion",
     "find_gap": "api.gap",
+    "guess": "api.guess",
     "identify": "api.identification",
     "json_schema": "api.schemas",
     "load": "api.ship",
@@ -109,6 +112,7 @@ __all__ = [
     "ExportResult",
     "GapResult",
     "GlideResult",
+    "GuessResult",
     "IdentificationResult",
     "InfluenceResult",
     "InputError",
@@ -137,6 +141,7 @@ __all__ = [
     "compare",
     "convert",
     "find_gap",
+    "guess",
     "identify",
     "json_schema",
     "load",

@@ -790,6 +790,47 @@ class YawKeys(_Keys):
     theory: list[dict[str, str | float | None]]
 
 
+class QuantileKeys(_Part):
+    """Quantiles of 5, 50 and 95 %."""
+
+    p5: float
+    p50: float
+    p95: float
+
+
+class GuessFigureKeys(_Part):
+    """A figure of a guessed ship: given or not, by the dimensions alone, and with the figures given."""
+
+    unit: str
+    given: Number
+    standard_error: Number
+    by_dimensions: QuantileKeys
+    found: QuantileKeys
+
+
+class GuessNumberKeys(_Part):
+    """A number of the card of a guessed ship."""
+
+    by_dimensions: float
+    by_dimensions_standard_error: float
+    value: float
+    standard_error: float
+    settled: bool
+
+
+class GuessKeys(_Keys):
+    """A ship guessed from dimensions and figures."""
+
+    ship: str
+    dimensions: dict[str, float]
+    members: int
+    seed: int
+    figures: dict[str, GuessFigureKeys]
+    parameters: dict[str, GuessNumberKeys]
+    next_figures: dict[str, float]
+    notices: list[str]
+
+
 KEYS: dict[str, Any] = {
     "audit": AuditKeys,
     "autopilot": AutopilotKeys,
@@ -800,6 +841,7 @@ KEYS: dict[str, Any] = {
     "export": ExportKeys,
     "gap": GapKeys,
     "glide": GlideKeys,
+    "guess": GuessKeys,
     "identify": IdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
     "log": LogKeys,

@@ -1,7 +1,8 @@
 """C code that evaluates a CasADi function for several ships at once, each in a lane of a vector register.
 
-Every operation acts on all lanes by itself and in the order of the function, without fused operations, and the sine is
-a polynomial of this file: a lane has the same bits for any number of lanes, on any processor. Conditions are masks.
+Every operation acts on all lanes by itself and in the order of the function, without fused operations, and sine, cosine
+and atan2 are polynomials of this file: a lane has the same bits for any number of lanes, on any processor. Conditions
+are masks.
 """
 
 from __future__ import annotations
@@ -40,8 +41,9 @@ int widest(void) {
 }
 """
 
-# The sine and cosine are those of fdlibm (Sun Microsystems 1993, k_sin.c, k_cos.c and e_rem_pio2.c: their coefficients
-# and the three parts of pi/2), within 1e-15 of the exact ones where the reduction is exact, and the C library's beyond.
+# Sine, cosine and atan2 are those of fdlibm (Sun Microsystems 1993, k_sin.c, k_cos.c, e_rem_pio2.c, s_atan.c: their
+# coefficients and the three parts of pi/2), within 1e-15 of the exact ones where the reduction is exact, and the C
+# library's beyond.
 VECTORS = """
 #include <math.h>
 #include <string.h>
@@ -120,7 +122,7 @@ static inline V lane_sign(V x) {
 EACH(tan, tan) EACH(asin, asin) EACH(acos, acos) EACH(atan, atan) EACH(exp, exp) EACH(log, log) EACH(floor, floor)
 EACH(ceil, ceil) EACH(sinh, sinh) EACH(cosh, cosh) EACH(tanh, tanh) EACH(erf, erf) EACH(log1p, log1p)
 EACH(expm1, expm1) EACH(asinh, asinh) EACH(acosh, acosh) EACH(atanh, atanh)
-EACH_OF_TWO(pow, pow) EACH_OF_TWO(atan2, atan2) EACH_OF_TWO(fmod, fmod) EACH_OF_TWO(hypot, hypot)
+EACH_OF_TWO(pow, pow) EACH_OF_TWO(fmod, fmod) EACH_OF_TWO(hypot, hypot)
 EACH_OF_TWO(copysign, copysign)
 static inline void lane_sincos(V x, V *sine, V *cosine) {
   const V shift = all(6755399441055744.0); /* 1.5 * 2^52: adding it rounds to an integer, in the lowest bits */
@@ -145,6 +147,37 @@ static inline void lane_sincos(V x, V *sine, V *cosine) {
   if (some(far))
     for (int i = 0; i < LANES; ++i)
       if (!(fabs(LANE(x, i)) <= 1e5)) { LANE(*sine, i) = sin(LANE(x, i)); LANE(*cosine, i) = cos(LANE(x, i)); }
+}
+/* After s_atan.c: of the smaller over the larger side, reduced by atan(1/2) or atan(1). */
+static inline V lane_atan2(V y, V x) {
+  const V ay = lane_fabs(y), ax = lane_fabs(x), zero = all(0.0);
+  const M steep = LT(ax, ay);
+  const V low = WHERE(steep, ax, ay), high = WHERE(steep, ay, ax);
+  const M middle = LE(all(0.4375) * high, low), large = LE(all(0.6875) * high, low);
+  const V above = WHERE(large, low - high, WHERE(middle, all(2.0) * low - high, low));
+  const V below = WHERE(large, low + high, WHERE(middle, all(2.0) * high + low, high));
+  const V t = WHERE(EQ(high, zero), zero, above / below);
+  const V z = t * t, w = z * z;
+  const V odd = z * (all(3.33333333333329318027e-01) + w * (all(1.42857142725034663711e-01)
+      + w * (all(9.09088713343650656196e-02) + w * (all(6.66107313738753120669e-02)
+      + w * (all(4.97687799461593236017e-02) + w * all(1.62858201153657823623e-02))))));
+  const V even = w * (all(-1.99999999998764832476e-01) + w * (all(-1.11111104054623557880e-01)
+      + w * (all(-7.69187620504482999495e-02) + w * (all(-5.83357013379057348645e-02)
+      + w * all(-3.65315727442169155270e-02)))));
+  const M none_equal = NE(high, zero);
+  const V first = WHERE0(none_equal, WHERE(large, all(7.85398163397448278999e-01),
+      WHERE0(middle, all(4.63647609000806093515e-01))));
+  const V last = WHERE0(none_equal, WHERE(large, all(3.06161699786838301793e-17),
+      WHERE0(middle, all(2.26987774529616870924e-17))));
+  V angle = first - ((t * (odd + even) - last) - t);
+  angle = WHERE(steep, all(1.57079632679489655800e+00) - (angle - all(6.12323399573676603587e-17)), angle);
+  const M sign = BITS(all(-0.0)), back = -((BITS(x) >> 63) & 1);
+  angle = WHERE(back, all(3.14159265358979311600e+00) - (angle - all(1.22464679914735317720e-16)), angle);
+  angle = REALS((BITS(angle) & ~sign) | (BITS(y) & sign));
+  const M far = ~(LE(ay, all(1e300)) & LE(ax, all(1e300))) | (LT(high, all(1e-290)) & none_equal);
+  if (some(far))
+    for (int i = 0; i < LANES; ++i) if (LANE(far, i)) LANE(angle, i) = atan2(LANE(y, i), LANE(x, i));
+  return angle;
 }
 """
 """C of vectors of LANES doubles (``V``), their masks (``M``), and the functions of them."""

@@ -75,6 +75,8 @@ class LaneManoeuvres:
         A ship that begins where its parameters say, without a trim.
     lanes : int, optional
         As for :class:`tank2sim.simulation.lane_runs.LaneRunner`.
+    longest : float
+        Longest run without a given duration, L/u0.
 
     Raises
     ------
@@ -82,8 +84,8 @@ class LaneManoeuvres:
         The model cannot be run in lanes.
     """
 
-    def __init__(self, model: Model, lanes: int | None = None):
-        self.model = model
+    def __init__(self, model: Model, lanes: int | None = None, longest: float = LONGEST_LENGTHS):
+        self.model, self._longest = model, longest
         if "initial.trim" in model and model.parameter_values()[model.parameter_names.index("initial.trim")]:
             raise NoLanesError("a ship that is trimmed first is not run in lanes")
         if not {*_BEGINS, "motion.u", "motion.v", "motion.r"} <= set(model.state_names):
@@ -123,7 +125,7 @@ class LaneManoeuvres:
         starts = np.ascontiguousarray(np.array(self.model.initial(p.T)).T)
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
-        ends = LONGEST_LENGTHS * ship_times if duration_s is None else np.full(len(p), duration_s)
+        ends = self._longest * ship_times if duration_s is None else np.full(len(p), duration_s)
         plan = _plan(manoeuvre, u, times, timed=duration_s is not None)
         side = math.copysign(1.0, manoeuvre.rudder)
         heading = starts[:, [self.model.state_names.index("motion.psi")]]
@@ -267,7 +269,8 @@ class LaneManoeuvres:
         x, y, heading = (self._column(starts, name) for name in _BEGINS)
         north, east = self._column(states, "motion.x") - x, self._column(states, "motion.y") - y
         cos, sin = np.cos(heading), np.sin(heading)
-        return north * cos + east * sin, side * (east * cos - north * sin)
+        with np.errstate(invalid="ignore"):  # ships beyond all bounds, which are left out later
+            return north * cos + east * sin, side * (east * cos - north * sin)
 
 
 def _plan(manoeuvre: Turn | Zigzag, inputs: Array, times: Sequence[float] | Array, *, timed: bool) -> LanePlan:

@@ -59,6 +59,7 @@ RESULT_TYPES = (
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Towed vehicle", "tow", ("tows", "methods", "mass_kg"), ("readings",)),
     ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
+    ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Audit of trials", "audit", ("findings", "trials"), ()),
     ResultType("FMU: export", "export", ("platforms", "size_bytes"), ("fmi", "size_bytes")),

@@ -12,6 +12,7 @@ from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.glide.page import glide_page
+from tank2sim.report.guess.page import guess_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
@@ -107,6 +108,10 @@ _PAGES: Mapping[str, _Page] = {
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
         | {"imo": list, "replays": list, "notices": list},
+    ),
+    "Guessed ship": _Page(
+        guess_page,
+        {"figures": dict, "dimensions": dict, "parameters": dict, "next_figures": dict, "notices": list},
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),

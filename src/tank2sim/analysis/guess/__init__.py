@@ -1,0 +1,1 @@
+"""A ship from her dimensions and the figures of her wheelhouse poster."""

@@ -1,0 +1,183 @@
+"""What is known of a ship by her main dimensions alone: a card of published estimates with wide standard errors.
+
+Linear and acceleration derivatives are those of :mod:`tank2sim.identification.estimates`. The rudder is one of the
+area that rules of classification require, in the slipstream of its propeller. For all other numbers there is no
+regression that would hold here: their means and standard errors enclose what was identified or measured on the bundled
+KVLCC2, Esso Osaka and Mariner, three ships, and so are uncertain themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, TestedRange, manoeuvring_card_text
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS
+from tank2sim.errors import InputError
+from tank2sim.identification.estimates import GYRATION, Particulars, estimate
+
+KNOT_MPS = 1852 / 3600
+"""A knot, m/s: 1852 m an hour."""
+
+_THREE_SHIPS = "ESTIMATED: about what KVLCC2, Esso Osaka and Mariner have"
+
+_RUDDER_SLOPE = 6.13 * 1.5 / (1.5 + 2.25)
+"""Normal force coefficient by angle of attack of a rudder of aspect ratio 1.5: Fujii's 6.13 A/(A + 2.25), as in
+Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52."""
+
+_HULL_FORCE = 1.3
+"""1 + a_H: side force of rudder and hull by that of the rudder (KVLCC2 1.31, Yasukawa and Yoshimura 2015)."""
+
+_SLIPSTREAM, _SLIPSTREAM_ERROR = 1.4, 0.35
+"""Square of the inflow speed of the rudder by that of the ship, and its relative standard error: the cards of KVLCC2,
+Esso Osaka and Mariner have 1.2, 2.0 and 1.2 of the force at the ship's speed. Project choice."""
+
+_ARM, _ARM_ERROR = 0.45, 0.4
+"""Arm of the rudder force, L, and relative standard error of the moment: 0.49, 0.34 and 0.50 on the same cards. Project
+choice."""
+
+_YR_ERROR = 0.25
+"""Standard error of Clarke's Y_r in units of pi (T/L)^2: a difference of numbers four times as large; those identified
+on KVLCC2 and Esso Osaka are 0.23 and 0.5 away. Project choice."""
+
+_BLOCK_OF_EVEN_TRIM, _TRIM_SLOPE = 0.683, 0.276
+"""Block coefficient at which x_G is midships, and x_G/L by the block coefficient beyond it: through KVLCC2 and Mariner.
+Project choice."""
+
+_SURGE_DRIFT, _SURGE_DRIFT_ERROR = 0.8, 0.4
+"""X_vr over -Y_vdot, and its standard error: 1.07, 1.0 and 0. Project choice."""
+
+_RUDDER_DRAG, _RUDDER_DRAG_ERROR = 0.6, 0.4
+"""X_dd over Y_d, and its relative standard error: 0.61, 0.75 and 0.34. Project choice."""
+
+_OTHERS: Mapping[str, tuple[float, float]] = {
+    "Xu": (-0.0028, 0.001),
+    "Xuu": (0.0015, 0.002),
+    "Xvv": (-0.004, 0.004),
+    "Xrr": (0.0003, 0.001),
+    "Nvvr": (-0.003, 0.012),
+    "Nvrr": (0.0, 0.0015),
+    "Nrrr": (0.0003, 0.0005),
+}
+"""Mean and standard error of derivatives without a formula. Project choice: as the beginning of this module says."""
+
+_EFFECTS: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "cross_flow_drag": {"drag_coefficient": (0.75, 0.2)},
+    "loaded_rudder": {"loading": (0.62, 0.15), "straightening": (0.44, 0.12), "lever": (-0.72, 0.1)},
+}
+"""The same of effects. Project choice."""
+
+_GEAR_RATE, _GEAR_ANGLE = 65.0 / 28.0, 35.0
+"""Rate (deg/s) and largest angle (deg) of the steering gear: 35 deg to 30 deg on the other side in 28 s (SOLAS
+II-1/29)."""
+
+_LIMITS: Mapping[str, tuple[float, float]] = {
+    "length": (20.0, 500.0),
+    "beam": (3.0, 100.0),
+    "draught": (0.5, 40.0),
+    "block": (0.35, 1.0),
+    "speed": (1.0, 45.0),
+}
+"""What a merchant ship can be, m, -, kn. Project choice: wider than any ship."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShipDimensions:
+    """Main dimensions of a ship.
+
+    Parameters
+    ----------
+    length_m, beam_m, draught_m : float
+        Between perpendiculars, moulded, mean.
+    block : float
+        Block coefficient.
+    speed_kn : float
+        Speed at which her figures hold, knots.
+
+    Raises
+    ------
+    InputError
+        A number is not one of a ship, or the numbers are not those of one ship.
+    """
+
+    length_m: float
+    beam_m: float
+    draught_m: float
+    block: float
+    speed_kn: float
+
+    def __post_init__(self) -> None:
+        units = {"length": "m", "beam": "m", "draught": "m", "block": "", "speed": "kn"}
+        for (name, (low, high)), value in zip(_LIMITS.items(), vars(self).values(), strict=True):
+            if not low <= value <= high:
+                problem = f"is {value:g} {units[name]}".rstrip()
+                raise InputError(f"--{name}", "", problem, f"ships have {low:g} to {high:g} {units[name]}".rstrip())
+        if not 3.0 <= self.length_m / self.beam_m <= 12.0:
+            problem = f"is 1/{self.length_m / self.beam_m:.3g} of the length"
+            raise InputError("--beam", "", problem, "ships have 1/12 to 1/3: give metres")
+        if not 1.5 <= self.beam_m / self.draught_m <= 8.0:
+            problem = f"is 1/{self.beam_m / self.draught_m:.3g} of the beam"
+            raise InputError("--draught", "", problem, "ships have 1/8 to 1/1.5: give metres")
+
+    @property
+    def speed_mps(self) -> float:
+        """The speed, m/s."""
+        return self.speed_kn * KNOT_MPS
+
+
+def prior_card(ship: ShipDimensions, name: str) -> ManoeuvringCard:
+    """The card of a ship of which the dimensions are known alone, with standard errors of all that is estimated."""
+    x_G = _TRIM_SLOPE * (ship.block - _BLOCK_OF_EVEN_TRIM)
+    particulars = Particulars(
+        length_m=ship.length_m,
+        beam_m=ship.beam_m,
+        draught_m=ship.draught_m,
+        block_coefficient=ship.block,
+        x_G_m=x_G * ship.length_m,
+    )
+    names = [*ACCELERATION_TERMS, "Yv", "Yr", "Nv", "Nr", "yaw_inertia"]
+    found = {
+        key: (entry.value, entry.standard_error, f"ESTIMATED: {entry.source}")
+        for key, entry in estimate(particulars, names).items()
+    }
+    _, _, inertia_source = inertia = found.pop("yaw_inertia")
+    value, _, source = found["Yr"]
+    found["Yr"] = value, _YR_ERROR * math.pi * (ship.draught_m / ship.length_m) ** 2, source
+    # Rules of Det Norske Veritas: A = L T/100 (1 + 25 (B/L)^2), as in Molland and Turnock (2007), Marine Rudders.
+    area = ship.length_m * ship.draught_m / 100 * (1 + 25 * (ship.beam_m / ship.length_m) ** 2)
+    side = _HULL_FORCE * _RUDDER_SLOPE * _SLIPSTREAM * area / ship.length_m**2
+    rudder = "ESTIMATED: rudder of the area by rule, slope by Fujii"
+    found["Yd"] = -side, _SLIPSTREAM_ERROR * side, rudder
+    found["Nd"] = _ARM * side, _ARM_ERROR * _ARM * side, rudder
+    found["Xdd"] = -_RUDDER_DRAG * side, _RUDDER_DRAG_ERROR * _RUDDER_DRAG * side, _THREE_SHIPS
+    sway = -found["Yvdot"][0]
+    found["Xvr"] = _SURGE_DRIFT * sway, _SURGE_DRIFT_ERROR * sway, _THREE_SHIPS
+    found |= {key: (mean, error, _THREE_SHIPS) for key, (mean, error) in _OTHERS.items()}
+    result = ManoeuvringResult(
+        particulars={
+            "name": name,
+            "length_m": ship.length_m,
+            "beam_m": ship.beam_m,
+            "draught_m": ship.draught_m,
+            "block_coefficient": ship.block,
+        },
+        source="guessed by tank2sim from main dimensions and manoeuvring figures",
+        notes="No number was measured: each is an estimate with a wide standard error.",
+        environment={"water_density_kgpm3": 1025.0},
+        speed_mps=ship.speed_mps,
+        largest=TestedRange(math.radians(30.0), math.radians(_GEAR_ANGLE), 1.2),
+        rigid_body={"mass": particulars.mass_prime, "yaw_inertia": inertia[0], "x_G": x_G},
+        inertia_source=inertia_source.removeprefix("ESTIMATED: ") or GYRATION,
+        derivatives={key: DerivativeEntry(*entry) for key, entry in found.items()},
+    )
+    lines = [manoeuvring_card_text(result), "[steering_gear]", f"max_rate_degps = {_GEAR_RATE:.4g}"]
+    lines.append(f"max_angle_deg = {_GEAR_ANGLE:g}")
+    for effect, values in _EFFECTS.items():
+        lines += ["", "[[effects]]", f'name = "{effect}"', "[effects.parameters]"]
+        lines += [f"{key} = {mean!r}" for key, (mean, _) in values.items()]
+        lines += ["[effects.uncertainty]", *(f"{key} = {error!r}" for key, (_, error) in values.items())]
+    card = parse_card("\n".join(lines) + "\n", name)
+    assert isinstance(card, ManoeuvringCard)
+    return card

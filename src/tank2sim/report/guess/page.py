@@ -1,0 +1,115 @@
+"""The page of a guessed ship: figures before and after, what is settled and what stays open."""
+
+from __future__ import annotations
+
+import altair as alt
+
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.page import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Page,
+    PageSection,
+    PageTable,
+    notices_section,
+)
+
+_FIGURES = (
+    "Nine of ten ships lie in each interval: wide by the dimensions alone, narrow by the figures that were given, too. "
+    "Figures that were not given are predictions."
+)
+_NUMBERS = (
+    "A number is settled where the figures take half of its variance away or more. Open numbers have the errors of the "
+    "prior: manoeuvres of another kind than those given may depend on them."
+)
+_HELP = (
+    "Mean share of the variance of all figures not given that one more figure would take away, measured with the usual "
+    "error, by the covariances of the ships found."
+)
+
+
+def guess_page(found: Json) -> Page:
+    """The page, from the JSON of ``tank2sim guess``."""
+    figures, dimensions = found["figures"], found["dimensions"]
+    size = f"{dimensions['length_m']:g} x {dimensions['beam_m']:g} x {dimensions['draught_m']:g} m"
+    given = sum(entry["given"] is not None for entry in figures.values())
+    settled = [name for name, row in found["parameters"].items() if row["settled"]]
+    cards = [
+        KeyFigure(label="Figures given", value=given),
+        KeyFigure(label="Numbers settled", value=len(settled), note=f"of {len(found['parameters'])}"),
+    ]
+    if found["next_figures"]:
+        best, share = next(iter(found["next_figures"].items()))
+        note = f"takes {100 * share:.0f} % of the variance of the others away"
+        cards.append(KeyFigure(label="Would help most", value=best, note=note))
+    parts = [
+        *notices_section(found["notices"]),
+        PageSection(
+            heading="Figures",
+            text=_FIGURES,
+            charts=[Illustration(chart=figures_chart(found))],
+            tables=[_figure_table(found)],
+        ),
+        PageSection(heading="What the figures settle", text=_NUMBERS, tables=[_number_table(found)]),
+    ]
+    if found["next_figures"]:
+        parts.append(PageSection(heading="Which further figure would help most", text=_HELP, tables=[_help(found)]))
+    subtitle = f"{size}, block coefficient {dimensions['block']:g}, {dimensions['speed_kn']:g} kn"
+    return Page(title=f"{found['ship']}: a guess", subtitle=subtitle, figures=cards, sections=parts)
+
+
+def figures_chart(found: Json) -> alt.TopLevelMixin:
+    """Intervals of each figure over the median found: by the dimensions alone, with the figures, and as given."""
+    rows = []
+    for key, entry in found["figures"].items():
+        middle = entry["found"]["p50"]
+        for kind, name in (("by dimensions", "by_dimensions"), ("with the figures", "found")):
+            band = entry[name]
+            rows.append({"figure": key, "kind": kind, "low": band["p5"] / middle, "high": band["p95"] / middle})
+        if entry["given"] is not None:
+            share = entry["given"] / middle
+            rows.append({"figure": key, "kind": "given", "low": share, "high": share})
+    base = alt.Chart(alt.Data(values=rows))
+    title = "over the median found"
+    x = alt.X("low:Q", title=title, scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format="~g"))
+    y = alt.Y("figure:N", title=None, sort=None)
+    colour = alt.Color("kind:N", title=None, sort=["by dimensions", "with the figures", "given"])
+    offset = alt.YOffset("kind:N", sort=["by dimensions", "with the figures", "given"])
+    bars = base.transform_filter("datum.kind != 'given'").mark_bar(height=6)
+    points = base.transform_filter("datum.kind == 'given'").mark_point(filled=True, size=50)
+    layers = bars.encode(x=x, x2="high:Q", y=y, color=colour, yOffset=offset), points.encode(x=x, y=y, color=colour)
+    chart: alt.TopLevelMixin = alt.layer(*layers).properties(width=560, title="Figures before and after")
+    return chart
+
+
+def _figure_table(found: Json) -> PageTable:
+    heads = ("figure", "unit", "given", "± standard error", "by dimensions, 5 %", "95 %", "found, 5 %", "50 %", "95 %")
+    rows: list[list[Cell]] = []
+    for key, entry in found["figures"].items():
+        before, after = entry["by_dimensions"], entry["found"]
+        given = entry["given"], entry["standard_error"]
+        rows.append(
+            [key, entry["unit"], *given, before["p5"], before["p95"], *(after[q] for q in ("p5", "p50", "p95"))]
+        )
+    return PageTable(caption="Figures, m and deg", columns=[Column(title=head) for head in heads], rows=rows)
+
+
+def _number_table(found: Json) -> PageTable:
+    heads = ("number", "by dimensions", "± standard error", "with the figures", "± standard error", "")
+    rows: list[list[Cell]] = [
+        [
+            name,
+            *(row[key] for key in ("by_dimensions", "by_dimensions_standard_error", "value", "standard_error")),
+            "settled" if row["settled"] else "open",
+        ]
+        for name, row in found["parameters"].items()
+    ]
+    return PageTable(caption="Numbers of the card, prime", columns=[Column(title=head) for head in heads], rows=rows)
+
+
+def _help(found: Json) -> PageTable:
+    rows: list[list[Cell]] = [[key, 100 * share] for key, share in found["next_figures"].items()]
+    columns = [Column(title="figure"), Column(title="variance gone", unit="%", digits=2)]
+    return PageTable(caption="One more figure", columns=columns, rows=rows)
