@@ -294,7 +294,7 @@ def _judge_by_simulation(
     sigmas: Mapping[str, float],
     share: float,
 ) -> _Judged:
-    """The decision that stands up to free-running simulations.
+    """The decision after free-running simulations with what it names.
 
     An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
     the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts

@@ -257,7 +257,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
 def _recorded(
     trials: Sequence[Trial], runs: Sequence[SampledRun], size: int, inputs: Sequence[str]
 ) -> dict[str, Array]:
-    """Winds and currents that every trial recorded, halfway between the fine instants, but for known inputs."""
+    """Winds and currents that every trial recorded, halfway between the fine instants, except known inputs."""
     found = {}
     for signals in (effect.measured_as for effect in EFFECTS.values() if effect.surroundings):
         names = set(signals.values())

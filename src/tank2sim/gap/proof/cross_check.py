@@ -31,7 +31,7 @@ MUCH = 3.0
 CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
-DIFFERS = 0.3
+ACTS_FROM = 0.3
 """Root mean square difference of two simulations, in noise units, from which an effect acts in a trial (project choice:
 far less than shows): a stall shows in hard turns alone."""
 
@@ -164,7 +164,7 @@ def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
     By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
-    signals of all trials in which the two simulations differ by :data:`DIFFERS`, for an effect may act in few of them.
+    signals of all trials in which the two simulations differ by :data:`ACTS_FROM`, for an effect may act in few of them.
     `limit` is the largest median.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
@@ -183,7 +183,7 @@ def _differs(replay: Passed, name: str) -> bool:
     before, after = replay.before[name][known], replay.after[name][known]
     if not (np.isfinite(before).all() and np.isfinite(after).all()):
         return True
-    return bool(np.sqrt(np.mean(np.square((after - before) / replay.noise[name]))) > DIFFERS)
+    return bool(np.sqrt(np.mean(np.square((after - before) / replay.noise[name]))) > ACTS_FROM)
 
 
 def worse_trials(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
