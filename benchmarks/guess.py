@@ -17,14 +17,22 @@ import sys
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.guess.conditioning import FIGURES, KEYS, MANOEUVRES, GivenFigure, PosterFigures, conditioned
-from tank2sim.analysis.guess.prior import KNOT_MPS, ShipDimensions, prior_card
+from tank2sim.analysis.guess.conditioning import (
+    FIGURE_KEYS,
+    FIGURES,
+    POSTER_MANOEUVRES,
+    GivenFigure,
+    PosterFigures,
+    conditioned,
+)
+from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
 from tank2sim.analysis.guess.study import default_error
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate
+from tank2sim.units import KNOT_MPS
 
 FORMS = {
     "tanker": ShipDimensions(length_m=320, beam_m=58, draught_m=20.8, block=0.81, speed_kn=15.5),
@@ -40,7 +48,7 @@ BUNDLED = {"kvlcc2": 0.81, "mariner": 0.60, "esso-osaka-ship": 0.83}
 def given_of(truth: dict[str, float], stream: np.random.Generator | None) -> list[GivenFigure]:
     found = []
     for key in GIVEN:
-        manoeuvre, word = KEYS[key]
+        manoeuvre, word = FIGURE_KEYS[key]
         error = default_error(word, truth[key])
         noise = 0.0 if stream is None else float(stream.normal()) * error
         found.append(GivenFigure(manoeuvre, word, max(truth[key] + noise, 0.2 * truth[key]), error))
@@ -59,9 +67,9 @@ def bundled(name: str) -> tuple[ShipDimensions, dict[str, float]]:
     card = read_card(name)
     assert isinstance(card, ManoeuvringCard)
     model, figures = build(card), {}
-    for manoeuvre, driven in MANOEUVRES.items():
+    for manoeuvre, driven in POSTER_MANOEUVRES.items():
         run = single_figures(simulate(model, driven).figures)
-        for key, (of, word) in KEYS.items():
+        for key, (of, word) in FIGURE_KEYS.items():
             if of == manoeuvre:
                 figures[key] = run[FIGURES[of][word]]
     size = {key: float(getattr(card.ship, key)) for key in ("length_m", "beam_m", "draught_m")}
@@ -73,8 +81,8 @@ def main() -> int:
     parser.add_argument("--ships", type=int, default=8)
     parser.add_argument("--members", type=int, default=800)
     asked = parser.parse_args()
-    inside: dict[str, list[bool]] = {key: [] for key in KEYS}
-    off: dict[str, list[float]] = {key: [] for key in KEYS}
+    inside: dict[str, list[bool]] = {key: [] for key in FIGURE_KEYS}
+    off: dict[str, list[float]] = {key: [] for key in FIGURE_KEYS}
     refused = 0
     for form, ship in FORMS.items():
         card, stream = prior_card(ship, form), np.random.default_rng(5)
@@ -89,7 +97,7 @@ def main() -> int:
                 inside[key].append(bool(low <= truth[key] <= high))
                 off[key].append(middle / truth[key] - 1)
     print(f"{len(FORMS)} forms, {asked.ships} ships each, {asked.members} members; refused {refused}")
-    for key in KEYS:
+    for key in FIGURE_KEYS:
         words = "given" if key in GIVEN else "not given"
         share, error = 100 * np.mean(inside[key]), 100 * np.sqrt(np.mean(np.square(off[key])))
         print(f"  {key:27} {words:9} {share:5.1f} % in the interval of 90 %, median off by {error:.1f} % rms")
@@ -106,7 +114,7 @@ def main() -> int:
             if key not in GIVEN:
                 parts.append(f"{key} {truth[key]:.4g} ({middle:.4g}, {low:.4g} to {high:.4g})")
         print(f"  {name}: {'; '.join(parts)}")
-    hidden = [value for key in KEYS if key not in GIVEN for value in inside[key]]
+    hidden = [value for key in FIGURE_KEYS if key not in GIVEN for value in inside[key]]
     print(f"figures not given: {100 * np.mean(hidden):.1f} % of {len(hidden)} in the interval of 90 %")
     return 0 if 0.8 <= np.mean(hidden) <= 0.97 else 1
 

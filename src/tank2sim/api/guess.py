@@ -1,11 +1,11 @@
-"""A ship guessed from her dimensions and the figures of her wheelhouse poster."""
+"""A ship guessed from dimensions and the figures of a wheelhouse poster."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, MANOEUVRES
+from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, POSTER_MANOEUVRES
 from tank2sim.analysis.guess.prior import ShipDimensions
 from tank2sim.analysis.guess.study import Guess, figure_unit, guess_ship, parse_figures
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class GuessResult(PagedResult):
-    """A guessed ship: her card with its covariance, what the figures settle, and what is predicted.
+    """A guessed ship: the card with its covariance, what the figures settle, and what is predicted.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def guess(
     members: int = DEFAULT_MEMBERS,
     seed: int = 0,
 ) -> GuessResult:
-    """Guess a ship from her main dimensions and figures of her manoeuvres.
+    """Guess a ship from its main dimensions and figures of its manoeuvres.
 
     Parameters
     ----------
@@ -142,8 +142,8 @@ def guess(
         raise InputError("--members", "", f"is {members}", f"{LEAST_MEMBERS} or more were expected")
     given = []
     for manoeuvre, text in (figures or {}).items():
-        if manoeuvre not in MANOEUVRES:
+        if manoeuvre not in POSTER_MANOEUVRES:
             problem = f"{manoeuvre!r} is not a manoeuvre of a poster"
-            raise InputError("figures", "", problem, f"there are: {', '.join(MANOEUVRES)}")
+            raise InputError("figures", "", problem, f"there are: {', '.join(POSTER_MANOEUVRES)}")
         given += parse_figures(manoeuvre, text)
     return GuessResult(guess_ship(ship, given, name, members, seed))

@@ -37,7 +37,7 @@ GROUPS = {
     "Identify": {
         "identify": "coefficients from free-running trials",
         "gap": "the physical effect that a card lacks",
-        "guess": "a ship from her dimensions and the figures of her wheelhouse poster",
+        "guess": "a ship from dimensions and the figures of a wheelhouse poster",
         "validate": "a validation report after ITTC 7.5-02-06-03",
         "compare": "cards of one ship side by side",
     },

@@ -1,4 +1,4 @@
-"""``tank2sim guess``: a ship from her dimensions and the figures of her wheelhouse poster."""
+"""``tank2sim guess``: a ship from dimensions and the figures of a wheelhouse poster."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def command(
     page: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Guess a ship from her dimensions and the figures of her wheelhouse poster.
+    """Guess a ship from dimensions and the figures of a wheelhouse poster.
 
     A prior over ships, from published regressions and the bundled ships, is moved to the figures by simulation. The
     card has the errors that are left, next to it lies their covariance.

@@ -227,7 +227,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           found->speeds[k * 4 + 1] = LANE(slowest, l);
           found->speeds[k * 4 + 2] = LANE(fastest, l);
           found->speeds[k * 4 + 3] = LANE(speed, l);
-          /* The sample two lengths before the end: samples are on the grid, but for the last. */
+          /* The sample two lengths before the end: all samples except the last are on the grid. */
           const double earlier = t_next - 2 * lengths[k] / fmax(LANE(speed, l), 1e-9);
           if (plan->most == 1 && earlier >= 0) {{
             long at = (long) ceil(earlier / h);

@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.guess import conditioning
-from tank2sim.analysis.guess.conditioning import KEYS, MANOEUVRES, GivenFigure, PosterFigures, conditioned
+from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, POSTER_MANOEUVRES, GivenFigure, PosterFigures, conditioned
 from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
 from tank2sim.analysis.guess.study import guess_ship, parse_figures
 from tank2sim.cards.covariance import read_covariance
@@ -28,7 +28,7 @@ GIVEN = ("advance@turn35", "tactical_diameter@turn35", "overshoot_1@zigzag10", "
 
 
 def figure(key: str, value: float, error: float) -> GivenFigure:
-    manoeuvre, word = KEYS[key]
+    manoeuvre, word = FIGURE_KEYS[key]
     return GivenFigure(manoeuvre, word, value, error)
 
 
@@ -54,8 +54,8 @@ def test_figures_of_members_are_those_of_single_runs() -> None:
     member = draws.member(4)
     found = PosterFigures(card, draws.names).at(np.array([list(member.values())]))
     model = build(card)
-    for key, (manoeuvre, word) in KEYS.items():
-        run = simulate(model, MANOEUVRES[manoeuvre], parameters=member)
+    for key, (manoeuvre, word) in FIGURE_KEYS.items():
+        run = simulate(model, POSTER_MANOEUVRES[manoeuvre], parameters=member)
         expected = single_figures(run.figures)[conditioning.FIGURES[manoeuvre][word]]
         assert found[key][0] == pytest.approx(expected, rel=1e-10), key
 
@@ -93,7 +93,7 @@ def test_intervals_hold_made_up_ships() -> None:
             found = conditioned(card, given, 300, 1)
         except InputError:
             continue
-        for key in KEYS:
+        for key in FIGURE_KEYS:
             if key not in GIVEN:
                 low, high = np.quantile(found.after[key], [0.05, 0.95])
                 inside.append(low <= figures[key][row] <= high)
@@ -112,7 +112,7 @@ def test_the_card_written_gives_the_figures_again(tmp_path) -> None:
     known = read_covariance(card)
     assert known is not None and known.samples is not None and "derivatives.Nd" in known.names
     np.testing.assert_allclose(known.samples, guess.card.covariance.samples, rtol=1e-12)
-    run = simulate(build(card), MANOEUVRES["turn35"]).figures
+    run = simulate(build(card), POSTER_MANOEUVRES["turn35"]).figures
     assert run["tactical_diameter_m"] == pytest.approx(980.0, rel=0.06)
     numbers = guess.parameters
     assert numbers["Nd"][3] < numbers["Nd"][1]

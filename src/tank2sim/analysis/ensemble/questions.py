@@ -16,7 +16,7 @@ from tank2sim.analysis.stability.imo import (
     imo_criteria,
     largest_trial_rudder,
     manoeuvring_trials,
-    stopping,
+    stopping_reach,
 )
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -239,7 +239,7 @@ class OfCriteria:
             if "propeller.speed" in model.input_names:
                 given = ({name: value for name, value in member.items() if name in parameters} for member in members)
                 reaches = [
-                    None if trouble else stopping(model, member, integrator)
+                    None if trouble else stopping_reach(model, member, integrator)
                     for member, trouble in zip(given, troubles, strict=True)
                 ]
                 figures[TRACK_REACH] = np.array([math.nan if reach is None else reach for reach in reaches])

@@ -1,1 +1,1 @@
-"""A ship from her dimensions and the figures of her wheelhouse poster."""
+"""A ship from dimensions and the figures of a wheelhouse poster."""

@@ -45,7 +45,7 @@ _LONGEST = 40.0
 
 _TEN, _TWENTY, _HARD = (math.radians(angle) for angle in (10.0, 20.0, 35.0))
 
-MANOEUVRES: Mapping[str, Turn | Zigzag] = {
+POSTER_MANOEUVRES: Mapping[str, Turn | Zigzag] = {
     "turn35": Turn(_HARD),
     "zigzag10": Zigzag(_TEN, _TEN),
     "zigzag20": Zigzag(_TWENTY, _TWENTY),
@@ -59,7 +59,7 @@ FIGURES: Mapping[str, Mapping[str, str]] = {
 }
 """Figures of each by the words of the option, to their names in a run."""
 
-KEYS: Mapping[str, tuple[str, str]] = {
+FIGURE_KEYS: Mapping[str, tuple[str, str]] = {
     f"{name.rpartition('_')[0]}@{manoeuvre}": (manoeuvre, word)
     for manoeuvre, words in FIGURES.items()
     for word, name in words.items()
@@ -78,7 +78,7 @@ class GivenFigure:
 
     @property
     def key(self) -> str:
-        """Key among :data:`KEYS`."""
+        """Key among :data:`FIGURE_KEYS`."""
         return figure_key(self.manoeuvre, self.word)
 
     @property
@@ -88,7 +88,7 @@ class GivenFigure:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class GuessMembers:
     """Members (n, k) of the parameters of `draws`, and their figures (n,) by key; before and after.
 
     Parameters
@@ -97,7 +97,7 @@ class Found:
         The prior.
     prior, posterior : arrays (n, k)
     before, after : mapping
-        Key of :data:`KEYS` to figures.
+        Key of :data:`FIGURE_KEYS` to figures.
     """
 
     draws: Draws
@@ -108,7 +108,15 @@ class Found:
 
 
 def figure_key(manoeuvre: str, word: str) -> str:
-    """The key of a figure among :data:`KEYS`."""
+    """The key of a figure among :data:`FIGURE_KEYS`.
+
+    Parameters
+    ----------
+    manoeuvre : str
+        One of :data:`POSTER_MANOEUVRES`.
+    word : str
+        Its figure in the words of :data:`FIGURES`.
+    """
     return f"{FIGURES[manoeuvre][word].rpartition('_')[0]}@{manoeuvre}"
 
 
@@ -134,7 +142,7 @@ class PosterFigures:
         faults = mass_faults(dict(zip(self._model.parameter_names, p.T, strict=True)))
         bad = np.array([bool(fault) for fault in faults])
         found = {}
-        for name, manoeuvre in MANOEUVRES.items():
+        for name, manoeuvre in POSTER_MANOEUVRES.items():
             runs = self._lanes.run(manoeuvre, p).figures
             for word, figure in FIGURES[name].items():
                 shown = runs.get(figure, np.full(len(values), np.nan))
@@ -142,8 +150,17 @@ class PosterFigures:
         return found
 
 
-def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: int, seed: int) -> Found:
+def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: int, seed: int) -> GuessMembers:
     """Ships of a prior card, moved to the figures that are given.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        The prior.
+    given : sequence of GivenFigure
+    members : int
+        Number of ships that are drawn from it.
+    seed : int
 
     Raises
     ------
@@ -182,7 +199,7 @@ def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: in
         off = abs(float(np.median(after)) - math.log(figure.value)) / (figure.standard_error / figure.value)
         if off > SURPRISE:
             _refuse_contradiction(given, before)
-    return Found(draws, prior, values, before, figures)
+    return GuessMembers(draws, prior, values, before, figures)
 
 
 def _showing(figures: Mapping[str, Array]) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""What is known of a ship by her main dimensions alone: a card of published estimates with wide standard errors.
+"""What is known of a ship by its main dimensions alone: a card of published estimates with wide standard errors.
 
 Linear and acceleration derivatives are those of :mod:`tank2sim.identification.estimates`. The rudder is one of the
 area that rules of classification require, in the slipstream of its propeller. For all other numbers there is no
@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, TestedRange, manoeuvring_card_text
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS
+from tank2sim.dynamics.effects.hull import CROSS_FLOW_DRAG
+from tank2sim.dynamics.effects.loaded_rudder import LOADED_RUDDER
 from tank2sim.errors import InputError
 from tank2sim.identification.estimates import GYRATION, Particulars, estimate
-
-KNOT_MPS = 1852 / 3600
-"""A knot, m/s: 1852 m an hour."""
+from tank2sim.units import KNOT_MPS
 
 _THREE_SHIPS = "ESTIMATED: about what KVLCC2, Esso Osaka and Mariner have"
 
@@ -64,8 +64,8 @@ _OTHERS: Mapping[str, tuple[float, float]] = {
 """Mean and standard error of derivatives without a formula. Project choice: as the beginning of this module says."""
 
 _EFFECTS: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "cross_flow_drag": {"drag_coefficient": (0.75, 0.2)},
-    "loaded_rudder": {"loading": (0.62, 0.15), "straightening": (0.44, 0.12), "lever": (-0.72, 0.1)},
+    CROSS_FLOW_DRAG.name: {"drag_coefficient": (0.75, 0.2)},
+    LOADED_RUDDER.name: {"loading": (0.62, 0.15), "straightening": (0.44, 0.12), "lever": (-0.72, 0.1)},
 }
 """The same of effects. Project choice."""
 
@@ -94,7 +94,7 @@ class ShipDimensions:
     block : float
         Block coefficient.
     speed_kn : float
-        Speed at which her figures hold, knots.
+        Speed at which the figures hold, knots.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A ship guessed from dimensions and figures: her card, what the figures settle, and what is predicted of her."""
+"""A ship guessed from dimensions and figures: its card, what the figures settle, and what is predicted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import tomlkit
 
 from tank2sim.analysis.ensemble.draws import by_file_name
-from tank2sim.analysis.guess.conditioning import FIGURES, KEYS, Found, GivenFigure, conditioned
+from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, FIGURES, GivenFigure, GuessMembers, conditioned
 from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card
@@ -40,7 +40,7 @@ class Guess:
     ----------
     ship : ShipDimensions
     given : tuple of GivenFigure
-    found : Found
+    found : GuessMembers
         The members before and after.
     prior, card : ManoeuvringCard
         The cards by the dimensions alone, and with the figures; the latter has a covariance with samples.
@@ -49,7 +49,7 @@ class Guess:
 
     ship: ShipDimensions
     given: tuple[GivenFigure, ...]
-    found: Found
+    found: GuessMembers
     prior: ManoeuvringCard
     card: ManoeuvringCard
     members: int
@@ -79,7 +79,7 @@ class Guess:
         """The JSON form."""
         given = {figure.key: figure for figure in self.given}
         figures = {}
-        for key in KEYS:
+        for key in FIGURE_KEYS:
             entry = given.get(key)
             figures[key] = {
                 "unit": figure_unit(key),
@@ -113,12 +113,12 @@ class Guess:
         """Figures not given, to the mean share of the variance of all figures not given that each would take away, with
         the errors of those given without; the most helpful first. By the covariance of the logarithms."""
         known = {figure.key for figure in self.given}
-        keys = [key for key in KEYS if key not in known]
+        keys = [key for key in FIGURE_KEYS if key not in known]
         logs = {key: np.log(self.found.after[key]) for key in keys}
         gains = {}
         for key in keys:
             median = float(np.median(self.found.after[key]))
-            error = default_error(KEYS[key][1], median) / median
+            error = default_error(FIGURE_KEYS[key][1], median) / median
             variance = float(logs[key].var()) + error**2
             shares = [float(np.cov(logs[key], other)[0, 1] ** 2 / variance / other.var()) for other in logs.values()]
             gains[key] = float(np.mean(shares))
@@ -130,7 +130,7 @@ _NUMBERS = ("by_dimensions", "by_dimensions_standard_error", "value", "standard_
 
 def figure_unit(key: str) -> str:
     """Unit of a figure by its key."""
-    manoeuvre, word = KEYS[key]
+    manoeuvre, word = FIGURE_KEYS[key]
     return FIGURES[manoeuvre][word].rpartition("_")[2]
 
 
@@ -165,7 +165,17 @@ def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
 
 
 def guess_ship(ship: ShipDimensions, given: Sequence[GivenFigure], name: str, members: int, seed: int) -> Guess:
-    """A ship from her dimensions and figures.
+    """A ship from its dimensions and figures.
+
+    Parameters
+    ----------
+    ship : ShipDimensions
+    given : sequence of GivenFigure
+    name : str
+        Of the ship on the card.
+    members : int
+        Ships of the prior.
+    seed : int
 
     Raises
     ------
@@ -177,7 +187,7 @@ def guess_ship(ship: ShipDimensions, given: Sequence[GivenFigure], name: str, me
     return Guess(ship, tuple(given), found, prior, _card_of(prior, found), members, seed)
 
 
-def _card_of(prior: ManoeuvringCard, found: Found) -> ManoeuvringCard:
+def _card_of(prior: ManoeuvringCard, found: GuessMembers) -> ManoeuvringCard:
     """The prior card with means, standard errors and covariance of the members."""
     document = tomlkit.parse(prior.text)
     keys = {parameter.name: parameter for parameter in card_parameters(prior, study_model(prior))}

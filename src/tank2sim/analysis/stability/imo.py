@@ -217,7 +217,7 @@ def imo_criteria(
     )
 
 
-def stopping(model: Model, changed: Mapping[str, float], integrator: Integrator) -> float | None:
+def stopping_reach(model: Model, changed: Mapping[str, float], integrator: Integrator) -> float | None:
     """Track reach of full astern stopping, L, of a ship with propulsion; None where its trial does not show it.
 
     Parameters
