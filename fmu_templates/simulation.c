@@ -11,6 +11,11 @@ enum { TRIM_ITERATIONS = 50 };
 /* H = 1 s with steps of 0.1 s shall be ten steps, although H / 0.1 may come out as 10.000000000000002. */
 static const double STEP_COUNT_ROUNDING = 1e-9;
 
+/* By how much the simulator's clock may differ from that of the instance, relative and below 1 s in s: as in the
+ * Reference FMUs of the Modelica Association (src/cosimulation.c, EPSILON). A clock that is kept in 32 bits adds up such
+ * errors. Half a step is never exceeded, so that a step that is repeated or left out is refused. */
+static const double CLOCK_TOLERANCE = 1e-5;
+
 /* More internal steps in one communication step are a mistake, in which a simulator would seem to hang (project choice). */
 static const double MOST_STEPS = 1e7;
 
@@ -122,7 +127,7 @@ Status finish_initialisation(Instance *self) {
 }
 
 static Status check_step(const Instance *self, double start, double size) {
-    const double rounding = 1e-6 * size + 1e-12 * fabs(start);
+    const double rounding = fmin(CLOCK_TOLERANCE * fmax(fabs(start), 1.0), size / 2);
     if (!(isfinite(size) && size > 0)) return report(self, ERROR, "a communication step of %g s cannot be done", size);
     if (!(fabs(start - self->value[TIME]) <= rounding)) {
         return report(self, ERROR, "the step is to start at %.17g s, but the time is %.17g s", start,

@@ -15,6 +15,8 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import read_model_description
 
 from tank2sim.cards import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.files import write_whole
 from tank2sim.fmu.documents import documents_of
@@ -169,6 +171,12 @@ def fmu_file(models: dict[str, Model], session_folder: Path) -> Callable[[str, i
         return path
 
     return file
+
+
+@pytest.fixture(scope="session")
+def mariner(mariner_card: ManoeuvringCard) -> Model:
+    """The model of which FMUs of this ship are made."""
+    return with_external_forces(build(mariner_card))
 
 
 @pytest.fixture(scope="session")

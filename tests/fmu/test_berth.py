@@ -84,3 +84,23 @@ def test_a_start_in_steady_motion_is_that_of_the_model(unpacked_ship, driven, sh
         before = fmu.read(OUTPUTS[:1])
         fmu.instance.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.1)
         assert fmu.read(OUTPUTS[:1]) == pytest.approx(before, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("water.depth", 7.0), ("water.depth", 0.0), ("water.depth", -3.0), ("propeller.speed", 90.0)]
+)
+def test_no_ship_sails_aground_or_with_revolutions_in_rpm(name: str, value: float, aground: UnpackedFmu) -> None:
+    """The draught is 7.468 m, the nominal revolutions 8.8 rad/s."""
+    log: list[str] = []
+    with running(aground, "CoSimulation", log=log) as fmu, pytest.raises(Exception, match="discard"):
+        fmu.initialise({name: value})
+    assert len(log) == 1 and name in log[0]
+
+
+@pytest.fixture(scope="module")
+def aground(tmp_path_factory) -> UnpackedFmu:
+    folder: Path = tmp_path_factory.mktemp("aground")
+    write_fmu(ship({"water_depth": TYPICAL["water_depth"]}), folder / "ship.fmu", fmi=2)
+    with zipfile.ZipFile(folder / "ship.fmu") as archive:
+        archive.extractall(folder)
+    return UnpackedFmu(folder, read_model_description(str(folder), validate=False))

@@ -43,6 +43,18 @@ def test_a_library_outside_the_archive_is_not_loaded(
     assert caught.value.place == "modelIdentifier" and caught.value.source == str(path)
 
 
+@pytest.mark.parametrize("name", ["../outside.txt", "resources/../../outside.txt", "/outside.txt", "..\\outside.txt"])
+def test_a_path_out_of_the_archive_is_refused(name: str, fmu_file: Callable[[str, int], Path], tmp_path: Path) -> None:
+    path, folder = tmp_path / "x.fmu", tmp_path / "unpacked"
+    shutil.copy(fmu_file("hull", 2), path)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(name, b"outside")
+    with pytest.raises(InputError) as caught:
+        unpack(path, folder)
+    assert repr(name) in caught.value.problem
+    assert not folder.exists()
+
+
 @pytest.mark.parametrize("bomb", ["large", "many"])
 def test_an_archive_that_would_fill_the_disk_is_not_unpacked(bomb: str, tmp_path: Path) -> None:
     path, folder = tmp_path / "bomb.fmu", tmp_path / "unpacked"

@@ -57,6 +57,29 @@ def test_a_step_too_short_to_change_the_time_is_refused(fmi: int, instantiate: I
     assert len(fmu.log) == 1
 
 
+@FMI
+def test_a_clock_that_adds_up_in_32_bits_is_accepted(fmi: int, instantiate: Instantiate) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+    exact = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+    now = np.float32(0.0)
+    for _ in range(3000):
+        fmu.instance.doStep(currentCommunicationPoint=float(now), communicationStepSize=0.1)
+        now += np.float32(0.1)
+    assert fmu.read(STATES) == pytest.approx(steps(exact, 3000), rel=1e-9)
+
+
+@FMI
+@pytest.mark.parametrize("clock", [999.9, 1000.1], ids=["repeated", "left out"])
+def test_a_step_repeated_or_left_out_is_refused_however_late(
+    fmi: int, clock: float, instantiate: Instantiate, status: Status
+) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    steps(fmu, 100, 10.0)
+    before = fmu.read(STATES)
+    assert status(fmu.instance.doStep, clock, 0.1) == ERROR
+    assert fmu.read(STATES) == before
+
+
 # ---- what only parameters determine ----
 
 

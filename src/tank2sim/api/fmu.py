@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
+from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
 from tank2sim.fmu.documents import documents_of
@@ -152,12 +153,13 @@ def make_fmu_file(
         Called with the stage that begins.
     """
     chosen = named_platforms(platforms)
-    made = make_fmu(ship.model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
+    model = with_external_forces(ship.model)
+    made = make_fmu(model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
     files: dict[Path, str | bytes] = {path: made.content}
     if ssp:
         from tank2sim.fmu.ssp import ship_with_autopilot
 
-        files[ssp] = ship_with_autopilot(ship.model, made, platforms=chosen, report=report)
+        files[ssp] = ship_with_autopilot(model, made, platforms=chosen, report=report)
     return ExportResult(ship, path, made, ssp, files)
 
 
@@ -181,4 +183,4 @@ def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     text = embedded_card(Path(path)) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else card.model
-    return CheckResult(check_against_model(Path(path), model=model))
+    return CheckResult(check_against_model(Path(path), model=model and with_external_forces(model)))

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
 from tank2sim.api.result import Result, ResultTable
+from tank2sim.dynamics.external_forces import external_inputs, with_external_forces
+from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.simulation.card_range import entry_name, single_figures
 from tank2sim.simulation.manoeuvres import Manoeuvre
@@ -131,16 +133,37 @@ class ManoeuvreResult(Result):
 
 
 def simulate_manoeuvre(
-    ship: Ship, manoeuvre: Manoeuvre, words: str, duration_s: float | None, ensemble: EnsembleOptions
+    ship: Ship,
+    manoeuvre: Manoeuvre,
+    words: str,
+    duration_s: float | None,
+    ensemble: EnsembleOptions,
+    external: Mapping[str, float] | None = None,
 ) -> ManoeuvreResult:
     """Simulate a manoeuvre of a ship, called by its `words`, with an ensemble if it has members.
+
+    Parameters
+    ----------
+    ship, manoeuvre, words
+        What is simulated, and what it is called.
+    duration_s : float or None
+        None: as long as the manoeuvre needs.
+    ensemble : EnsembleOptions
+        Size, seed and computer of the ensemble.
+    external : mapping, optional
+        As in :meth:`.Ship.simulate`.
 
     Raises
     ------
     InputError
         As :meth:`.Ship.simulate`.
     """
-    run = simulate(ship.model, manoeuvre, duration_s=duration_s)
+    if external and ensemble.members:
+        raise InputError("external", "", "cannot act on an ensemble", "leave out either the members or the force")
+    inputs = external_inputs(external or {})
+    run = simulate(
+        with_external_forces(ship.model) if inputs else ship.model, manoeuvre, duration_s=duration_s, inputs=inputs
+    )
     bands = None
     if ensemble.members:
         from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands

@@ -213,6 +213,7 @@ class Ship:
         manoeuvre: str | Manoeuvre,
         *,
         duration_s: float | None = None,
+        external: Mapping[str, float] | None = None,
         members: int = 0,
         seed: int = 0,
         executor: str = PROCESSES,
@@ -225,6 +226,9 @@ class Ship:
             Angles of a text in degrees; an object of :mod:`tank2sim.simulation.manoeuvres` has radians.
         duration_s : float, optional
             By default as long as the manoeuvre needs.
+        external : mapping, optional
+            Constant force from outside: ``X``, ``Y`` (N, positive forward and to starboard) at ``x``, ``y`` (m, forward
+            of midships and to starboard), and a moment ``N`` (N m, positive to starboard) in addition.
         members : int
             Size of an ensemble drawn from the standard errors of the card, for bands of 5, 50 and 95 %; 0 for none.
         seed : int
@@ -235,14 +239,16 @@ class Ship:
         Raises
         ------
         InputError
-            The text is not a manoeuvre, the card is not one of a ship with a rudder, or the motion leaves all bounds.
+            The text is not a manoeuvre, the card is not one of a ship with a rudder, the motion leaves all bounds,
+            or `external` has an unknown key or comes with an ensemble.
         """
         from tank2sim.api.manoeuvre import simulate_manoeuvre
         from tank2sim.simulation.manoeuvres import parse_manoeuvre
 
         parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
         words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
-        return simulate_manoeuvre(self, parsed, words, duration_s, EnsembleOptions(members, seed, executor))
+        ensemble = EnsembleOptions(members, seed, executor)
+        return simulate_manoeuvre(self, parsed, words, duration_s, ensemble, external)
 
     def stability(
         self,

@@ -13,6 +13,7 @@ _DESCRIPTIONS = {
     "steering": "Steering gear: rudder order and angle, failure",
     "propulsion": "Propulsion: ordered and actual revolutions",
     "force": "Hydrodynamic forces and moment on the ship",
+    "external": "External force and moment: X and Y at a point x, y, and N",
     "heading": "Heading order",
     "buoyancy": "Net buoyancy: order and actual",
     "pitch": "Pitch: order and actual",

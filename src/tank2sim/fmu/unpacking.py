@@ -78,8 +78,8 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
     Raises
     ------
     InputError
-        The file is missing, no FMU, damaged, too large, of another version of FMI than 2.0 or 3.0, names a library
-        outside the archive, or has none for this machine.
+        The file is missing, no FMU, damaged, too large, of another version of FMI than 2.0 or 3.0, names a file or
+        library outside the archive, or has none for this machine.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -88,6 +88,7 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
             names = archive.namelist()
         if damaged is not None:
             raise zipfile.BadZipFile(damaged)
+        _require_inside(path, names)
         if "modelDescription.xml" not in names:
             raise InputError(
                 path, "", "is not an FMU: it has no modelDescription.xml", "give a file that tank2sim exported"
@@ -137,6 +138,14 @@ def _require_bounded(path: Path, archive: zipfile.ZipFile) -> None:
         problem = f"would unpack to {size / 1e6:.0f} MB in {len(entries)} files"
         remedy = f"at most {LARGEST_BYTES / 1e6:.0f} MB in {MOST_FILES} files are unpacked: it is not an FMU of a ship"
         raise InputError(path, "", problem, remedy)
+
+
+def _require_inside(path: Path, names: list[str]) -> None:
+    """Refuse an archive with a name that leads out of the folder into which it is unpacked."""
+    for name in names:
+        if name.startswith("/") or "\\" in name or ":" in name or ".." in name.split("/"):
+            problem = f"has a file {name!r}, which leads out of the archive"
+            raise InputError(path, "", problem, "do not trust this file")
 
 
 def _require_plain_identifiers(path: Path, description: Any) -> None:
