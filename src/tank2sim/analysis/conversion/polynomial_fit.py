@@ -40,7 +40,7 @@ err by 2.8 % at most and its overshoots by 0.9 deg; with 1 by 5.4 % and 0.8 deg.
 SPREADS = {"u": 0.1, "v": 0.1, "r": 0.2, "rudder_deg": 10.0}
 """Standard deviations of the scatter: u over u0, v over U, r' and the rudder. Project choices."""
 
-SAMPLES = 20000
+SCATTERED_MOTIONS = 20000
 """Motions that are fitted: with twice as many, figures of the KVLCC2's manoeuvres change by 0.3 % at
 most. Project choice."""
 
@@ -86,7 +86,9 @@ def manoeuvre_motions(model: Model) -> Array:
     return np.vstack(found)
 
 
-def scattered_motions(model: Model, motions: Array, scatter: float = SCATTER, samples: int = SAMPLES) -> Array:
+def scattered_motions(
+    model: Model, motions: Array, scatter: float = SCATTER, samples: int = SCATTERED_MOTIONS
+) -> Array:
     """Motions about those of manoeuvres, within the rudder's limits and ahead of rest.
 
     Parameters
