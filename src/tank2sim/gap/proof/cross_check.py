@@ -164,7 +164,7 @@ def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
     By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
-    signals of all trials in which the two simulations differ by :data:`ACTS_FROM`, for an effect may act in few of them.
+    signals of all trials in which the simulations differ by :data:`ACTS_FROM`, for an effect may act in few of them.
     `limit` is the largest median.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
