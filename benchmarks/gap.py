@@ -47,7 +47,7 @@ from tank2sim.files import write_whole
 from tank2sim.gap.diagnosis.residuals import estimates
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.outcome.export import NOISE_FLOOR, in_file_units
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, decide
@@ -73,7 +73,9 @@ NOTHING_MISSING = (
     *(("gusts", "independent"), ("waves", "correlated")),
 )
 PROCESSES = (("gusts", "independent"), ("waves", "exact"), ("none", "correlated"))
-PARTS = ("singles", "weak", "pairs", "none", "outsiders", "process")
+BY_TRIAL = (("wind",), ("current",), ("wind", "rudder_lag"), ("current", "cross_flow_drag"))
+NEXT_TO_UNKNOWN = (("cross_flow_drag", "out_tug"), ("wind", "out_oscillation"))
+PARTS = ("singles", "weak", "pairs", "none", "outsiders", "process", "by_trial", "next_to_unknown")
 OUTCOMES = ("right", "undecided", "half", "misnamed", "none", "outside")
 NONE_PER_SEED = 2
 """So many sets of each kind with nothing missing for each seed: five seeds make 70."""
@@ -116,13 +118,16 @@ class Said:
         """One of :data:`OUTCOMES`."""
         truth, named = set(self.there), set(self.named)
         outsider = bool(truth & set(OUTSIDERS))
+        if outsider and not truth <= set(OUTSIDERS):
+            known = truth - set(OUTSIDERS)
+            return "right" if named == known else "outside" if not named else "half" if named < known else "misnamed"
         if self.verdict == OUTSIDE_LIBRARY:
             return "right" if outsider else "outside"
-        if self.verdict == NO_EFFECT_MISSING and not truth:
+        if self.verdict in (NO_EFFECT_MISSING, COEFFICIENTS) and not truth:
             return "right"
         if not outsider and named <= truth and all(self._hidden(name) for name in truth - named):
             return "right" if self.verdict == MISSING and named == truth else "undecided"
-        if self.verdict == NO_EFFECT_MISSING:
+        if self.verdict in (NO_EFFECT_MISSING, COEFFICIENTS):
             return "none"
         if self.verdict == AMBIGUOUS and truth and truth in map(set, self.alternatives):
             return "undecided"
@@ -156,6 +161,10 @@ def settings(part: str, seeds: Sequence[int]) -> Iterator[tuple[str, Setting]]:
             yield from ((part, Setting((name,), seed, strength=0.25, noise=2.0)) for name in EFFECTS)
         elif part == "pairs":
             yield from ((part, Setting(pair, seed)) for pair in PAIRS)
+        elif part == "by_trial":
+            yield from ((part, Setting(names, seed, by_trial=True)) for names in BY_TRIAL)
+        elif part == "next_to_unknown":
+            yield from ((part, Setting(names, seed)) for names in NEXT_TO_UNKNOWN)
         elif part == "outsiders":
             yield from ((part, Setting((name,), seed)) for name in OUTSIDERS)
         elif part == "process":
@@ -180,6 +189,7 @@ def key(setting: Setting, args: argparse.Namespace) -> str:
     words = ("+".join(setting.effects) or "none", setting.seed, setting.strength, setting.noise)
     more = [*(["proved"] if args.prove else []), *([f"{args.hertz}Hz"] if args.hertz < 10 else [])]
     more += [f"wrong{args.wrong_card}"] if args.wrong_card else []
+    more += ["by_trial"] if setting.by_trial else []
     return "_".join(map(str, (*words, setting.process, setting.coefficients, *more)))
 
 
