@@ -9,6 +9,8 @@ pairs      two effects of different kinds at once
 none       nothing missing: sensor noise alone, every coefficient of the true ship 2 % off the card's (each by itself,
            or in groups), gusts, waves, and both together
 outsiders  what the library does not hold
+by_trial   winds and currents drawn for each trial, alone and with another effect
+next_to_unknown  an effect of the library next to what it does not hold: the known one is to be named
 process    singles with gusts and coefficients 2 % off, with waves, or with coefficients 2 % off in groups, by turns
 
 A set is *right* if exactly the truth is named (none where there is none, outside the library where it is);
