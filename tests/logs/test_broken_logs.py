@@ -283,3 +283,12 @@ def test_an_exchanged_order_and_angle_of_the_rudder_are_left_out(written) -> Non
     result = log(written(table))
     assert any("as an order does" in mark for mark in result.marks)
     assert not {"rudder_angle", "rudder_order"} & set(used(result))
+
+
+def test_a_log_that_was_encoded_twice_is_refused_without_a_warning(tmp_path, recwarn) -> None:
+    path = tmp_path / "voyage.csv"
+    text = "\n".join(nmea_lines())
+    path.write_bytes(text.encode("utf-16").decode("latin-1").encode("utf-16"))
+    with pytest.raises(InputError):
+        read_log(path)
+    assert not recwarn.list

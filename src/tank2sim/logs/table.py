@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import re
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,19 +58,21 @@ def read_table_log(path: Path) -> VesselLog:
 
     layout, encoding = _layout(path)
     try:
-        frame = pd.read_csv(
-            path,
-            sep=r"\s+" if layout.separator == WHITESPACE else layout.separator,
-            names=list(layout.names),
-            index_col=False,
-            skiprows=layout.skip,
-            comment="#",
-            decimal="," if layout.comma else ".",
-            encoding=encoding,
-            encoding_errors="replace",
-            on_bad_lines="skip",
-            low_memory=False,
-        )
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always", pd.errors.ParserWarning)
+            frame = pd.read_csv(
+                path,
+                sep=r"\s+" if layout.separator == WHITESPACE else layout.separator,
+                names=list(layout.names),
+                index_col=False,
+                skiprows=layout.skip,
+                comment="#",
+                decimal="," if layout.comma else ".",
+                encoding=encoding,
+                encoding_errors="replace",
+                on_bad_lines="skip",
+                low_memory=False,
+            )
     except (ValueError, csv.Error) as error:
         raise InputError(path, "", f"is not a table ({' '.join(str(error).split())})", "give a CSV") from None
     rows = len(frame)
@@ -78,6 +81,10 @@ def read_table_log(path: Path) -> VesselLog:
         body = itertools.islice(file, layout.skip, None)
         skipped = max(0, sum(1 for line in body if line.strip() and not line.startswith(b"#")) - rows)
     findings = [LogFinding("note", f"{skipped} rows have too many cells and are left out")] if skipped else []
+    if any(issubclass(each.category, pd.errors.ParserWarning) for each in warned):
+        findings.append(
+            LogFinding("note", f"rows have cells beyond the {len(layout.names)} columns; they are not read")
+        )
     time, dated, used = _time(path, frame, findings)
     streams = [
         _stream(name, unit, time, values)
