@@ -51,6 +51,7 @@ from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import lowered_bound_notice, polynomial_over_trials
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
 
@@ -144,6 +145,7 @@ def run_gap_workflow(
         A trial is too short or measures too little, or a requested effect cannot be tried on this card.
     """
     options = options or GapOptions()
+    given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
         gap, trials = _search_once(card, (fitted, held), options, progress, pool)
@@ -158,7 +160,7 @@ def run_gap_workflow(
             if not _adds(gap, further, 1 - options.false_discovery):
                 break
             gap, trials = combine_passes(gap, further), found_trials
-        return gap
+        return replace(gap, notices=(*lowered_bound_notice(given, card), *gap.notices))
 
 
 def _search_once(
