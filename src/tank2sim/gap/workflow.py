@@ -315,7 +315,8 @@ def _judge_by_simulation(
         unknown = current.verdict == OUTSIDE_LIBRARY
         if _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results):
             verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
-            return _Judged(replace(current, verdict=verdict), estimated, proof, tuple(withheld))
+            boxed = replace(proof, results=_with_black_box(card, proof, estimated, sigmas))
+            return _Judged(replace(current, verdict=verdict), estimated, boxed, tuple(withheld))
         if not unknown:
             withheld.append(" and ".join(current.best.hypothesis.effects))
         kept = tuple(fit for fit in remaining.fits if fit is not current.best)
@@ -365,7 +366,7 @@ def _prove(
     best: ExplanationFit,
 ) -> _Proof:
     """The card with the effects, and with coefficients fitted together with them if fitted trials are then followed
-    better by :data:`BETTER`; replays by both cards, and by a black box where an effect is named.
+    better by :data:`BETTER`; replays by both cards.
 
     Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
     """
@@ -386,14 +387,19 @@ def _prove(
             keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
             of_effect = {key: _misfit_of(results, "after", held_out=held) for key, held in keys.items()}
             proof = _Proof(trials, by_trial, base, joint, joint_results, refitted, of_effect if estimated else {})
-    if not estimated:
-        return proof
-    box = black_box(card, trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
+    return proof
+
+
+def _with_black_box(
+    card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], sigmas: Mapping[str, float]
+) -> list[Passed]:
+    """The replays of a proof, and by a black box with as many coefficients as the named effects have parameters."""
+    box = black_box(card, proof.trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
     boxed: list[Passed] = []
-    for group, held_out in zip(trials, (False, True), strict=True):
+    for group, held_out in zip(proof.trials, (False, True), strict=True):
         of_group = [result for result in proof.results if result.held_out == held_out]
         boxed += with_black_box(of_group, box.card, group, sigmas) if of_group else []
-    return replace(proof, results=boxed)
+    return boxed
 
 
 def _in_surroundings(
