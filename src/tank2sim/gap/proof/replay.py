@@ -90,8 +90,8 @@ def _followed(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
     p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in seen])
     for trial, found in zip(measured.trials, known, strict=True):
         if key not in found:
-            record = input_record(replayer, trial)
-            simulated = replayer.motion(record, replayer.fit_initial_state(record, sigma, p), p)
+            record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
+            simulated = replayer.motion(record, start, p)
             found[key] = _Followed(record, replayer.seen, simulated)
     return [found[key] for found in known]
 
