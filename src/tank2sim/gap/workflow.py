@@ -71,6 +71,14 @@ EXPLAINED = 0.2
 TRIES = 4
 """Explanations that are simulated at most, one after the other (project choice)."""
 
+NEAR_NOISE = 1.2
+"""Misfit in noise units of the fitted trials up to which a name is not compared with coefficients alone (project
+choice): many coefficients follow a few trials a little better than they should."""
+
+DECISIVE = 40.0
+"""Difference of the scores of "none" and of a name (-2 log probability) from which simulations with coefficients alone
+are not asked for (project choice: odds of 1 to e^20)."""
+
 CLEARLY = 0.7
 """Largest share of the misfit that may remain where a second explanation, or one next to something unknown, is named
 (project choice)."""
@@ -301,9 +309,11 @@ def _judge_by_simulation(
     An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
     the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts
     next to something that no effect explains, must close the gap clearly (:data:`CLEARLY`); nothing is named without.
+    A name in doubt must also follow the fitted trials as closely as the card's coefficients alone, fitted to them.
     `share` is the option ``false_discovery``.
     """
     withheld: list[str] = []
+    alone: _Proof | None = None
     remaining, current = found, decision
     for _ in range(TRIES):
         if not current.best.hypothesis.effects:
@@ -313,7 +323,12 @@ def _judge_by_simulation(
         by_trial = surroundings_by_trial(by_formula, remaining.likelihood.motion.names)
         proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, remaining, current.best)
         unknown = current.verdict == OUTSIDE_LIBRARY
-        if _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results):
+        closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
+        if closes and _is_doubtful(found, current, proof):
+            alone = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+            with_effects, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, alone))
+            closes = with_effects < max((1 + BETTER) * without, NEAR_NOISE)
+        if closes:
             verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
             boxed = replace(proof, results=_with_black_box(card, proof, estimated, sigmas))
             return _Judged(replace(current, verdict=verdict), estimated, boxed, tuple(withheld))
@@ -322,10 +337,18 @@ def _judge_by_simulation(
         kept = tuple(fit for fit in remaining.fits if fit is not current.best)
         remaining = replace(remaining, fits=kept)
         current = decide(remaining, share)
-    proof = _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+    proof = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
     if decision.best.hypothesis.effects:
-        decision = replace(decision, verdict=OUTSIDE_LIBRARY)
+        follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
+        decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
     return _Judged(decision, [], proof, tuple(withheld))
+
+
+def _is_doubtful(found: Search, decision: Decision, proof: _Proof) -> bool:
+    """Whether coefficients alone may follow the trials as well as a name does: its score is not far ahead of theirs, or
+    the fitted trials are missed with it."""
+    near = found.none.score - decision.best.score < DECISIVE
+    return near or _misfit_of(proof.results, "after", held_out=False) > AGAIN
 
 
 def _closes_clearly(results: Sequence[Passed]) -> bool:
@@ -524,7 +547,7 @@ def _notices(
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(strange) for strange in decision.strange]
     notices += [
-        f"{names}: fits best from instant to instant, but a simulation with it is not closer: not named"
+        f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
         for names in withheld
     ]
     if own_surroundings:
