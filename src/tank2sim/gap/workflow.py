@@ -309,7 +309,8 @@ def _judge_by_simulation(
     An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
     the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts
     next to something that no effect explains, must close the gap clearly (:data:`CLEARLY`); nothing is named without.
-    A name in doubt must also follow the fitted trials as closely as the card's coefficients alone, fitted to them.
+    A name whose score is not far ahead of none (:data:`DECISIVE`) must also follow the fitted trials as closely as the
+    card's coefficients alone, fitted to them.
     `share` is the option ``false_discovery``.
     """
     withheld: list[str] = []
@@ -324,7 +325,7 @@ def _judge_by_simulation(
         proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, remaining, current.best)
         unknown = current.verdict == OUTSIDE_LIBRARY
         closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
-        if closes and _is_doubtful(found, current, proof):
+        if closes and found.none.score - current.best.score < DECISIVE:
             alone = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
             with_effects, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, alone))
             closes = with_effects < max((1 + BETTER) * without, NEAR_NOISE)
@@ -342,13 +343,6 @@ def _judge_by_simulation(
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
     return _Judged(decision, [], proof, tuple(withheld))
-
-
-def _is_doubtful(found: Search, decision: Decision, proof: _Proof) -> bool:
-    """Whether coefficients alone may follow the trials as well as a name does: its score is not far ahead of theirs, or
-    the fitted trials are missed with it."""
-    near = found.none.score - decision.best.score < DECISIVE
-    return near or _misfit_of(proof.results, "after", held_out=False) > AGAIN
 
 
 def _closes_clearly(results: Sequence[Passed]) -> bool:
