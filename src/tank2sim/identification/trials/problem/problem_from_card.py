@@ -70,7 +70,13 @@ def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> Ma
 
 
 def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[str, ...]:
-    """What :func:`polynomial_over_trials` changed of the given card, as a notice; empty if nothing."""
+    """What :func:`polynomial_over_trials` changed of a card, as a notice; empty if nothing.
+
+    Parameters
+    ----------
+    given, card : ManoeuvringCard
+        Before and after.
+    """
     if card is given:
         return ()
     text = (
@@ -81,7 +87,14 @@ def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple
 
 def slowest_speed(trial: Trial, ship_time: float) -> float:
     """Lowest speed (m/s) of a trial, noise apart: through the water if it is known, else over the ground; infinite if
-    neither was measured. `ship_time` (s) is L/U."""
+    neither was measured.
+
+    Parameters
+    ----------
+    trial : Trial
+    ship_time : float
+        L/u0, s: positions are compared over a quarter of it.
+    """
     signals = trial.signals
     if "u_mps" in signals:
         speed = np.hypot(signals["u_mps"], signals.get("v_mps", 0.0))
