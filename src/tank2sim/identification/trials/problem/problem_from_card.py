@@ -111,7 +111,7 @@ def slowest_speed(trial: Trial, ship_time: float) -> float:
 
 
 def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
-    """The card's model, driven by the measured angle of the rudder or by its order."""
+    """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order."""
     model = with_ground_velocities(build(card))
     return driven_by_angle(model) if driven_by == "angle" else model
 
@@ -195,6 +195,16 @@ def problem_from_card(
     """The problem of fitting a card's free parameters to trials, except for those in `hold`.
 
     Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    trials : sequence of Trial
+        At the ship's size.
+    driven_by : str
+        ``angle`` or ``order`` of the rudder.
+    inertia : bool
+        Whether accelerations are free too.
 
     Raises
     ------
