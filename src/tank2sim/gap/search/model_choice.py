@@ -217,12 +217,12 @@ def _change_of_gear(fit: ExplanationFit, name: str) -> float:
     none. A gear that is better than the card states is no fault of the gear."""
     ((_, values, _),) = [found for found in estimates(fit) if found[0] == name]
     ((key, value),) = values.items()
-    (parameter,) = (each for each in EFFECTS[name].parameters if each.name == key)
+    worse = next((parameter.worse for parameter in EFFECTS[name].parameters if parameter.name == key), 0)
     stated = getattr(fit.hypothesis.card.steering_gear, key, None)
     if stated is None:
         return float(np.inf)
     change = float((value - stated) / (GEAR * stated))
-    return change * parameter.worse if parameter.worse else abs(change)
+    return change * worse if worse else abs(change)
 
 
 _WINDOWS = (6, 12, 24, 48)
