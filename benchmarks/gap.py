@@ -1,7 +1,7 @@
 """The gap workflow judged on made-up trials: how often the missing effect is named, and how often a wrong one is.
 
-The trials are of gap_truth, a generator that shares no code with the program: seven manoeuvres of the Mariner at 10 Hz,
-written to files and read from them as a user's are. Parts:
+The trials are of gap_truth, a generator that shares no code with the program: seven manoeuvres of one of its four
+ships at 10 Hz (the Mariner unless another is asked for), written to files and read from them as a user's are. Parts:
 
 singles    each effect of the library alone, at the strength at which one would call it real; the card exact
 weak       the same at a quarter of the strength and with twice the noise
@@ -40,7 +40,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from gap_truth import EFFECTS, FIT, HOLDOUT, OUTSIDERS, Made, Setting, make, sampled, write, wrong_card
+from gap_truth import EFFECTS, FIT, HOLDOUT, HULLS, OUTSIDERS, Made, Setting, make, sampled, write, wrong_card
 from scipy.stats import binomtest
 
 from tank2sim.cards import ManoeuvringCard, read_card
@@ -154,8 +154,12 @@ class Said:
         )
 
 
-def settings(part: str, seeds: Sequence[int]) -> Iterator[tuple[str, Setting]]:
-    """The sets of a part, each with the group of which it is counted."""
+def settings(part: str, seeds: Sequence[int], ship: str) -> Iterator[tuple[str, Setting]]:
+    """The sets of a part with a ship, each with the group of which it is counted."""
+    yield from ((group, replace(setting, ship=ship)) for group, setting in _settings(part, seeds))
+
+
+def _settings(part: str, seeds: Sequence[int]) -> Iterator[tuple[str, Setting]]:
     for seed in seeds:
         if part == "singles":
             yield from ((part, Setting((name,), seed)) for name in EFFECTS)
@@ -192,6 +196,7 @@ def key(setting: Setting, args: argparse.Namespace) -> str:
     more = [*(["proved"] if args.prove else []), *([f"{args.hertz}Hz"] if args.hertz < 10 else [])]
     more += [f"wrong{args.wrong_card}"] if args.wrong_card else []
     more += ["by_trial"] if setting.by_trial else []
+    more += [setting.ship] if setting.ship != "mariner" else []
     return "_".join(map(str, (*words, setting.process, setting.coefficients, *more)))
 
 
@@ -359,6 +364,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep what was said, a file a set; resume from it")
     parser.add_argument("--hertz", type=int, choices=(10, 5, 2, 1), default=10, help="rows of a record a second (10)")
+    parser.add_argument("--ship", choices=tuple(HULLS), default="mariner", help="ship of the generator (mariner)")
     percent = "each derivative of the card off by a normal error of P %% of it, which the card states"
     parser.add_argument("--wrong-card", type=float, default=0.0, metavar="P", help=percent)
     parser.add_argument("--prove", action="store_true", help="the whole workflow, proved on held-out trials")
@@ -373,7 +379,7 @@ def main() -> int:
     chosen = [
         (group, setting)
         for part in args.part
-        for group, setting in settings(part, seeds)
+        for group, setting in settings(part, seeds, args.ship)
         if not args.only or set(setting.effects or ("none",)) & set(args.only)
     ]
     sets = run(chosen, args)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter, lfiltic
 
 from gap_truth.lane import Lane
-from gap_truth.ship import Array
+from gap_truth.ship import MARINER, Array, Hull
 
 WHITE = {"u_mps": 0.02, "v_mps": 0.02, "r_degps": 0.02, "psi_deg": 0.1, "x_m": 0.5, "y_m": 0.5}
 """Standard deviation of each sample, as measured in the worked cases."""
@@ -24,6 +24,8 @@ WANDER = {
 Measured as `WHITE`, from the covariance of five-second means at 5 to 50 s lag."""
 
 FORCE_STEP_S = 0.5
+"""Of the Mariner; with L/U for others."""
+
 GUST = ((3e-5, 25.0), (7e-5, 20.0), (1.5e-5, 15.0))
 """X', Y', N' (scaled with u0) standard deviation and time constant: N' of one degree of rudder is 2.4e-5."""
 
@@ -42,19 +44,31 @@ def markov(generator: np.random.Generator, count: int, step_s: float, sigma: flo
     return np.asarray(lfilter([1.0], [1.0, -keep], kick), float)
 
 
+def noise_scale(hull: Hull, signal: str) -> float:
+    """Noise of a signal over the Mariner's: a model basin's instruments are better as the model is smaller."""
+    length = min(1.0, hull.length_m / MARINER.length_m)
+    speed = min(1.0, hull.speed_mps / MARINER.speed_mps)
+    return {"u_mps": speed, "v_mps": speed, "x_m": length, "y_m": length, "r_degps": 1.0 / min(1.0, hull.time)}.get(
+        signal, 1.0
+    )
+
+
 def sensor_noise(lane: Lane, count: int) -> dict[str, Array]:
     """Noise of every signal, (count,) at 10 Hz, in file units."""
     generator = lane.setting.generator(f"sensors of {lane.trial}")
     noise = {}
     for name, sigma in WHITE.items():
-        slow = markov(generator, count, 0.1, *WANDER[name])
-        noise[name] = lane.setting.noise * (sigma * generator.standard_normal(count) + slow)
+        wander, tau_s = WANDER[name]
+        slow = markov(generator, count, 0.1, wander, tau_s * lane.setting.hull.time)
+        size = lane.setting.noise * noise_scale(lane.setting.hull, name)
+        noise[name] = size * (sigma * generator.standard_normal(count) + slow)
     return noise
 
 
 def forces(lane: Lane, duration_s: float) -> Array:
     """Process forces (count, 3) every `FORCE_STEP_S`: X', Y', N' scaled with u0; zeros in the regime `none`."""
-    count = round(duration_s / FORCE_STEP_S) + 2
+    time = lane.setting.hull.time
+    count = round(duration_s / (FORCE_STEP_S * time)) + 2
     if lane.setting.process == "none":
         return np.zeros((count, 3))
     generator = lane.setting.generator(f"process of {lane.trial}")

@@ -1,4 +1,6 @@
-"""How large each effect is: random parameters in the units of files, at a strength.
+"""How large each effect is on the Mariner: random parameters in the units of files, at a strength.
+
+Other ships get the same in the prime system (Hull.scaled).
 
 Strength 1 is an effect a naval architect would call real and noticeable; the ranges are a choice of ours, of the size
 of the worked cases where there is one (current 0.3-0.6 m/s, wind 8-14 m/s, rate limit 1.2-2 deg/s). Strength s means
@@ -15,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gap_truth.ship import GEAR_RATE_DEGPS, GEAR_TIME_S
+from gap_truth.ship import MARINER
 
 Draw = Callable[[np.random.Generator, float], dict[str, float]]
 _Range = tuple[float, float]
@@ -41,12 +43,14 @@ def _power(name: str, limits: _Range, power: float, direction: bool) -> Draw:
 
 
 def _rate_limit(generator: np.random.Generator, strength: float) -> dict[str, float]:
-    healthy = 1.0 / GEAR_RATE_DEGPS
+    healthy = 1.0 / MARINER.gear_rate_degps
     return {"max_rate_degps": 1.0 / (healthy + strength * (1.0 / generator.uniform(1.2, 2.0) - healthy))}
 
 
 def _lag(generator: np.random.Generator, strength: float) -> dict[str, float]:
-    return {"time_constant_s": GEAR_TIME_S + strength**0.7 * (generator.uniform(4.0, 7.0) - GEAR_TIME_S)}
+    return {
+        "time_constant_s": MARINER.gear_time_s + strength**0.7 * (generator.uniform(4.0, 7.0) - MARINER.gear_time_s)
+    }
 
 
 def _lever_arm(generator: np.random.Generator, strength: float) -> dict[str, float]:

@@ -9,23 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from gap_truth.motion import Force, Motion, Parameters
-from gap_truth.ship import (
-    AIR_KGPM3,
-    BEAM_M,
-    DRAUGHT_M,
-    GRAVITY_MPS2,
-    LENGTH_M,
-    SPEED_MPS,
-    WATER_KGPM3,
-    XNN,
-    Array,
-)
+from gap_truth.ship import AIR_KGPM3, GRAVITY_MPS2, WATER_KGPM3, Array
 
 Forces = tuple[Array | float, Array | float, Array | float]
-
-FRONT_M2 = 430.0
-SIDE_M2 = 1900.0
-"""Areas above water of a cargo ship of the Mariner's size, chosen so that the worked case's wind gives its gap."""
 
 _STRIPS = np.linspace(-0.5, 0.5, 21)
 _WEIGHTS = np.where(np.abs(_STRIPS) == 0.5, 0.5, 1.0) / (len(_STRIPS) - 1)  # trapezoid
@@ -45,19 +31,19 @@ def _air(m: Motion, along: Array, across: Array) -> tuple[Array, Array, Array]:
     squared = along * along + across * across
     speed = np.sqrt(squared) + 1e-9
     c, s = along / speed, across / speed
-    pressure = (AIR_KGPM3 / WATER_KGPM3) * squared / (LENGTH_M**2 * m.speed**2)
-    surge = -0.72 * c * (0.85 + 0.15 * c * c) * pressure * FRONT_M2
-    sway = -0.85 * s * (0.9 + 0.1 * s * s) * pressure * SIDE_M2
-    return surge, sway, -0.20 * s * c * pressure * SIDE_M2
+    pressure = (AIR_KGPM3 / WATER_KGPM3) * squared / (m.hull.length_m**2 * m.speed**2)
+    surge = -0.72 * c * (0.85 + 0.15 * c * c) * pressure * m.hull.front_m2
+    sway = -0.85 * s * (0.9 + 0.1 * s * s) * pressure * m.hull.side_m2
+    return surge, sway, -0.20 * s * c * pressure * m.hull.side_m2
 
 
 def wave_drift(m: Motion, p: Parameters) -> Forces:
     """Mean drift 1/2 rho g a^2 of waves from a direction, a little more against them than with them."""
     relative = p["direction_rad"] - m.psi  # bearing of where the waves come from
     c, s = np.cos(relative), np.sin(relative)
-    encounter = 1.0 + 0.25 * c * m.u / SPEED_MPS
+    encounter = 1.0 + 0.25 * c * m.u / m.hull.speed_mps
     size = GRAVITY_MPS2 * (p["height_m"] / 2.0) ** 2 / m.speed**2 * encounter
-    return -0.6 * c * size * BEAM_M / LENGTH_M**2, -0.9 * s * np.abs(s) * size / LENGTH_M, 0.0
+    return -0.6 * c * size * m.hull.beam_m / m.hull.length_m**2, -0.9 * s * np.abs(s) * size / m.hull.length_m, 0.0
 
 
 def bank_suction(m: Motion, p: Parameters) -> Forces:
@@ -68,7 +54,7 @@ def bank_suction(m: Motion, p: Parameters) -> Forces:
 
 def propeller_side_force(m: Motion, p: Parameters) -> Forces:
     """Side force of the screw, with its thrust: revolutions squared, growing as the advance falls."""
-    load = m.nominal * m.rpm_ratio * (1.15 * m.rpm_ratio - 0.15 * m.u / SPEED_MPS)
+    load = m.nominal * m.rpm_ratio * (1.15 * m.rpm_ratio - 0.15 * m.u / m.hull.speed_mps)
     return 0.0, p["Y_prime"] * load, p["N_prime"] * load
 
 
@@ -82,7 +68,7 @@ def loading_side_force(m: Motion, p: Parameters) -> Forces:
 def rudder_slipstream(m: Motion, p: Parameters) -> Forces:
     """The rudder stands partly in a jet that keeps its speed with the revolutions while the ship loses hers."""
     share = 0.4 * p["gain"]
-    inflow = 1.0 + share * (m.rpm_ratio * SPEED_MPS / m.speed - 1.0)
+    inflow = 1.0 + share * (m.rpm_ratio * m.hull.speed_mps / m.speed - 1.0)
     grown = inflow * inflow - 1.0
     return grown * m.steering[0], grown * m.steering[1], grown * m.steering[2]
 
@@ -96,7 +82,7 @@ def rudder_stall(m: Motion, p: Parameters) -> Forces:
 def loaded_rudder(m: Motion, p: Parameters) -> Forces:
     """More jet over the rudder as the ship slows, at the rudder angle less the straightened local drift."""
     drift = p["straightening"] * np.arctan2(m.v_prime + p["lever"] * m.r_prime, m.u / m.speed)
-    jet = p["loading"] * (m.rpm_ratio * SPEED_MPS / m.speed - 1.0)
+    jet = p["loading"] * (m.rpm_ratio * m.hull.speed_mps / m.speed - 1.0)
     lift = jet * np.sin(m.rudder + drift)
     return -0.4 * np.abs(lift * np.sin(m.rudder)) * 278e-5, -278e-5 * lift, 139e-5 * lift
 
@@ -108,13 +94,13 @@ def cross_flow_drag(m: Motion, p: Parameters) -> Forces:
         local = m.v_prime + x * m.r_prime
         strip = weight * local * np.abs(local)
         sway, yaw = sway + strip, yaw + x * strip
-    size = -p["drag_coefficient"] * DRAUGHT_M / LENGTH_M
+    size = -p["drag_coefficient"] * m.hull.draught_m / m.hull.length_m
     return 0.0, size * sway, size * yaw
 
 
 def hull_fouling(m: Motion, p: Parameters) -> Forces:
     """Roughness drag, quadratic with a little of the viscous power."""
-    return p["X_prime"] * (m.u / m.speed) ** 2 * (SPEED_MPS / m.speed) ** 0.1, 0.0, 0.0
+    return p["X_prime"] * (m.u / m.speed) ** 2 * (m.hull.speed_mps / m.speed) ** 0.1, 0.0, 0.0
 
 
 def hump_resistance(m: Motion, p: Parameters) -> Forces:
@@ -125,8 +111,8 @@ def hump_resistance(m: Motion, p: Parameters) -> Forces:
 
 def engine_droop(m: Motion, p: Parameters) -> Forces:
     """Thrust lost because the engine falls back as the ship slows: n (1 - droop (1 - (u/u0)^1.5)/1.5)."""
-    kept = 1.0 - p["droop"] * (1.0 - np.maximum(m.u, 0.1) ** 1.5 / SPEED_MPS**1.5) / 1.5
-    return XNN * m.rpm_ratio**2 * (kept * kept - 1.0) * m.nominal, 0.0, 0.0
+    kept = 1.0 - p["droop"] * (1.0 - np.maximum(m.u, 0.1) ** 1.5 / m.hull.speed_mps**1.5) / 1.5
+    return m.hull.xnn * m.rpm_ratio**2 * (kept * kept - 1.0) * m.nominal, 0.0, 0.0
 
 
 def asymmetric_turning(m: Motion, p: Parameters) -> Forces:
@@ -154,7 +140,8 @@ def turning_drag(m: Motion, p: Parameters) -> Forces:
 
 def tug(m: Motion, p: Parameters) -> Forces:
     """A push for a limited time, slack taken up in three seconds. Outside any library."""
-    on = np.clip((m.t_s - p["t0"]) / 3.0, 0.0, 1.0) * np.clip((p["t0"] + p["dur"] - m.t_s) / 3.0, 0.0, 1.0)
+    slack_s = 3.0 * m.hull.time
+    on = np.clip((m.t_s - p["t0"]) / slack_s, 0.0, 1.0) * np.clip((p["t0"] + p["dur"] - m.t_s) / slack_s, 0.0, 1.0)
     return 0.0, p["F"] * on * m.nominal, p["F"] * p["lever"] * on * m.nominal
 
 
@@ -166,12 +153,12 @@ def oscillation(m: Motion, p: Parameters) -> Forces:
 
 def drag_step(m: Motion, p: Parameters) -> Forces:
     """Something caught half-way: drag from `t0` on. Outside any library."""
-    return p["X"] * np.clip((m.t_s - p["t0"]) / 2.0, 0.0, 1.0) * m.nominal, 0.0, 0.0
+    return p["X"] * np.clip((m.t_s - p["t0"]) / (2.0 * m.hull.time), 0.0, 1.0) * m.nominal, 0.0, 0.0
 
 
 def flooding(m: Motion, p: Parameters) -> Forces:
     """A list growing with time, and its sideways force. Outside any library."""
-    grown = m.t_s / 400.0 * (m.u / m.speed) ** 2
+    grown = m.t_s / (400.0 * m.hull.time) * (m.u / m.speed) ** 2
     return -0.3 * np.abs(p["Y"]) * grown, p["Y"] * grown, p["N"] * grown
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gap_truth.lane import Lane
-from gap_truth.ship import GEAR_ANGLE_DEG, GEAR_RATE_DEGPS, GEAR_TIME_S, Array
+from gap_truth.ship import GEAR_ANGLE_DEG, Array
 
 
 def _of(lanes: Sequence[Lane], effect: str, parameter: str, otherwise: float) -> Array:
@@ -23,15 +23,16 @@ class Gear:
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
         n = len(lanes)
+        hull = lanes[0].setting.hull
         self.angle, self.stock = np.zeros(n), np.zeros(n)
         self.stages = [np.zeros(n) for _ in range(3)]
         telemotor = _of(lanes, "telemotor_lag", "time_constant_s", 0.0)
         lag = _of(lanes, "rudder_lag", "time_constant_s", 0.0)
         self.stage_times = (0.95 * telemotor, 0.05 * telemotor, 0.05 * lag)
-        self.time = np.where(lag > 0.0, 0.95 * lag, GEAR_TIME_S)
+        self.time = np.where(lag > 0.0, 0.95 * lag, hull.gear_time_s)
         limit = np.radians(_of(lanes, "rudder_rate_limit", "max_rate_degps", 0.0))
         self.soft = limit > 0.0
-        self.rate = np.where(self.soft, limit, np.radians(GEAR_RATE_DEGPS))
+        self.rate = np.where(self.soft, limit, np.radians(hull.gear_rate_degps))
         self.band = np.radians(_of(lanes, "rudder_dead_band", "half_width_deg", 0.0))
         self.play = 0.5 * np.radians(_of(lanes, "rudder_backlash", "width_deg", 0.0))
         self.bias = np.radians(_of(lanes, "rudder_bias", "angle_deg", 0.0))

@@ -1,4 +1,4 @@
-"""All lanes in one batch: Heun's method at 0.05 s, sampled and steered at 10 Hz."""
+"""All lanes of a ship in one batch: Heun's method at 0.05 s or less, sampled and steered at 10 Hz."""
 
 from __future__ import annotations
 
@@ -13,20 +13,8 @@ from gap_truth.lane import Lane
 from gap_truth.manoeuvres import Helm
 from gap_truth.memory import FlowMemory, Roll
 from gap_truth.motion import Index, Motion, Parameters
-from gap_truth.ship import (
-    COEFFICIENTS,
-    LENGTH_M,
-    MASS,
-    NOMINAL_RPM,
-    SPEED_MPS,
-    X_G,
-    XNN,
-    YAW_INERTIA,
-    Array,
-    polynomial,
-)
+from gap_truth.ship import Array, polynomial
 
-STEP_S = 0.05
 TICK_S = 0.1
 SPARE_S = 10.0
 """Every lane runs on after its end, for records whose clock stood still or whose rudder column is early."""
@@ -54,8 +42,11 @@ class Batch:
     def __init__(self, lanes: Sequence[Lane]) -> None:
         n = len(lanes)
         self.n = n
+        self.hull = hull = lanes[0].setting.hull
+        if any(lane.setting.hull is not hull for lane in lanes):
+            raise ValueError("lanes of one ship expected")
         self.duration_s = max(lane.manoeuvre.duration_s for lane in lanes) + SPARE_S
-        self.coefficients = {name: np.array([lane.coefficients[name] for lane in lanes]) for name in COEFFICIENTS}
+        self.coefficients = {name: np.array([lane.coefficients[name] for lane in lanes]) for name in hull.coefficients}
         self.effects = [(force, *gathered(lanes, name)) for name, force in FORCES.items()]
         self.effects = [effect for effect in self.effects if effect[1].size]
         self.memories = [memory for memory in (Roll(lanes), FlowMemory(lanes)) if memory.lanes.size]
@@ -67,19 +58,21 @@ class Batch:
         towards = np.radians([lane.value("current", "direction_deg", 0.0) for lane in lanes])
         self.drift = np.stack([speed * np.cos(towards), speed * np.sin(towards)])
         c = self.coefficients
-        self.m11, self.m22, self.m33 = MASS - c["Xudot"], MASS - c["Yvdot"], YAW_INERTIA - c["Nrdot"]
-        self.m23, self.m32 = MASS * X_G - c["Yrdot"], MASS * X_G - c["Nvdot"]
+        self.m11, self.m22 = hull.mass - c["Xudot"], hull.mass - c["Yvdot"]
+        self.m33 = hull.yaw_inertia - c["Nrdot"]
+        self.m23, self.m32 = hull.mass * hull.x_g - c["Yrdot"], hull.mass * hull.x_g - c["Nvdot"]
 
     def rates(self, t: float, states: list[Array], rpm_ratio: Array, rudder: Array) -> list[Array]:
         """Time derivatives of the ship's states and of the memories' states."""
+        hull = self.hull
         u, v, r, psi = states[0][:4]
         speed = np.sqrt(u * u + v * v)
-        v_prime, r_prime = v / speed, r * LENGTH_M / speed
-        hull, steering = polynomial(self.coefficients, (u - SPEED_MPS) / speed, v_prime, r_prime, rudder)
-        total = hull + steering
-        nominal = (SPEED_MPS / speed) ** 2
-        total[0] += XNN * (rpm_ratio * np.abs(rpm_ratio) - 1.0) * nominal
-        motion = Motion(t, u, v, r, psi, speed, v_prime, r_prime, rudder, rpm_ratio, steering)
+        v_prime, r_prime = v / speed, r * hull.length_m / speed
+        bare, steering = polynomial(self.coefficients, (u - hull.speed_mps) / speed, v_prime, r_prime, rudder)
+        total = bare + steering
+        nominal = (hull.speed_mps / speed) ** 2
+        total[0] += hull.xnn * (rpm_ratio * np.abs(rpm_ratio) - 1.0) * nominal
+        motion = Motion(hull, t, u, v, r, psi, speed, v_prime, r_prime, rudder, rpm_ratio, steering)
         for force, lanes, parameters in self.effects:
             for row, part in zip(total, force(motion.of(lanes), parameters), strict=True):
                 row[lanes] += part
@@ -90,16 +83,16 @@ class Batch:
             for row, part in zip(total[1:], parts, strict=True):
                 row[memory.lanes] += part
         if self.process is not None:
-            place = t / FORCE_STEP_S
+            place = t / (FORCE_STEP_S * hull.time)
             low = int(place)
             share = place - low
             total += ((1.0 - share) * self.process[low] + share * self.process[low + 1]) * nominal
-        scale = speed * speed / LENGTH_M
+        scale = speed * speed / hull.length_m
         determinant = self.m22 * self.m33 - self.m23 * self.m32
         new = np.empty_like(states[0])
         new[U] = scale * total[0] / self.m11
         new[V] = scale * (self.m33 * total[1] - self.m23 * total[2]) / determinant
-        new[R] = scale / LENGTH_M * (self.m22 * total[2] - self.m32 * total[1]) / determinant
+        new[R] = scale / hull.length_m * (self.m22 * total[2] - self.m32 * total[1]) / determinant
         new[PSI] = r
         cos, sin = np.cos(psi), np.sin(psi)
         new[X] = u * cos - v * sin + self.drift[0]
@@ -117,18 +110,20 @@ def integrate(lanes: Sequence[Lane]) -> dict[str, Array]:
     states = [ship, *(memory.start() for memory in batch.memories)]
     ticks = round(batch.duration_s / TICK_S) + 1
     history = {name: np.empty((ticks, batch.n)) for name in RECORDED}
-    steps = round(TICK_S / STEP_S)
+    step_s = min(TICK_S / 2.0, batch.hull.gear_time_s / 20.0)
+    steps = round(TICK_S / step_s)
+    step_s = TICK_S / steps
     for tick in range(ticks):
         ship = states[0]
         helm.give(tick, np.degrees(ship[PSI]), np.degrees(ship[R]))
         for name, values in zip(RECORDED, (*ship, helm.order_deg, helm.rpm), strict=True):
             history[name][tick] = values
-        order, rpm_ratio = np.radians(helm.order_deg), helm.rpm / NOMINAL_RPM
+        order, rpm_ratio = np.radians(helm.order_deg), helm.rpm / batch.hull.rpm
         for step in range(steps if tick < ticks - 1 else 0):
-            t = tick * TICK_S + step * STEP_S
-            rudder, rudder_next = batch.gear.advance(order, t, STEP_S)
+            t = tick * TICK_S + step * step_s
+            rudder, rudder_next = batch.gear.advance(order, t, step_s)
             first = batch.rates(t, states, rpm_ratio, rudder)
-            guess = [state + STEP_S * rate for state, rate in zip(states, first, strict=True)]
-            second = batch.rates(t + STEP_S, guess, rpm_ratio, rudder_next)
-            states = [s + 0.5 * STEP_S * (a + b) for s, a, b in zip(states, first, second, strict=True)]
+            guess = [state + step_s * rate for state, rate in zip(states, first, strict=True)]
+            second = batch.rates(t + step_s, guess, rpm_ratio, rudder_next)
+            states = [s + 0.5 * step_s * (a + b) for s, a, b in zip(states, first, second, strict=True)]
     return history

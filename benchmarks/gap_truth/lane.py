@@ -9,8 +9,8 @@ import numpy as np
 
 from gap_truth.changed import CHANGES
 from gap_truth.draws import DRAWS, OUTSIDERS, TRIALS_STRUCK
-from gap_truth.manoeuvres import FIT, MANOEUVRES, Manoeuvre
-from gap_truth.ship import perturbed
+from gap_truth.manoeuvres import FIT, MANOEUVRES, Manoeuvre, at_size_of
+from gap_truth.ship import HULLS, Hull, perturbed
 
 SURROUNDINGS = ("wind", "current")
 PROCESSES = ("none", "gusts", "waves")
@@ -28,12 +28,18 @@ class Setting:
     coefficients: str = "exact"  # exact | independent | correlated
     manoeuvres: tuple[str, ...] | None = None  # None: all
     by_trial: bool = False  # wind and current are drawn for each trial
+    ship: str = "mariner"
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.effects if name not in DRAWS]
         unknown += [name for name in self.manoeuvres or () if name not in MANOEUVRES]
-        if unknown or self.process not in PROCESSES:
+        if unknown or self.process not in PROCESSES or self.ship not in HULLS:
             raise ValueError(f"unknown in this setting: {unknown or self.process}")
+
+    @property
+    def hull(self) -> Hull:
+        """The ship."""
+        return HULLS[self.ship]
 
     @property
     def trials(self) -> tuple[str, ...]:
@@ -42,7 +48,7 @@ class Setting:
 
     def generator(self, purpose: str) -> np.random.Generator:
         """Random numbers of one purpose in this set, the same in whatever batch, at whatever strength and noise."""
-        words = ("+".join(self.effects) or "none", purpose)
+        words = ("+".join(self.effects) or "none", purpose, *([] if self.ship == "mariner" else [self.ship]))
         return np.random.default_rng(np.random.SeedSequence([self.seed, *(zlib.crc32(w.encode()) for w in words)]))
 
 
@@ -70,7 +76,7 @@ def parameters_of(setting: Setting) -> dict[str, dict[str, float]]:
             truth[name] = {f"{key} in {trial}": value for trial, found in each.items() for key, value in found.items()}
             continue
         generator = setting.generator(f"parameters of {name}")
-        truth[name] = {key: float(value) for key, value in DRAWS[name](generator, setting.strength).items()}
+        truth[name] = _at_size(setting, DRAWS[name](generator, setting.strength))
         if name in TRIALS_STRUCK:
             possible = [trial for trial in setting.trials if trial in FIT] or list(setting.trials)
             if name in ("out_rudder_stuck", "out_clock_freeze"):  # shows only where the rudder moves
@@ -82,16 +88,20 @@ def parameters_of(setting: Setting) -> dict[str, dict[str, float]]:
 
 def _drawn(setting: Setting, name: str, where: str) -> dict[str, float]:
     generator = setting.generator(f"parameters of {name}{where}")
-    return {key: float(value) for key, value in DRAWS[name](generator, setting.strength).items()}
+    return _at_size(setting, DRAWS[name](generator, setting.strength))
+
+
+def _at_size(setting: Setting, drawn: dict[str, float]) -> dict[str, float]:
+    return {key: float(setting.hull.scaled(key, value)) for key, value in drawn.items()}
 
 
 def lanes_of(setting: Setting) -> list[Lane]:
     """All trials of a set."""
     truth = parameters_of(setting)
-    coefficients = perturbed(setting.coefficients, setting.generator("coefficients"))
+    coefficients = perturbed(setting.hull, setting.coefficients, setting.generator("coefficients"))
     for name in setting.effects:
         if name in CHANGES:
-            coefficients = CHANGES[name](coefficients, truth[name])
+            coefficients = CHANGES[name](setting.hull, coefficients, truth[name])
     lanes = []
     for trial in setting.trials:
         here = {
@@ -99,5 +109,5 @@ def lanes_of(setting: Setting) -> list[Lane]:
             for name, values in truth.items()
             if name not in OUTSIDERS or name not in TRIALS_STRUCK or f"in_{trial}" in values
         }
-        lanes.append(Lane(setting, trial, MANOEUVRES[trial], coefficients, here))
+        lanes.append(Lane(setting, trial, at_size_of(setting.hull, MANOEUVRES[trial]), coefficients, here))
     return lanes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,9 +14,9 @@ from gap_truth.integrate import integrate
 from gap_truth.lane import Lane, Setting, lanes_of, parameters_of
 from gap_truth.manoeuvres import FIT, HOLDOUT
 from gap_truth.record import COLUMNS, recorded
-from gap_truth.ship import Array, ship_toml
+from gap_truth.ship import MARINER, Array, ship_toml
 
-SHIP_TOML = ship_toml()
+SHIP_TOML = ship_toml(MARINER)
 SETS_AT_ONCE = 64
 """Histories of so many sets of thirteen trials take 300 MB; the result does not depend on it."""
 
@@ -45,12 +45,19 @@ def make(settings: Sequence[Setting]) -> list[Made]:
     made: list[Made] = []
     for start in range(0, len(settings), SETS_AT_ONCE):
         chosen = settings[start : start + SETS_AT_ONCE]
-        lanes: list[Lane] = [lane for setting in chosen for lane in lanes_of(setting)]
-        history = integrate(lanes)
-        trials = iter(recorded(lane, history, column) for column, lane in enumerate(lanes))
+        trials: dict[str, Iterator[dict[str, Array]]] = {}
+        for ship in dict.fromkeys(setting.ship for setting in chosen):
+            lanes: list[Lane] = [lane for setting in chosen if setting.ship == ship for lane in lanes_of(setting)]
+            trials[ship] = _recorded(lanes)
         for setting in chosen:
-            made.append(Made(setting, parameters_of(setting), {name: next(trials) for name in setting.trials}))
+            found = trials[setting.ship]
+            made.append(Made(setting, parameters_of(setting), {name: next(found) for name in setting.trials}))
     return made
+
+
+def _recorded(lanes: list[Lane]) -> Iterator[dict[str, Array]]:
+    history = integrate(lanes)
+    return (recorded(lane, history, column) for column, lane in enumerate(lanes))
 
 
 def sampled(made: Made, hertz: int) -> Made:
@@ -68,7 +75,7 @@ def wrong_card(made: Made, share: float) -> str:
     """The card with each hydrodynamic derivative off by a normal error of `share` of its value, and stating so."""
     generator = made.setting.generator(f"card wrong by {share}")
     lines, errors, inside = [], [], False
-    for line in SHIP_TOML.splitlines():
+    for line in ship_toml(made.setting.hull).splitlines():
         inside = line == "[derivatives]" if line.startswith("[") else inside
         name, equals, value = line.partition(" = ")
         if inside and equals and not name.endswith("dot") and float(value.split("#")[0]):
@@ -90,6 +97,7 @@ def truth(made: Made) -> dict[str, object]:
         "fit": [name for name in FIT if name in made.trials],
         "holdout": [name for name in HOLDOUT if name in made.trials],
         "setting": {
+            "ship": made.setting.ship,
             "seed": made.setting.seed,
             "strength": made.setting.strength,
             "noise": made.setting.noise,
@@ -102,7 +110,7 @@ def truth(made: Made) -> dict[str, object]:
 def write(made: Made, folder: Path) -> None:
     """Trials as CSV rounded like the worked cases, `ship.toml` and `truth.json` into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "ship.toml").write_text(SHIP_TOML, encoding="utf-8")
+    (folder / "ship.toml").write_text(ship_toml(made.setting.hull), encoding="utf-8")
     (folder / "truth.json").write_text(json.dumps(truth(made), indent=1) + "\n", encoding="utf-8")
     formats = [f"%.{_DECIMALS[name]}f" for name in COLUMNS]
     for name, trial in made.trials.items():

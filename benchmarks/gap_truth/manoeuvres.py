@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gap_truth.ship import NOMINAL_RPM, SPEED_MPS, Array
+from gap_truth.ship import MARINER, Array, Hull
 
 EXECUTE_S = 20.0
-"""All rudder orders begin here, after a straight stretch at rudder amidships."""
+"""All rudder orders begin here (the Mariner's), after a straight stretch at rudder amidships."""
 
 HELM_HEADING = 0.8
 HELM_RATE_S = 10.0
-"""Course keeping: order = -0.8 (psi - psi_0) - 10 s r; a choice of ours, well damped for the Mariner."""
+"""Course keeping: order = -0.8 (psi - psi_0) - 10 s r; a choice of ours, well damped for the Mariner; the rate's
+time goes with L/U."""
 
 
 @dataclass(frozen=True)
@@ -27,18 +28,19 @@ class Manoeuvre:
     revolutions: tuple[tuple[float, float], ...] = ()
     zigzag_deg: float = 0.0  # rudder and heading angle, negative: first to port; 0: no zigzag
     keeps_course: bool = False
-    start_speed_mps: float = SPEED_MPS
-    start_rpm: float = NOMINAL_RPM
+    start_speed_mps: float = MARINER.speed_mps
+    start_rpm: float = MARINER.rpm
+    time: float = 1.0  # of the ship, over the Mariner's
 
 
-_LOW_RPM = 0.6 * NOMINAL_RPM
-_DIP_RPM = 0.8 * NOMINAL_RPM
+_LOW_RPM = 0.6 * MARINER.rpm
+_DIP_RPM = 0.8 * MARINER.rpm
 _STEPS = (
     *((20.0, 12.4), (51.3, -6.1), (74.2, -15.8), (103.0, 3.7), (126.6, 18.9), (158.1, 9.2), (180.4, -11.3)),
     *((205.9, -22.6), (238.7, 5.0), (262.2, 16.1), (288.8, -2.9), (311.5, -17.4), (339.0, 21.7), (367.3, -8.4)),
     *((392.6, 13.5), (420.1, -19.8), (452.4, 7.6)),
 )
-_DIPS = ((51.3, _DIP_RPM), (74.2, NOMINAL_RPM), (205.9, _DIP_RPM), (238.7, NOMINAL_RPM), (339.0, _DIP_RPM))
+_DIPS = ((51.3, _DIP_RPM), (74.2, MARINER.rpm), (205.9, _DIP_RPM), (238.7, MARINER.rpm), (339.0, _DIP_RPM))
 
 
 def _turn(heading_deg: float, duration_s: float, angle_deg: float) -> Manoeuvre:
@@ -59,9 +61,9 @@ MANOEUVRES: dict[str, Manoeuvre] = {
     "accel": Manoeuvre(
         270.0,
         420.0,
-        revolutions=((30.0, NOMINAL_RPM),),
+        revolutions=((30.0, MARINER.rpm),),
         keeps_course=True,
-        start_speed_mps=0.6 * SPEED_MPS,
+        start_speed_mps=0.6 * MARINER.speed_mps,
         start_rpm=_LOW_RPM,
     ),
     "turn35_port": _turn(150.0, 480.0, -35.0),
@@ -69,11 +71,27 @@ MANOEUVRES: dict[str, Manoeuvre] = {
     "zigzag15_15_port": Manoeuvre(240.0, 420.0, zigzag_deg=-15.0),
     "pullout_port": _pull_out(60.0, -20.0),
     "slowdown": Manoeuvre(180.0, 420.0, revolutions=((30.0, _LOW_RPM),), keeps_course=True),
-    "random_steps": Manoeuvre(330.0, 480.0, orders=_STEPS, revolutions=(*_DIPS, (367.3, NOMINAL_RPM))),
+    "random_steps": Manoeuvre(330.0, 480.0, orders=_STEPS, revolutions=(*_DIPS, (367.3, MARINER.rpm))),
 }
 
 FIT = ("zigzag20_20", "zigzag10_10", "turn35_stbd", "turn20_port", "pullout_stbd", "straight", "accel")
 HOLDOUT = ("turn35_port", "turn10_stbd", "zigzag15_15_port", "pullout_port", "slowdown", "random_steps")
+
+
+def at_size_of(hull: Hull, manoeuvre: Manoeuvre) -> Manoeuvre:
+    """The same manoeuvre of another ship: times with L/U, revolutions and speeds with its own."""
+    if hull is MARINER:
+        return manoeuvre
+    rpm = hull.rpm / MARINER.rpm
+    return replace(
+        manoeuvre,
+        duration_s=round(manoeuvre.duration_s * hull.time, 1),
+        orders=tuple((time * hull.time, angle) for time, angle in manoeuvre.orders),
+        revolutions=tuple((time * hull.time, value * rpm) for time, value in manoeuvre.revolutions),
+        start_speed_mps=manoeuvre.start_speed_mps * hull.speed_mps / MARINER.speed_mps,
+        start_rpm=manoeuvre.start_rpm * rpm,
+        time=hull.time,
+    )
 
 
 class Helm:
@@ -86,6 +104,7 @@ class Helm:
         self._course: NDArray[np.intp] = np.array([i for i, lane in enumerate(lanes) if lane.keeps_course], int)
         self._zigzag: NDArray[np.intp] = np.array([i for i, lane in enumerate(lanes) if lane.zigzag_deg], int)
         self._angle_deg: Array = np.array([lanes[i].zigzag_deg for i in self._zigzag])
+        self._time = lanes[0].time
         self._events: dict[int, list[tuple[Array, int, float]]] = {}
         for i, lane in enumerate(lanes):
             for target, steps in ((self.order_deg, lane.orders), (self.rpm, lane.revolutions)):
@@ -98,10 +117,11 @@ class Helm:
             target[lane] = value
         course, zigzag = self._course, self._zigzag
         off = psi_deg - self._heading_deg
-        self.order_deg[course] = -HELM_HEADING * off[course] - HELM_RATE_S * r_degps[course]
-        if tick == round(10.0 * EXECUTE_S):
+        self.order_deg[course] = -HELM_HEADING * off[course] - HELM_RATE_S * self._time * r_degps[course]
+        execute = round(10.0 * EXECUTE_S * self._time)
+        if tick == execute:
             self.order_deg[zigzag] = self._angle_deg
-        elif tick > round(10.0 * EXECUTE_S):
+        elif tick > execute:
             order, limit = self.order_deg[zigzag], np.abs(self._angle_deg)
             passed = np.where(order > 0.0, off[zigzag] >= limit, off[zigzag] <= -limit)
             self.order_deg[zigzag] = np.where(passed, -order, order)

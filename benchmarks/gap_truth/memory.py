@@ -8,7 +8,7 @@ import numpy as np
 
 from gap_truth.lane import Lane
 from gap_truth.motion import Index, Motion, Parameters
-from gap_truth.ship import GRAVITY_MPS2, SPEED_MPS, Array
+from gap_truth.ship import GRAVITY_MPS2, Array
 
 
 def _gathered(lanes: Sequence[Lane], effect: str) -> tuple[Index, Parameters]:
@@ -38,7 +38,7 @@ class Roll:
         del coefficients
         p = self.parameters
         omega = 2.0 * np.pi / p["roll_period_s"]
-        heel = -p["heel_ratio"] * m.u * m.r / GRAVITY_MPS2 + 0.035 * m.rudder * (m.speed / SPEED_MPS) ** 2
+        heel = -p["heel_ratio"] * m.u * m.r / GRAVITY_MPS2 + 0.035 * m.rudder * (m.speed / m.hull.speed_mps) ** 2
         phi, rate = state
         restoring = omega * omega * (heel - phi * (1.0 + 0.5 * phi * phi))
         return (p["Yphi"] * phi, p["Nphi"] * phi), np.stack([rate, restoring - 2.0 * p["damping"] * omega * rate])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gap_truth.ship import LENGTH_M, SPEED_MPS, Array
+from gap_truth.ship import Array, Hull
 
 Index = NDArray[np.intp]
 
@@ -20,6 +20,7 @@ class Motion:
     `rpm_ratio` is n/n_0; `steering` (3, n) the rudder's X', Y', N' of the polynomial; `t_s` one number.
     """
 
+    hull: Hull
     t_s: float
     u: Array
     v: Array
@@ -36,22 +37,22 @@ class Motion:
         """The same of some lanes only."""
         rows = (self.u, self.v, self.r, self.psi, self.speed, self.v_prime, self.r_prime, self.rudder, self.rpm_ratio)
         picked = [row[lanes] for row in rows]
-        return Motion(self.t_s, *picked, steering=np.ascontiguousarray(self.steering[:, lanes]))  # type: ignore[misc]
+        return Motion(self.hull, self.t_s, *picked, steering=np.ascontiguousarray(self.steering[:, lanes]))  # type: ignore[misc]
 
     @property
     def u_loss(self) -> Array:
         """1 - u/u0, the share of speed lost."""
-        return 1.0 - self.u / SPEED_MPS
+        return 1.0 - self.u / self.hull.speed_mps
 
     @property
     def nominal(self) -> Array:
         """(u0/U)^2, which turns a force scaled with u0 into the prime system."""
-        return (SPEED_MPS / self.speed) ** 2
+        return (self.hull.speed_mps / self.speed) ** 2
 
     @property
     def length_time(self) -> Array:
         """L/U, the time scale of the prime system in seconds."""
-        return LENGTH_M / self.speed
+        return self.hull.length_m / self.speed
 
 
 Parameters = dict[str, Array]

@@ -213,6 +213,18 @@ def test_a_rate_of_the_gear_that_the_card_may_be_wrong_by_is_not_named() -> None
         assert is_significant(found) == named, rate
 
 
+def test_a_gear_that_is_better_than_the_card_states_is_no_fault_of_it() -> None:
+    """5 deg/s and 0.5 s are stated: 8 deg/s, or 0.2 s, are no limit and no lag."""
+    stated = made_up_ship.CARD.replace("[steering_gear]", "[steering_gear]\nmax_rate_degps = 5.0")
+    for name, value, named in (
+        *(("rudder_rate_limit", np.radians(8.0), False), ("rudder_rate_limit", np.radians(3.0), True)),
+        *(("rudder_lag", 0.2, False), ("rudder_lag", 1.0, True)),
+    ):
+        hypothesis = Hypothesis(parse_card(stated, "made_up.toml"), "order", [name])
+        found = ExplanationFit(hypothesis, np.array([value]), np.array([[1e-12]]), LOGS, 0.0, np.zeros(0))
+        assert is_significant(found) == named, (name, value)
+
+
 def test_an_effect_without_amplitude_is_out_by_its_score_alone() -> None:
     card = parse_card(made_up_ship.CARD, "made_up.toml")
     hypothesis = Hypothesis(card, "order", ["rudder_lag"])

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gap_truth import EFFECTS, FIT, HOLDOUT, OUTSIDERS, SENSORS, SHIP_TOML, Setting, make, write
+from gap_truth import EFFECTS, FIT, HOLDOUT, HULLS, OUTSIDERS, SENSORS, SHIP_TOML, Setting, make, write
 from gap_truth.disturbances import WANDER, WHITE, sensor_noise
 from gap_truth.integrate import integrate
 from gap_truth.lane import Lane, lanes_of, parameters_of
 from gap_truth.manoeuvres import MANOEUVRES, Manoeuvre
 from gap_truth.record import recorded
+from gap_truth.ship import Hull
 
 QUIET = Setting((), seed=1, noise=0.0)
 DISTURBED = tuple(
@@ -131,6 +132,29 @@ def test_symmetric_hull_turns_alike_to_both_sides(long: dict[str, list[Trial]]) 
         assert stbd[name] == pytest.approx(-port[name], abs=1e-9)
     assert stbd["x_m"] == pytest.approx(port["x_m"], abs=1e-9)
     assert stbd["psi_deg"][-1] > 90.0
+
+
+def test_a_model_turns_like_its_ship() -> None:
+    """Froude's law: lengths with the scale, times with L/U, speeds as shares of the approach."""
+    full, small = HULLS["tanker"], HULLS["model"]
+    rate = 1.5
+    (again,), (turned,) = run_each(rate_limited(full, rate / full.time), rate_limited(small, rate / small.time))
+    late = again["t_s"] <= 0.95 * again["t_s"][-1]
+    at = again["t_s"][late] * small.time / full.time
+    for name, scale in (("x_m", 7.0 / 320.0), ("y_m", 7.0 / 320.0), ("u_mps", 1.179 / 7.97), ("psi_deg", 1.0)):
+        found = np.interp(at, turned["t_s"], turned[name])
+        assert found == pytest.approx(scale * again[name][late], abs=0.01 * scale * np.ptp(again[name]))
+
+
+def run_each(*groups: list[Lane]) -> list[list[Trial]]:
+    """Recorded trials of lanes of several ships."""
+    return [run({"": group})[""] for group in groups]
+
+
+def rate_limited(hull: Hull, rate: float) -> list[Lane]:
+    """The turn of a ship whose gear is limited to this rate (deg/s)."""
+    (lane,) = lanes_of(dataclasses.replace(QUIET, ship=hull.name, manoeuvres=("turn35_stbd",)))
+    return [dataclasses.replace(lane, effects={"rudder_rate_limit": {"max_rate_degps": rate}})]
 
 
 def test_noise_has_the_stated_size() -> None:

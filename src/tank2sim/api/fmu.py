@@ -12,8 +12,8 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
-from tank2sim.fmu.documents import documents_of
-from tank2sim.fmu.export import ExportedFmu, make_fmu
+from tank2sim.fmu.documents import documents_of, documents_without_card
+from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
 from tank2sim.fmu.platforms import named_platforms
 from tank2sim.fmu.unpacking import embedded_card
 
@@ -137,6 +137,7 @@ def make_fmu_file(
     fmi: int = 3,
     platforms: str = "host",
     ssp: Path | None = None,
+    sources: bool = True,
     report: Callable[[str], None] = lambda _: None,
 ) -> ExportResult:
     """Make the FMU of a ship, without writing it: its bytes are in ``files``. Raises as :meth:`.Ship.to_fmu`.
@@ -145,7 +146,7 @@ def make_fmu_file(
     ----------
     ship : Ship
     path : Path
-    fmi, platforms
+    fmi, platforms, sources
         As in :meth:`.Ship.to_fmu`.
     ssp : Path, optional
         Also an SSP package in which a heading autopilot steers the ship.
@@ -154,7 +155,11 @@ def make_fmu_file(
     """
     chosen = named_platforms(platforms)
     model = with_external_forces(ship.model)
-    made = make_fmu(model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
+    if sources:
+        made = make_fmu(model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
+    else:
+        bare, documents = without_coefficients(model), documents_without_card(ship.card)
+        made = make_fmu(bare, fmi=fmi, documents=documents, platforms=chosen, report=report, sources=False)
     files: dict[Path, str | bytes] = {path: made.content}
     if ssp:
         from tank2sim.fmu.ssp import ship_with_autopilot

@@ -596,7 +596,7 @@ class Ship:
             write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
         return result
 
-    def to_fmu(self, path: str | Path, *, fmi: int = 3, platforms: str = "host") -> ExportResult:
+    def to_fmu(self, path: str | Path, *, fmi: int = 3, platforms: str = "host", sources: bool = True) -> ExportResult:
         """Write the FMU (Model Exchange and Co-Simulation).
 
         Parameters
@@ -606,6 +606,8 @@ class Ship:
             2 or 3.
         platforms : str
             ``host``, ``all``, or names of FMI 3 with commas between (``x86_64-linux,x86_64-windows``).
+        sources : bool
+            False: without C sources, ship card and coefficients, which are then constants of the library.
 
         Raises
         ------
@@ -614,7 +616,7 @@ class Ship:
         """
         from tank2sim.api.fmu import make_fmu_file
 
-        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms)
+        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources)
         write_together(made.files, inputs=[Path(self.card.source)])
         return made
 

@@ -28,6 +28,12 @@ from tank2sim.fmu.platforms import PLATFORMS
 )
 @set_option
 @click.option(
+    "--sources/--no-sources",
+    default=True,
+    show_default=True,
+    help="With the C sources and the ship card, or without them and with coefficients that cannot be read or tuned.",
+)
+@click.option(
     "--ssp",
     type=click.Path(path_type=Path),
     metavar="SYSTEM.ssp",
@@ -40,12 +46,13 @@ def command(
     fmi: str,
     platforms: str,
     values: dict[str, object],
+    sources: bool,
     ssp: Path | None,
     json_file: Path | None,
 ) -> None:
     """Write the FMU (Model Exchange and Co-Simulation) of CARD (a file, or the name of a bundled ship)."""
     ship = load(card, values)
     with showing_stages("making the FMU") as report:
-        result = make_fmu_file(ship, output, fmi=int(fmi), platforms=platforms, ssp=ssp, report=report)
+        result = make_fmu_file(ship, output, fmi=int(fmi), platforms=platforms, ssp=ssp, sources=sources, report=report)
     write_result(result, [ship.card.source], json_file=json_file, files=result.files)
     show_result(result)

@@ -295,6 +295,13 @@ class Model:
         kept = tuple(parameter for parameter in self.parameters if parameter.name != name or ca.depends_on(value, old))
         return replace(self, quantities=quantities, states=states, parameters=kept)
 
+    def with_constants(self, names: Iterable[str]) -> Model:
+        """A model without the parameters of these names: their start values are numbers in its equations."""
+        model, given = self, set(names)
+        for parameter in [parameter for parameter in self.parameters if parameter.name in given]:
+            model = model.substitute(parameter.name, ca.SX(parameter.start))
+        return model
+
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""
 

@@ -17,6 +17,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.comparison import description_differences
+from tank2sim.fmu.export import without_coefficients
 from tank2sim.fmu.interface import MAX_STEP, interface
 from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.process import Drive, drive_apart
@@ -93,6 +94,7 @@ def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport
             differences, about["reference_error"] = _repeat_reference(unpacked)
             passed = not validation and not differences
             return CheckReport(**about, compared=False, differences=tuple(differences), passed=passed)
+        model = _without_hidden(unpacked, model)
         run = manoeuvre(model)
         differences, errors = _compare(unpacked, model, run)
         if "CoSimulation" in errors:  # else the library cannot run, which has been said
@@ -169,6 +171,14 @@ def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
     if errors[worst] <= LIMITS["CoSimulation"]:
         return [], errors[worst]
     return [f"{worst} differs by {errors[worst]:.1e} of its range from the reference result in the FMU"], errors[worst]
+
+
+def _without_hidden(unpacked: UnpackedFmu, model: Model) -> Model:
+    """The model with coefficients as constants if the FMU has no parameter but those of such a model."""
+    bare = without_coefficients(model)
+    found = {name.name for name in unpacked.description.modelVariables if name.causality == "parameter"}
+    hidden = set(model.parameter_names) - set(bare.parameter_names)
+    return model if found & hidden else bare
 
 
 def _name_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:

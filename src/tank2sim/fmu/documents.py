@@ -34,6 +34,12 @@ class Documents:
     origins: Mapping[str, ValueOrigin] = field(default_factory=dict)
 
 
+def documents_without_card(card: Card) -> Documents:
+    """Validity alone: neither the card, nor where its numbers come from."""
+    documents = documents_of(card)
+    return Documents(validity=documents.validity, speed_range_mps=documents.speed_range_mps)
+
+
 def documents_of(card: Card) -> Documents:
     """Source, validity, the origin of every coefficient and the card itself, to lie in the FMU."""
     speeds = card.model.speed_range_mps if isinstance(card, ManoeuvringCard) else card.model.valid_speed_mps

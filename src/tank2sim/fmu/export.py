@@ -81,6 +81,7 @@ def make_fmu(
     documents: Documents | None = None,
     platforms: Sequence[Platform] | None = None,
     report: ProgressReport = lambda _: None,
+    sources: bool = True,
 ) -> ExportedFmu:
     """One FMU with Model Exchange and Co-Simulation for this machine's platform, or for others.
 
@@ -95,6 +96,9 @@ def make_fmu(
         None: this machine's, compiled by its own compiler; others need the extra ``platforms``.
     report : callable, optional
         Hears which libraries are being compiled.
+    sources : bool
+        Whether the C sources are in it. Without them it holds libraries alone; :func:`without_coefficients` makes a
+        model whose libraries show no coefficient either.
 
     Raises
     ------
@@ -108,11 +112,13 @@ def make_fmu(
     documents = documents or Documents()
     described = interface(model)
     identifier = c_identifier(model.name)
-    files, token = _with_token(_texts(model, described, fmi, documents))
-    sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
+    files, token = _with_token(_texts(model, described, fmi, documents, sources))
+    written = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
+    if not sources:
+        files = {name: text for name, text in files.items() if not name.startswith("sources/")}
     with ThreadPoolExecutor(1) as pool:  # the reference is calculated while the compiler works
         promised = pool.submit(_gathered, model)
-        made = libraries(sources, platforms, fmi, report)
+        made = libraries(written, platforms, fmi, report)
         evidence = promised.result()
     contents = _encoded(files | evidence.reference_files()) | _icons(fmi)
     contents |= {f"binaries/{folder}/{identifier}{suffix}": library for (folder, suffix), library in made.items()}
@@ -124,6 +130,12 @@ def make_fmu(
         token=token,
         platforms=tuple(folder for folder, _ in made),
     )
+
+
+def without_coefficients(model: Model) -> Model:
+    """The model with all parameters as numbers in its equations, except for those of the start and of the place."""
+    kept = ("initial.", "origin.")
+    return model.with_constants(name for name in model.parameter_names if not name.startswith(kept))
 
 
 def description_text(model: Model, *, fmi: int) -> str:
@@ -138,12 +150,12 @@ def _gathered(model: Model) -> AcceptanceResult:
     return gather(model)
 
 
-def _texts(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, str]:
-    """All files of the FMU but the library, by name, with a token of zeros."""
-    sources = c_sources(model, described, fmi, _NO_TOKEN)
+def _texts(model: Model, described: Interface, fmi: int, documents: Documents, sources: bool) -> dict[str, str]:
+    """All files of the FMU but the library, by name, with a token of zeros; `sources` says whether it names those."""
+    written = c_sources(model, described, fmi, _NO_TOKEN)
     values = _values(model, described, fmi, documents)
-    values["sources"] = sorted(name for name in sources if name.endswith(".c"))
-    files = {f"sources/{name}": text for name, text in sources.items()}
+    values["sources"] = sorted(name for name in written if name.endswith(".c")) if sources else []
+    files = {f"sources/{name}": text for name, text in written.items()}
     files[_DESCRIPTION] = render(f"modelDescription-fmi{fmi}.xml", values)
     files["documentation/index.html"] = render("index.html", values)
     files["documentation/licenses/license.txt"] = bundled("LICENSE").read_text(encoding="utf-8")

@@ -51,6 +51,7 @@ from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import lowered_bound_notice, polynomial_over_trials
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
 
@@ -69,6 +70,14 @@ EXPLAINED = 0.2
 
 TRIES = 4
 """Explanations that are simulated at most, one after the other (project choice)."""
+
+NEAR_NOISE = 1.2
+"""Misfit in noise units of the fitted trials up to which a name is not compared with coefficients alone (project
+choice): many coefficients follow a few trials a little better than they should."""
+
+DECISIVE = 40.0
+"""Difference of the scores of "none" and of a name (-2 log probability) from which simulations with coefficients alone
+are not asked for (project choice: odds of 1 to e^20)."""
 
 CLEARLY = 0.7
 """Largest share of the misfit that may remain where a second explanation, or one next to something unknown, is named
@@ -144,6 +153,7 @@ def run_gap_workflow(
         A trial is too short or measures too little, or a requested effect cannot be tried on this card.
     """
     options = options or GapOptions()
+    given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
         gap, trials = _search_once(card, (fitted, held), options, progress, pool)
@@ -158,7 +168,7 @@ def run_gap_workflow(
             if not _adds(gap, further, 1 - options.false_discovery):
                 break
             gap, trials = combine_passes(gap, further), found_trials
-        return gap
+        return replace(gap, notices=(*lowered_bound_notice(given, card), *gap.notices))
 
 
 def _search_once(
@@ -299,9 +309,12 @@ def _judge_by_simulation(
     An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
     the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts
     next to something that no effect explains, must close the gap clearly (:data:`CLEARLY`); nothing is named without.
+    A name whose score is not far ahead of none (:data:`DECISIVE`) must also follow the fitted trials as closely as the
+    card's coefficients alone, fitted to them.
     `share` is the option ``false_discovery``.
     """
     withheld: list[str] = []
+    alone: _Proof | None = None
     remaining, current = found, decision
     for _ in range(TRIES):
         if not current.best.hypothesis.effects:
@@ -311,17 +324,24 @@ def _judge_by_simulation(
         by_trial = surroundings_by_trial(by_formula, remaining.likelihood.motion.names)
         proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, remaining, current.best)
         unknown = current.verdict == OUTSIDE_LIBRARY
-        if _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results):
+        closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
+        if closes and found.none.score - current.best.score < DECISIVE:
+            alone = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+            with_effects, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, alone))
+            closes = with_effects < max((1 + BETTER) * without, NEAR_NOISE)
+        if closes:
             verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
-            return _Judged(replace(current, verdict=verdict), estimated, proof, tuple(withheld))
+            boxed = replace(proof, results=_with_black_box(card, proof, estimated, sigmas))
+            return _Judged(replace(current, verdict=verdict), estimated, boxed, tuple(withheld))
         if not unknown:
             withheld.append(" and ".join(current.best.hypothesis.effects))
         kept = tuple(fit for fit in remaining.fits if fit is not current.best)
         remaining = replace(remaining, fits=kept)
         current = decide(remaining, share)
-    proof = _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+    proof = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
     if decision.best.hypothesis.effects:
-        decision = replace(decision, verdict=OUTSIDE_LIBRARY)
+        follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
+        decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
     return _Judged(decision, [], proof, tuple(withheld))
 
 
@@ -363,7 +383,7 @@ def _prove(
     best: ExplanationFit,
 ) -> _Proof:
     """The card with the effects, and with coefficients fitted together with them if fitted trials are then followed
-    better by :data:`BETTER`; replays by both cards, and by a black box where an effect is named.
+    better by :data:`BETTER`; replays by both cards.
 
     Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
     """
@@ -384,14 +404,19 @@ def _prove(
             keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
             of_effect = {key: _misfit_of(results, "after", held_out=held) for key, held in keys.items()}
             proof = _Proof(trials, by_trial, base, joint, joint_results, refitted, of_effect if estimated else {})
-    if not estimated:
-        return proof
-    box = black_box(card, trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
+    return proof
+
+
+def _with_black_box(
+    card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], sigmas: Mapping[str, float]
+) -> list[Passed]:
+    """The replays of a proof, and by a black box with as many coefficients as the named effects have parameters."""
+    box = black_box(card, proof.trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
     boxed: list[Passed] = []
-    for group, held_out in zip(trials, (False, True), strict=True):
+    for group, held_out in zip(proof.trials, (False, True), strict=True):
         of_group = [result for result in proof.results if result.held_out == held_out]
         boxed += with_black_box(of_group, box.card, group, sigmas) if of_group else []
-    return replace(proof, results=boxed)
+    return boxed
 
 
 def _in_surroundings(
@@ -516,7 +541,7 @@ def _notices(
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(strange) for strange in decision.strange]
     notices += [
-        f"{names}: fits best from instant to instant, but a simulation with it is not closer: not named"
+        f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
         for names in withheld
     ]
     if own_surroundings:

@@ -55,6 +55,8 @@ class EffectParameter:
     spread : float or callable, optional
         Standard deviation, SI, of what is known beforehand of a parameter with a default, if a search shall estimate
         it with the others; None: it stays at its default.
+    worse : int
+        1 if the fault is a larger value than the ship's own, -1 if a smaller one (the rate of a gear), 0 if either.
     """
 
     name: str
@@ -66,6 +68,7 @@ class EffectParameter:
     absent: float | None = field(default=None, kw_only=True)
     typical: Values | Callable[[ManoeuvringCard], Values] = field(default=(), kw_only=True)
     spread: float | Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
+    worse: int = field(default=0, kw_only=True)
 
     @property
     def stem(self) -> str:

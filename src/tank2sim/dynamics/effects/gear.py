@@ -39,6 +39,7 @@ RUDDER_RATE_LIMIT = Effect(
             2.0,
             # 1 to 5 deg/s where L/u0 is 20 s; SOLAS II-1/29 asks for 2.3 deg/s.
             typical=rates(*(math.radians(angle) for angle in (40.0, 20.0, 60.0, 100.0))),
+            worse=-1,
         ),
     ),
     equations=_with_rate_limit,
@@ -66,6 +67,7 @@ RUDDER_LAG = Effect(
             0.01,
             100.0,
             typical=time_scale_passages(0.1, 0.05, 0.2),  # 1 to 4 s where L/u0 is 20 s (project choice)
+            worse=1,
         ),
     ),
     equations=_with_lag,

@@ -124,9 +124,10 @@ class _Fit:
         self.starts = [replayer.guess_initial_state(record, self.sigma, p) for record in records]
 
     def update_starts(self, names: Sequence[str], changes: Array) -> None:
-        """Find the initial states again."""
+        """Find the initial states and the instants of the orders again."""
         p = self._parameters(names, changes)
-        self.starts = [self.replayer.fit_initial_state(record, self.sigma, p) for record in self.records]
+        fits = [self.replayer.fit_record(record, self.sigma, p) for record in self.records]
+        self.records, self.starts = [record for record, _ in fits], [start for _, start in fits]
 
     def misfit(self, names: Sequence[str], changes: Array) -> Array:
         """(Simulated less measured)/noise of all measurements."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -57,6 +59,8 @@ class InputRecord:
         Each n-th instant is compared.
     readings : array (m, ny)
         Single readings at those instants; nan where there is none.
+    instants : array (n,), optional
+        Share of the interval before each row at which its order was given; without it, half.
     """
 
     name: str
@@ -65,6 +69,7 @@ class InputRecord:
     inputs: Array
     every: int
     readings: Array
+    instants: Array | None = None
 
     @property
     def times(self) -> Array:
@@ -79,12 +84,37 @@ _LEAST_RUDDER = math.radians(1.0)
 _ROUNDS = 5
 """Gauss-Newton steps, and updates of the weights of signals; both converge in two or three."""
 
-_SETTLED = 0.02
-"""A step below this share of the trust in the first reading ends the search."""
-
 _NEAR = 2.0
 """A model that follows a record to within this many times the noise is taken as right when its initial state is sought
 (project choice): the remaining misfit is too small to bias it much."""
+
+_UNSURE_FROM = 0.01
+"""Interval between two readings of the order, in L/u0, from which the instants of its steps are estimated (project
+choice: a shorter one moves a ship by less than its sensors show)."""
+
+_FINE = 0.003
+"""Integration step in L/u0, at most, where instants of orders are estimated: an order is given at one of them, for a
+gear at its largest rate takes no notice of the mean of two orders (project choice)."""
+
+_STEP_OF_ORDER = math.radians(1.0)
+"""Smallest step of an order whose instant is estimated (project choice: the smallest of a helmsman)."""
+
+_ALONE = 0.1
+"""Changes of the order right before and after a step, as a share of it, up to which it is a step and not part of a
+course keeper's changing order (project choice)."""
+
+_MOST_STEPS = 40
+"""Steps of the order in a trial at most of which the instants are estimated: more are those of a course keeper."""
+
+_EXPLAINED = 0.5
+"""Share of the misfit below which instants of orders explain it although the rest is not near the noise (project
+choice)."""
+
+_FOLLOWED = 50 * _NEAR
+"""Misfit in noise units up to which instants of orders are estimated (project choice): beyond, the model is wrong."""
+
+_SETTLED = 0.02
+"""A step below this share of the trust in the first reading ends the search."""
 
 
 class Replayer:
@@ -110,30 +140,116 @@ class Replayer:
         self._shown = shown_by(self.model, seen)
         ordered = driven_by == "order" and "rudder.command" in self.model.input_names
         self._order = self.model.input_names.index("rudder.command") if ordered else None
+        self._passage_s = card.ship.length_m / card.model.speed_mps
         self._nominal = np.array([state.nominal for state in self.model.states])
 
-    def states(self, start: Array, inputs: Array, step_s: float, p: Array) -> Array:
-        """States (n, nx) at the instants of `inputs` (n, nu), each row held for `step_s`; nan once out of bounds."""
-        parts = parts_of(self.model, step_s)
-        fine = np.repeat(inputs[:-1], parts, axis=0)
+    def states(self, record: InputRecord, start: Array, p: Array) -> Array:
+        """States (n, nx) at the instants of a record's inputs; nan once out of bounds."""
+        parts = self._parts(record)
+        fine = np.repeat(record.inputs[:-1], parts, axis=0)
         if self._order is not None:  # given, on average, half an interval before the first reading that shows it
-            early = np.repeat(inputs[:, self._order], parts)[parts // 2 :]
-            fine[:, self._order] = early[: len(fine)]
+            order = record.inputs[:, self._order]
+            if record.instants is None:
+                fine[:, self._order] = np.repeat(order, parts)[parts // 2 :][: len(fine)]
+            else:
+                fine[:, self._order] = _orders_in_steps(order, record.instants, parts)
         with np.errstate(all="ignore"):
-            states = self._steps.run(start, fine, p, np.array([step_s / parts]))[::parts]
+            states = self._steps.run(start, fine, p, np.array([record.step_s / parts]))[::parts]
             lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)
         if lost.any():
             states[int(np.argmax(lost)) :] = np.nan
         return states
 
-    def seen_along(self, start: Array, inputs: Array, step_s: float, p: Array, every: int) -> Array:
-        """Readings of the sensors (m, ny) at every n-th of the instants of :meth:`states`."""
-        states = self.states(start, inputs, step_s, p)[::every]
-        return self._shown(states, inputs[::every], p)[0]
-
     def motion(self, record: InputRecord, start: Array, p: Array) -> Array:
         """Readings of the sensors (m, ny) at the compared instants of a record."""
-        return self.seen_along(start, record.inputs, record.step_s, p, record.every)
+        states = self.states(record, start, p)[:: record.every]
+        return self._shown(states, record.inputs[:: record.every], p)[0]
+
+    def fit_record(self, record: InputRecord, sigma: Array, p: Array) -> tuple[InputRecord, Array]:
+        """The record with the instants at which its orders were given, and its initial state, that fit it best.
+
+        An order that was sampled once or twice a second was given at an unknown instant between two readings. Where the
+        model follows the record to within :data:`_FOLLOWED` noises, these instants are estimated together with the
+        initial state, each beforehand uniform over its interval (with the variance of that, 1/12). Without such steps,
+        and with a model that is further off, as :meth:`fit_initial_state`.
+        """
+        start, misfit = self._least_squares_start(record, sigma, p, wrong=False)
+        rows = self._unsure_steps(record)
+        if len(rows) and misfit < _FOLLOWED:
+            timed, begun, left = self._least_squares_instants(record, start, rows, sigma, p)
+            if left < max(min(_NEAR, misfit), _EXPLAINED * misfit):
+                return timed, begun
+        return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, wrong=True)[0]
+
+    def _coarse(self, record: InputRecord) -> bool:
+        """Whether it matters when an order between two readings was given."""
+        return record.step_s > _UNSURE_FROM * self._passage_s
+
+    def _parts(self, record: InputRecord) -> int:
+        """Integration steps in a step of a record's inputs."""
+        parts = parts_of(self.model, record.step_s)
+        if self._order is None or not self._coarse(record):
+            return parts
+        return max(parts, math.ceil(record.step_s / (_FINE * self._passage_s)))
+
+    def _unsure_steps(self, record: InputRecord) -> NDArray[np.intp]:
+        """Rows (m,) at which a step of the order is seen first that was given at an unknown instant before."""
+        none: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
+        if self._order is None or not self._coarse(record):
+            return none
+        change = np.abs(np.diff(record.inputs[:, self._order]))
+        others = np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1]))
+        rows = np.flatnonzero((change > _STEP_OF_ORDER) & (others < _ALONE * change)) + 1
+        return rows if len(rows) <= _MOST_STEPS else none
+
+    def _least_squares_instants(
+        self, record: InputRecord, start: Array, rows: NDArray[np.intp], sigma: Array, p: Array
+    ) -> tuple[InputRecord, Array, float]:
+        """The record with the instants of the steps at `rows`, the initial state, and their misfit.
+
+        By Gauss-Newton on the beginning of the record, then on twice as many steps, and so on: a small error at an
+        early step of an unstable ship is a large one later, where the motion is no longer nearly linear in it.
+        """
+        guess, spread = _first_state(self, record, sigma, p)
+        known, size = ~np.isnan(record.readings), len(start)
+        unknown = np.append(guess, np.full(len(rows), 0.5))
+        reach = np.append(1e-4 * self._nominal, np.full(len(rows), 2.0 / self._parts(record)))
+        steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
+        for count in [*steps, len(rows)]:
+            last = rows[count] if count < len(rows) else len(record.inputs)
+            compared = known & (np.arange(len(known)) * record.every < last)[:, None]
+            free = np.arange(size + count)
+
+            def misfit(values: Array, compared: NDArray[np.bool_] = compared) -> Array:
+                each = unknown.copy()
+                each[: len(values)] = values
+                begun, shares = each[:size], each[size:]
+                shown = self.motion(self._given_at(record, rows, shares), begun, p)
+                away = ((shown - record.readings) / sigma)[compared]
+                return np.concatenate([away, (begun - guess) / spread, (shares - 0.5) * math.sqrt(12.0)])
+
+            def slopes(values: Array, misfit: Callable[[Array], Array] = misfit, size: int = size) -> Array:
+                inward = np.where(values > 0.5, -1.0, 1.0)  # of an instant, away from the nearer bound
+                inward[:size] = 1.0
+                return difference_slopes(misfit, values, misfit(values), inward * reach[: len(values)])
+
+            low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
+            low[size:], high[size:] = 0.0, 1.0
+            if not np.isfinite(misfit(unknown[free])).all():
+                return record, start, np.inf
+            scale = np.append(spread, np.full(count, 0.3))
+            found = least_squares(
+                misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=3 * _ROUNDS
+            )
+            unknown[free] = found.x
+        left = float(np.sqrt(np.mean(found.fun[: int(known.sum())] ** 2)))
+        return self._given_at(record, rows, unknown[size:]), unknown[:size], left
+
+    @staticmethod
+    def _given_at(record: InputRecord, rows: NDArray[np.intp], shares: Array) -> InputRecord:
+        instants = np.full(len(record.inputs), 0.5)
+        instants[rows] = np.clip(shares, 0.0, 1.0)
+        return replace(record, instants=instants)
 
     def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
         """Initial state (nx,) that fits a record best, kept near the state of its first seconds.
@@ -204,6 +320,14 @@ class Replayer:
                 break
         whole = float(np.sqrt(np.mean((residual / sigma[column]) ** 2)))
         return start, whole if np.isfinite(whole) else np.inf
+
+
+def _orders_in_steps(order: Array, instants: Array, parts: int) -> Array:
+    """The order in each of `parts` steps of every interval, (n - 1) * parts: each value of `order` (n,) holds from the
+    step next to the share `instants` (n,) of the interval before its reading on."""
+    given = np.round((np.arange(1, len(order)) - 1 + instants[1:]) * parts).astype(np.intp)
+    edges = np.concatenate([[0], given, [len(order) * parts]])
+    return np.repeat(order, np.diff(edges))[: (len(order) - 1) * parts]
 
 
 def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.audit.noise import record_noise
+from tank2sim.records.trials import Trial
 
 _LEAST_NOISE = 1e-6
 """Noise of a record without any, SI: all its signals then weigh alike. Project choice."""
@@ -53,19 +55,45 @@ def replay_trials(
     InputError
         A trial is too short, or has none of the signals in `noise`.
     """
-    replayers = {True: _replayer(card, measured, noise)}
-    replayers[False] = replayers[True] if improved is card else _replayer(improved, measured, noise)
-    corrected_trials = {trial.name: trial for trial in corrected.trials} if corrected is not None else {}
+    given = _followed(card, measured, noise)
+    after = given if improved is card and corrected is None else _followed(improved, corrected or measured, noise)
     results = []
-    for trial in measured.trials:
-        record = input_record(replayers[True], trial)
-        before = _simulated(replayers[True], record, noise)
-        after = before
-        if improved is not card or trial.name in corrected_trials:
-            better = input_record(replayers[False], corrected_trials.get(trial.name, trial))
-            after = _simulated(replayers[False], better, noise) + np.nan_to_num(record.readings - better.readings)
-        results.append(_passed(record, replayers[True].seen, noise, held_out, (before, after)))
+    for old, new in zip(given, after, strict=True):
+        simulated = new.simulated + np.nan_to_num(old.record.readings - new.record.readings)
+        results.append(_passed(old.record, old.seen, noise, held_out, (old.simulated, simulated)))
     return tuple(results)
+
+
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """A trial as a card's model simulates it: readings (m, ny) of the variables `seen`."""
+
+    record: InputRecord
+    seen: tuple[str, ...]
+    simulated: Array
+
+
+_Key = tuple[str, str, tuple[tuple[str, float], ...]]
+_FOLLOWED: WeakKeyDictionary[Trial, dict[_Key, _Followed]] = WeakKeyDictionary()
+"""What was simulated of each trial that still exists: each explanation is compared with the same simulation before."""
+
+
+def _followed(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]) -> list[_Followed]:
+    """Each trial as the card's model simulates it, from the initial state that fits it best."""
+    key = card.text, measured.driven_by, tuple(noise.items())
+    known = [_FOLLOWED.setdefault(trial, {}) for trial in measured.trials]
+    if all(key in found for found in known):
+        return [found[key] for found in known]
+    model = driven_model(card, measured.driven_by)
+    seen = [name for name in OBSERVED_SIGNALS.values() if name in noise and name in model]
+    replayer = Replayer(card, measured.driven_by, seen)
+    p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in seen])
+    for trial, found in zip(measured.trials, known, strict=True):
+        if key not in found:
+            record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
+            simulated = replayer.motion(record, start, p)
+            found[key] = _Followed(record, replayer.seen, simulated)
+    return [found[key] for found in known]
 
 
 def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
@@ -91,27 +119,13 @@ def with_black_box(
     results: Sequence[Passed], box: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]
 ) -> tuple[Passed, ...]:
     """The same replays with the simulation of each trial by a black box's card; `noise` weighs its initial states."""
-    replayer = _replayer(box, measured, noise)
-    trials = {trial.name: trial for trial in measured.trials}
+    followed = {each.record.name: each for each in _followed(box, measured, noise)}
     boxed = []
     for result in results:
-        simulated = _simulated(replayer, input_record(replayer, trials[result.name]), noise)
-        columns = dict(zip(replayer.seen, simulated.T, strict=True))
+        simulated = followed[result.name]
+        columns = dict(zip(simulated.seen, simulated.simulated.T, strict=True))
         boxed.append(replace(result, black_box={name: columns[name] for name in result.noise}))
     return tuple(boxed)
-
-
-def _replayer(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]) -> Replayer:
-    model = driven_model(card, measured.driven_by)
-    return Replayer(
-        card, measured.driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise and name in model]
-    )
-
-
-def _simulated(replayer: Replayer, record: InputRecord, noise: Mapping[str, float]) -> Array:
-    p = replayer.model.parameter_values()
-    sigma = np.array([noise[name] for name in replayer.seen])
-    return replayer.motion(record, replayer.fit_initial_state(record, sigma, p), p)
 
 
 def _passed(

@@ -213,11 +213,16 @@ def _change(fit: ExplanationFit, name: str) -> float:
 
 
 def _change_of_gear(fit: ExplanationFit, name: str) -> float:
-    """Change of the card's steering-gear data, in their standard errors; infinite if the card states none."""
+    """Change of the card's steering-gear data for the worse, in their standard errors; infinite if the card states
+    none. A gear that is better than the card states is no fault of the gear."""
     ((_, values, _),) = [found for found in estimates(fit) if found[0] == name]
-    ((parameter, value),) = values.items()
-    stated = getattr(fit.hypothesis.card.steering_gear, parameter, None)
-    return float(np.inf) if stated is None else float(abs(value - stated) / (GEAR * stated))
+    ((key, value),) = values.items()
+    (parameter,) = (each for each in EFFECTS[name].parameters if each.name == key)
+    stated = getattr(fit.hypothesis.card.steering_gear, key, None)
+    if stated is None:
+        return float(np.inf)
+    change = float((value - stated) / (GEAR * stated))
+    return change * parameter.worse if parameter.worse else abs(change)
 
 
 _WINDOWS = (6, 12, 24, 48)

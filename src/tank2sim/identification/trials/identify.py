@@ -51,6 +51,8 @@ from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
     card_with_estimate,
+    lowered_bound_notice,
+    polynomial_over_trials,
     problem_from_card,
     with_captive,
     with_correlations,
@@ -258,6 +260,7 @@ def _identified(
         raise InputError(
             "--structure", "", problem_text, "leave it out, or fit what tank2sim convert makes of the card"
         )
+    given, card = card, polynomial_over_trials(card, trials.trials)
     structures: Mapping[str, CrossValidation] = {}
     weights: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
@@ -313,6 +316,7 @@ def _identified(
         notices=(
             *trials.notices,
             *(held.notices if held else ()),
+            *lowered_bound_notice(given, card),
             *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
             *_captive_notice(card, trials.captive),
             *chosen,

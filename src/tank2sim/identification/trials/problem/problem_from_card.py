@@ -45,6 +45,58 @@ ASSUMED_EFFECT_ERROR = 0.25
 """Standard error of an effect's parameter without one, as a share of its bounds' distance (project choice)."""
 
 
+SLOWEST_OF_TURNS = 0.2
+"""Speed over the speed of expansion below which a trial is not taken for a manoeuvre ahead but for a stop: a tanker at
+full rudder keeps 0.3 to 0.4 (project choice)."""
+
+
+def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> ManoeuvringCard:
+    """The card with its polynomial down to the slowest speed of the trials, if it states no range of speeds itself.
+
+    By default the forces at low speed take the place of the polynomial below half of the speed of expansion, and full
+    ships are slower in hard turns: their trials would be compared with another model than the card's. Trials that fall
+    below :data:`SLOWEST_OF_TURNS` of that speed are stops and do not count.
+    """
+    stated = card.model.valid_speed_mps is not None or card.model.low_speed_below_mps is not None
+    if stated or card.model.kind != "abkowitz":
+        return card
+    nominal = card.model.speed_mps
+    known = (slowest_speed(trial, card.ship.length_m / nominal) for trial in trials)
+    ahead = [speed for speed in known if speed >= SLOWEST_OF_TURNS * nominal]
+    bound = float(f"{0.95 * min(ahead, default=np.inf):.3g}")
+    if bound >= card.model.low_speed_bound_mps:
+        return card
+    return revised(card, {}, {"model.low_speed_below_mps": bound}, comment="slowest speed of the trials")
+
+
+def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[str, ...]:
+    """What :func:`polynomial_over_trials` changed of the given card, as a notice; empty if nothing."""
+    if card is given:
+        return ()
+    text = (
+        f"{given.source} states no range of speeds; its polynomial is used down to {card.model.low_speed_bound_mps:g}"
+    )
+    return (f"{text} m/s, near the slowest of the trials (model.low_speed_below_mps)",)
+
+
+def slowest_speed(trial: Trial, ship_time: float) -> float:
+    """Lowest speed (m/s) of a trial, noise apart: through the water if it is known, else over the ground; infinite if
+    neither was measured. `ship_time` (s) is L/U."""
+    signals = trial.signals
+    if "u_mps" in signals:
+        speed = np.hypot(signals["u_mps"], signals.get("v_mps", 0.0))
+    elif "x_m" in signals and "y_m" in signals:
+        far = np.searchsorted(trial.time_s, trial.time_s + 0.25 * ship_time)
+        begin = np.flatnonzero(far < len(trial.time_s))
+        end = far[begin]
+        travelled = np.hypot(*(signals[name][end] - signals[name][begin] for name in ("x_m", "y_m")))
+        speed = travelled / (trial.time_s[end] - trial.time_s[begin])
+    else:
+        return np.inf
+    speed = speed[np.isfinite(speed)]
+    return float(np.quantile(speed, 0.01)) if len(speed) else np.inf
+
+
 def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
     """The card's model, driven by the measured angle of the rudder or by its order."""
     model = with_ground_velocities(build(card))

@@ -1,0 +1,76 @@
+"""Orders that were sampled once a second were given in between: the replay finds when."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gap_truth import HULLS, Setting, make, sampled, write
+from gap_truth.disturbances import WHITE, noise_scale
+
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.gap.proof.open_loop import Replayer, input_record
+from tank2sim.gap.proof.replay import replay_trials
+from tank2sim.identification.trials.problem.prepare_trials import measured
+from tank2sim.identification.trials.problem.problem_from_card import polynomial_over_trials
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+
+ZIGZAGS = ("zigzag10_10", "zigzag15_15_port")
+
+
+def written(folder: Path, ship: str, hertz: int):
+    """Zigzags of a ship with nothing missing, as files; and the times at which the orders were given."""
+    (made,) = make([Setting((), 5, ship=ship, manoeuvres=ZIGZAGS)])
+    write(sampled(made, hertz), folder)
+    card = read_card(folder / "ship.toml")
+    assert isinstance(card, ManoeuvringCard)
+    trials = measured([folder / f"{name}.csv" for name in ZIGZAGS], card)
+    given = {
+        name: trial["t_s"][1:][np.abs(np.diff(trial["delta_order_deg"])) > 1.0] for name, trial in made.trials.items()
+    }
+    return polynomial_over_trials(card, trials.trials), trials, given
+
+
+def noise_of(ship: str) -> dict[str, float]:
+    """Of one reading, by variable, SI: of the generator, white and slow together."""
+    sizes = {"u_mps": 0.021, "v_mps": 0.021, "r_degps": 0.02, "psi_deg": 0.105, "x_m": 0.58, "y_m": 0.58}
+    assert set(sizes) == set(WHITE)
+    scaled = {name: size * noise_scale(HULLS[ship], name) for name, size in sizes.items()}
+    radians = {name.replace("deg", "rad"): np.radians(v) if "deg" in name else v for name, v in scaled.items()}
+    return {variable: radians[signal] for signal, variable in OBSERVED_SIGNALS.items() if signal in radians}
+
+
+@pytest.mark.parametrize("ship", ["tanker", "model"])
+def test_a_right_model_follows_zigzags_of_a_record_of_one_row_a_second(tmp_path: Path, ship: str) -> None:
+    """The tanker is unstable: an error of half a second at an order is many noises later."""
+    card, trials, _ = written(tmp_path, ship, 1)
+    misfits = [replay.misfit("after") for replay in replay_trials(card, card, trials, noise_of(ship), held_out=False)]
+    assert max(misfits) < 1.5
+
+
+def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
+    card, trials, given = written(tmp_path, "model", 1)
+    noise = noise_of("model")
+    replayer = Replayer(card, trials.driven_by, list(noise))
+    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
+    found, middle = [], []
+    for trial in trials.trials:
+        record, _ = replayer.fit_record(input_record(replayer, trial), sigma, p)
+        assert record.instants is not None
+        order = record.inputs[:, replayer.model.input_names.index("rudder.command")]
+        rows = np.flatnonzero(np.abs(np.diff(order)) > 0.01) + 1
+        found += [*(record.begin_s + (rows - 1 + record.instants[rows]) * record.step_s - given[trial.name])]
+        middle += [*(record.begin_s + (rows - 0.5) * record.step_s - given[trial.name])]
+    assert np.abs(found).max() < 0.3
+    assert np.std(found) < 0.5 * np.std(middle)
+
+
+def test_fine_records_are_taken_as_they_are(tmp_path: Path) -> None:
+    card, trials, _ = written(tmp_path, "tanker", 10)
+    noise = noise_of("tanker")
+    replayer = Replayer(card, trials.driven_by, list(noise))
+    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
+    record, _ = replayer.fit_record(input_record(replayer, replace(trials.trials[0])), sigma, p)
+    assert record.instants is None

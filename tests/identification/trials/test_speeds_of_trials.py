@@ -1,0 +1,81 @@
+"""A card without a range of speeds keeps its polynomial down to the slowest of the trials it is compared with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.dynamics import build
+from tank2sim.identification.trials.problem.problem_from_card import (
+    lowered_bound_notice,
+    polynomial_over_trials,
+    slowest_speed,
+)
+from tank2sim.records.trials import Trial
+
+MODELS = Path(__file__).parents[3] / "models"
+SHIP_TIME_S = 160.93 / 7.7175
+
+
+def card(**model: object) -> ManoeuvringCard:
+    """The Mariner without a stated range, or with these keys of [model]."""
+    text = (MODELS / "mariner" / "ship.toml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith(("valid_speed_mps", "low_speed_below_mps"))]
+    place = lines.index("[model]") + 1
+    lines[place:place] = [f"{key} = {value}" for key, value in model.items()]
+    made = parse_card("\n".join(lines), "ship.toml")
+    assert isinstance(made, ManoeuvringCard)
+    return made
+
+
+def slowing(lowest_mps: float, signals: tuple[str, ...] = ("u_mps", "v_mps")) -> Trial:
+    """A run that slows from 7.7 m/s to its lowest speed on a straight line to the north-east."""
+    time = np.arange(0.0, 600.0, 0.5)
+    speed = lowest_mps + (7.7 - lowest_mps) * np.exp(-time / 60.0)
+    way = np.concatenate([[0.0], np.cumsum(0.25 * (speed[1:] + speed[:-1]))])
+    known = {"u_mps": speed, "v_mps": 0.0 * speed, "x_m": way / np.sqrt(2.0), "y_m": way / np.sqrt(2.0)}
+    return Trial(Path("slowing.csv"), time, {name: known[name] for name in signals})
+
+
+def test_the_bound_is_below_the_slowest_trial() -> None:
+    lowered = polynomial_over_trials(card(), [slowing(3.0), slowing(2.6)])
+    assert lowered.model.low_speed_bound_mps == pytest.approx(0.95 * 2.6, rel=0.01)
+    assert lowered.model.valid_speed_mps is None  # what it is valid for is stated by nobody
+    assert lowered_bound_notice(card(), lowered)
+
+
+@pytest.mark.parametrize("signals", [("u_mps", "v_mps"), ("x_m", "y_m")])
+def test_the_slowest_speed_is_that_of_the_log_or_of_the_track(signals: tuple[str, ...]) -> None:
+    assert slowest_speed(slowing(2.6, signals), SHIP_TIME_S) == pytest.approx(2.6, rel=0.01)
+
+
+def test_the_polynomial_acts_at_the_slowest_speed_of_the_trials() -> None:
+    def rates(of: ManoeuvringCard) -> np.ndarray:
+        model = build(of)
+        parameters = model.parameter_values()
+        states = np.array(model.initial(parameters)).ravel()
+        states[[model.state_names.index(name) for name in ("motion.u", "motion.v", "motion.r")]] = 2.6, -0.4, 0.01
+        return np.array(model.rhs(states, model.input_values(), parameters)).ravel()
+
+    lowered = polynomial_over_trials(card(), [slowing(2.6)])
+    polynomial = card(low_speed_below_mps=0.5)
+    assert rates(lowered) == pytest.approx(rates(polynomial), abs=1e-12)
+    assert rates(card()) != pytest.approx(rates(polynomial), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("given", "trials"),
+    [
+        (card(valid_speed_mps=[3.9, 9.0]), [slowing(2.6)]),
+        (card(low_speed_below_mps=3.0), [slowing(2.6)]),
+        (card(), [slowing(5.0)]),
+        (card(), [slowing(0.1)]),
+    ],
+    ids=["a stated range", "a stated bound", "no slower than the bound", "a stop"],
+)
+def test_a_stated_range_and_stops_leave_the_card_as_it_is(given: ManoeuvringCard, trials: list[Trial]) -> None:
+    assert polynomial_over_trials(given, trials) is given
+    assert lowered_bound_notice(given, given) == ()
