@@ -46,8 +46,8 @@ ASSUMED_EFFECT_ERROR = 0.25
 
 
 SLOWEST_OF_TURNS = 0.2
-"""Speed over the speed of expansion below which a trial is not taken for a manoeuvre ahead but for a stop: a tanker at
-full rudder keeps 0.3 to 0.4 (project choice)."""
+"""Speed over the speed of expansion below which a trial is taken for a stop and not for a manoeuvre: a tanker at full
+rudder keeps 0.3 to 0.4 of its speed (project choice)."""
 
 
 def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> ManoeuvringCard:
