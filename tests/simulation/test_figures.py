@@ -10,6 +10,7 @@ import pytest
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.records.trial_csv import read_trial_csv
 from tank2sim.simulation.figures import figures_of
 from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Turn, Zigzag, parse_manoeuvre, read_orders
 from tank2sim.simulation.run import simulate
@@ -188,6 +189,27 @@ def test_a_run_is_written_as_a_trial_in_the_units_of_its_header(mariner) -> None
     assert last["delta_order_deg"] == pytest.approx(20.0)
     assert last["r_degps"] == pytest.approx(math.degrees(run["motion.r"][-1]))
     assert last["x_m"] == pytest.approx(run["motion.x"][-1])
+
+
+def test_heel_is_written_in_a_trial_and_read_again_outwards_in_a_turn(mariner_card, tmp_path) -> None:
+    ratio = 3.0  # steady heel is -h u r/g, to port in a turn to starboard
+    rolling = f"""
+[[effects]]
+name = "roll_coupling"
+parameters = {{ heel_ratio = {ratio}, Yphi = 3e-4, Nphi = -1e-4 }}
+"""
+    card = parse_card(mariner_card.text + rolling, "rolling")
+    run = simulate(build(card), parse_manoeuvre("turn:20")).trajectory
+    (tmp_path / "turn.csv").write_text(trial_csv(run, "turn"), encoding="utf-8")
+    signals = read_trial_csv(tmp_path / "turn.csv").signals
+    steady = -ratio * run["motion.u"][-1] * run["motion.r"][-1] / 9.80665
+    assert steady < 0
+    assert signals["phi_rad"][-1] == pytest.approx(steady, rel=1e-4)
+    assert signals["phi_rad"] == pytest.approx(run["motion.phi"], abs=1e-9)
+    assert abs(run["motion.p"]).max() > 1e-4
+    np.testing.assert_allclose(
+        np.gradient(run["motion.phi"], run.t)[1:-1], run["motion.p"][1:-1], atol=2e-2 * abs(run["motion.p"]).max()
+    )
 
 
 def test_a_single_order_needs_to_be_reported_how_long(mariner, tmp_path) -> None:

@@ -22,6 +22,7 @@ _COLUMNS = {
     "psi_deg": "motion.psi",
     "x_m": "motion.x",
     "y_m": "motion.y",
+    "phi_deg": "motion.phi",
 }
 
 

@@ -129,7 +129,7 @@ def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
     )
     scaling = scales(model, speed_of_scaling(model, card))
     rolling = with_forces(
-        model.extend(phi, p, phidot, pdot, outputs=["motion.phi"]),
+        model.extend(phi, p, phidot, pdot, outputs=["motion.phi", "motion.p"]),
         Y=scaling.force * given["Yphi"] * phi.symbol,
         N=scaling.force * scaling.length * given["Nphi"] * phi.symbol,
     )
