@@ -4,7 +4,7 @@
 
 ANSWERS.csv has the columns ``case``, ``verdict`` (``none``, ``missing``, ``outside``) and ``effects`` (names of the
 catalogue joined by ``+``; empty unless something is missing), and, if the program has them, ``confidence`` (0 to 1, of
-the names) and ``held_out_misfit`` (root mean square of simulated less measured over the noise of one reading, of the
+the names), ``alternatives`` (sets of names joined by ``+``, with blanks between, at most three) and ``held_out_misfit`` (root mean square of simulated less measured over the noise of one reading, of the
 trials held out, with what was found). A case that is not answered counts as wrong.
 
 Printed are, with 95 % Wilson intervals: cases answered exactly (verdict and all names); precision and recall of names;
@@ -26,6 +26,9 @@ from scipy.stats import binomtest
 
 SAME = {"water_depth": "shallow_water"}
 """A depth and the magnification that it makes are one effect."""
+
+MOST = 3
+"""Alternatives that count: whoever gives all has said nothing."""
 
 BINS = (0.0, 0.5, 0.8, 0.95, 1.0)
 
@@ -51,6 +54,12 @@ class Scored:
     def exact(self) -> bool:
         """Whether verdict and names are right."""
         return self.answer.get("verdict") == self.truth["verdict"] and self.named == self.hidden
+
+    @property
+    def among(self) -> bool:
+        """Whether the answer is exact, or the truth is one of at most :data:`MOST` alternatives given with it."""
+        others = (self.answer.get("alternatives") or "").split()[:MOST]
+        return self.exact or any(_names(other) == self.hidden for other in others)
 
     @property
     def misnamed(self) -> bool:
@@ -82,6 +91,7 @@ def show(title: str, scored: Sequence[Scored]) -> None:
     hidden = sum(len(one.hidden) for one in scored)
     cells = (
         rate(sum(one.exact for one in scored), len(scored)),
+        rate(sum(one.among for one in scored), len(scored)),
         rate(there, named),
         rate(there, hidden),
         rate(sum(one.misnamed for one in scored), len(scored)),
@@ -96,7 +106,9 @@ def main() -> int:
     args = parser.parse_args()
     answers = {row["case"]: row for row in read_rows(args.answers)}
     scored = [Scored(row, answers.get(row["case"], {})) for row in read_rows(args.truth)]
-    print(f"{'':22s}{'cases':>6s}{'exact':>18s}{'precision':>18s}{'recall':>18s}{'wrong name':>18s}")
+    print(
+        f"{'':22s}{'cases':>6s}{'exact':>18s}{'or alternative':>18s}{'precision':>18s}{'recall':>18s}{'wrong name':>18s}"
+    )
     show("all", scored)
     for column in ("group", "hertz", "ship"):
         for value in dict.fromkeys(one.truth[column] for one in scored):
