@@ -4,8 +4,9 @@
 
 ANSWERS.csv has the columns ``case``, ``verdict`` (``none``, ``missing``, ``outside``) and ``effects`` (names of the
 catalogue joined by ``+``; empty unless something is missing), and, if the program has them, ``confidence`` (0 to 1, of
-the names), ``alternatives`` (sets of names joined by ``+``, with blanks between, at most three) and ``held_out_misfit`` (root mean square of simulated less measured over the noise of one reading, of the
-trials held out, with what was found). A case that is not answered counts as wrong.
+the names), ``alternatives`` (sets of names joined by ``+``, with blanks between, at most three) and ``held_out_misfit``
+(root mean square of simulated less measured over the noise of one reading, of the trials held out, with what was
+found). A case that is not answered counts as wrong.
 
 Printed are, with 95 % Wilson intervals: cases answered exactly (verdict and all names); precision and recall of names;
 cases with a name that is not there; for answers with a confidence, how often the names were there.
@@ -106,9 +107,8 @@ def main() -> int:
     args = parser.parse_args()
     answers = {row["case"]: row for row in read_rows(args.answers)}
     scored = [Scored(row, answers.get(row["case"], {})) for row in read_rows(args.truth)]
-    print(
-        f"{'':22s}{'cases':>6s}{'exact':>18s}{'or alternative':>18s}{'precision':>18s}{'recall':>18s}{'wrong name':>18s}"
-    )
+    titles = ("exact", "or alternative", "precision", "recall", "wrong name")
+    print(f"{'':22s}{'cases':>6s}" + "".join(f"{title:>18s}" for title in titles))
     show("all", scored)
     for column in ("group", "hertz", "ship"):
         for value in dict.fromkeys(one.truth[column] for one in scored):
