@@ -10,7 +10,7 @@ import pytest
 from gap_truth import HULLS, Setting, make, sampled, write
 from gap_truth.disturbances import WHITE, noise_scale
 
-from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.gap.proof.open_loop import Replayer, input_record
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import measured
@@ -65,6 +65,25 @@ def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
         middle += [*(record.begin_s + (rows - 0.5) * record.step_s - given[trial.name])]
     assert np.abs(found).max() < 0.3
     assert np.std(found) < 0.5 * np.std(middle)
+
+
+@pytest.mark.parametrize("hertz", [1, 2])
+def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz: int) -> None:
+    """The true delay follows the zigzags to the noise; half an interval more or less does not."""
+    hidden = Setting(("rudder_time_offset",), 5, ship="model", manoeuvres=ZIGZAGS)
+    (made,) = make([hidden])
+    write(sampled(made, hertz), tmp_path)
+    text, delay = (tmp_path / "ship.toml").read_text(encoding="utf-8"), made.parameters["rudder_time_offset"]["delay_s"]
+    misfits = []
+    for off in (0.0, 0.8):
+        effect = f'\n[[effects]]\nname = "rudder_time_offset"\n[effects.parameters]\ndelay_s = {delay + off / hertz}\n'
+        card = parse_card(text + effect, "late.toml")
+        assert isinstance(card, ManoeuvringCard)
+        trials = measured([tmp_path / f"{name}.csv" for name in ZIGZAGS], card)
+        card = polynomial_over_trials(card, trials.trials)
+        replays = replay_trials(card, card, trials, noise_of("model"), held_out=False)
+        misfits.append(max(replay.misfit("after") for replay in replays))
+    assert misfits[0] < 1.6 and misfits[1] > 1.5 * misfits[0]
 
 
 def test_fine_records_are_taken_as_they_are(tmp_path: Path) -> None:

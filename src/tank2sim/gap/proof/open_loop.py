@@ -60,7 +60,8 @@ class InputRecord:
     readings : array (m, ny)
         Single readings at those instants; nan where there is none.
     instants : array (n,), optional
-        Share of the interval before each row at which its order was given; without it, half.
+        Share of the interval before each row at which its order was given (with a delay it may lie half an interval
+        outside); without it, half.
     """
 
     name: str
@@ -70,6 +71,11 @@ class InputRecord:
     every: int
     readings: Array
     instants: Array | None = None
+
+    @property
+    def middle(self) -> float:
+        """Share of an interval at which an order was given on average: half of it, and what a delay adds."""
+        return 0.5 if self.instants is None else float(self.instants[0])
 
     @property
     def times(self) -> Array:
@@ -87,6 +93,8 @@ _ROUNDS = 5
 _NEAR = 2.0
 """A model that follows a record to within this many times the noise is taken as right when its initial state is sought
 (project choice): the remaining misfit is too small to bias it much."""
+
+_ORDER = "rudder.command"
 
 _UNSURE_FROM = 0.01
 """Interval between two readings of the order, in L/u0, from which the instants of its steps are estimated (project
@@ -138,8 +146,8 @@ class Replayer:
         self.model = driven_model(card, driven_by)
         self._steps = Chain(runge_kutta_step(self.model))
         self._shown = shown_by(self.model, seen)
-        ordered = driven_by == "order" and "rudder.command" in self.model.input_names
-        self._order = self.model.input_names.index("rudder.command") if ordered else None
+        ordered = driven_by == "order" and _ORDER in self.model.input_names
+        self._order = self.model.input_names.index(_ORDER) if ordered else None
         self._passage_s = card.ship.length_m / card.model.speed_mps
         self._nominal = np.array([state.nominal for state in self.model.states])
 
@@ -181,6 +189,23 @@ class Replayer:
                 return timed, begun
         return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, wrong=True)[0]
 
+    def delayed_by_instants(self, record: InputRecord, given: Array) -> InputRecord:
+        """A coarse record whose order a fault of the card delays, with that delay in its instants.
+
+        The mean of two orders, by which a part of an interval is else delayed, was never ordered. `given` (n, nu) are
+        the inputs without the delay.
+        """
+        known = dict(zip(self.model.parameter_names, self.model.parameter_values(), strict=True))
+        effects = [EFFECTS[entry.name] for entry in self.card.effects]
+        keys = [effect.model_names()[effect.delays[_ORDER]] for effect in effects if _ORDER in effect.delays]
+        late = sum(known[key] for key in keys) / record.step_s
+        if self._order is None or not late or not self._coarse(record):
+            return record
+        whole = math.floor(late + 0.5)
+        inputs = record.inputs.copy()
+        inputs[:, self._order] = later(given[:, self._order], whole)
+        return replace(record, inputs=inputs, instants=np.full(len(inputs), 0.5 + late - whole))
+
     def _coarse(self, record: InputRecord) -> bool:
         """Whether it matters when an order between two readings was given."""
         return record.step_s > _UNSURE_FROM * self._passage_s
@@ -207,12 +232,13 @@ class Replayer:
     ) -> tuple[InputRecord, Array, float]:
         """The record with the instants of the steps at `rows`, the initial state, and their misfit.
 
-        By Gauss-Newton on the beginning of the record, then on twice as many steps, and so on: a small error at an
+        By least squares on the beginning of the record, then on twice as many steps, and so on: a small error at an
         early step of an unstable ship is a large one later, where the motion is no longer nearly linear in it.
         """
+        middle = record.middle
         guess, spread = _first_state(self, record, sigma, p)
         known, size = ~np.isnan(record.readings), len(start)
-        unknown = np.append(guess, np.full(len(rows), 0.5))
+        unknown = np.append(guess, np.full(len(rows), middle))
         reach = np.append(1e-4 * self._nominal, np.full(len(rows), 2.0 / self._parts(record)))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
@@ -226,15 +252,15 @@ class Replayer:
                 begun, shares = each[:size], each[size:]
                 shown = self.motion(self._given_at(record, rows, shares), begun, p)
                 away = ((shown - record.readings) / sigma)[compared]
-                return np.concatenate([away, (begun - guess) / spread, (shares - 0.5) * math.sqrt(12.0)])
+                return np.concatenate([away, (begun - guess) / spread, (shares - middle) * math.sqrt(12.0)])
 
             def slopes(values: Array, misfit: Callable[[Array], Array] = misfit, size: int = size) -> Array:
-                inward = np.where(values > 0.5, -1.0, 1.0)  # of an instant, away from the nearer bound
+                inward = np.where(values > middle, -1.0, 1.0)  # of an instant, away from the nearer bound
                 inward[:size] = 1.0
                 return difference_slopes(misfit, values, misfit(values), inward * reach[: len(values)])
 
             low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
-            low[size:], high[size:] = 0.0, 1.0
+            low[size:], high[size:] = middle - 0.5, middle + 0.5
             if not np.isfinite(misfit(unknown[free])).all():
                 return record, start, np.inf
             scale = np.append(spread, np.full(count, 0.3))
@@ -247,8 +273,8 @@ class Replayer:
 
     @staticmethod
     def _given_at(record: InputRecord, rows: NDArray[np.intp], shares: Array) -> InputRecord:
-        instants = np.full(len(record.inputs), 0.5)
-        instants[rows] = np.clip(shares, 0.0, 1.0)
+        instants = np.full(len(record.inputs), record.middle)
+        instants[rows] = shares
         return replace(record, instants=instants)
 
     def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
@@ -326,6 +352,7 @@ def _orders_in_steps(order: Array, instants: Array, parts: int) -> Array:
     """The order in each of `parts` steps of every interval, (n - 1) * parts: each value of `order` (n,) holds from the
     step next to the share `instants` (n,) of the interval before its reading on."""
     given = np.round((np.arange(1, len(order)) - 1 + instants[1:]) * parts).astype(np.intp)
+    given = np.maximum.accumulate(np.clip(given, 0, len(order) * parts))
     edges = np.concatenate([[0], given, [len(order) * parts]])
     return np.repeat(order, np.diff(edges))[: (len(order) - 1) * parts]
 
@@ -390,9 +417,9 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     for place, name in enumerate(replayer.seen):
         if (values := trial.signals.get(variables[name])) is not None:
             readings[:, place] = np.where(off, np.nan, values[nearest])
-    return InputRecord(
-        run.name, run.begin_s, run.step_s, delayed(replayer.card, model, run.inputs, run.step_s), every, readings
-    )
+    inputs = delayed(replayer.card, model, run.inputs, run.step_s)
+    record = InputRecord(run.name, run.begin_s, run.step_s, inputs, every, readings)
+    return replayer.delayed_by_instants(record, run.inputs)
 
 
 def delayed(card: ManoeuvringCard, model: Model, inputs: Array, step_s: float, p: Array | None = None) -> Array:
