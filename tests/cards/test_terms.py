@@ -28,5 +28,5 @@ def test_printed_names_are_read() -> None:
 
 
 def test_what_is_no_name_is_none() -> None:
-    for text in ("", "Y", "Z0", "Yw", "yv", "Ydelta", "Y0v", "Yv ", "Kp", "Ydot", "Yddot"):
+    for text in ("", "Y", "Z0", "Yw", "yv", "Ydelta", "Y0v", "Yv ", "Kq", "Ydot", "Yddot"):
         assert parse_term(text) is None, text

@@ -111,11 +111,11 @@ def energy(model: Model, states: np.ndarray, card: ManoeuvringCard) -> np.ndarra
 def test_in_the_range_of_the_card_the_forces_are_those_of_its_polynomial(speed, drift, r, d) -> None:
     model, card = driven_ship(), driven()
     u, v = speed * math.cos(drift), -speed * math.sin(drift)
-    primes = v / speed, r * L / speed, d, (u - U0) / speed
+    primes = {"v": v / speed, "r": r * L / speed, "d": d, "u": (u - U0) / speed}
     scale = RHO / 2 * L**2 * speed**2
     coefficients = {name: card.derivatives.get(name, 0.0) for force in "XYN" for name in ABKOWITZ_TERMS[force]}
     for axis, arm in (("X", 1.0), ("Y", 1.0), ("N", L)):
-        expected = scale * arm * polynomial(ABKOWITZ_TERMS[axis], coefficients, *primes)
+        expected = scale * arm * polynomial(ABKOWITZ_TERMS[axis], coefficients, **primes)
         assert force(model, f"force.{axis}", state(model, u, v, r, d)) == pytest.approx(
             expected, rel=1e-9, abs=1e-4
         )  # N, N m: sums of terms that nearly cancel
@@ -426,7 +426,7 @@ def test_a_card_that_holds_down_to_rest_does_so_to_a_twentieth_of_its_speed() ->
     assert force(model, "force.X", state(model, 0.0), propeller_speed=0.0) == pytest.approx(0.0, abs=1e-6)
     x = state(model, 0.06 * U0)
     assert force(model, "force.X", x) == pytest.approx(
-        RHO / 2 * L**2 * x[3] ** 2 * polynomial(("Xu", "Xuu", "Xuuu"), card.derivatives, 0, 0, 0, (x[3] - U0) / x[3]),
+        RHO / 2 * L**2 * x[3] ** 2 * polynomial(("Xu", "Xuu", "Xuuu"), card.derivatives, u=(x[3] - U0) / x[3]),
         rel=1e-9,
     )
 

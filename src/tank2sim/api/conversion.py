@@ -240,8 +240,9 @@ def _fitted(
     polynomial = polynomial_card(card, fit)
     changes = figure_changes(bare, build(polynomial))
     made = in_conventions(polynomial, wanted)
-    if card.uncertainty or card.interaction_errors:
-        notices = (*notices, "standard errors of the MMG card are not carried over: 2 % of each derivative is assumed")
+    if fit.covariance is not None:
+        carried = "standard errors are those of the MMG card's numbers, carried through the fit with their covariance"
+        notices = (*notices, f"{carried}; what the fit itself misses is in the table alone")
     return ConversionResult(ship, "abkowitz", ConvertedText(made.text, made, fit, changes), notices)
 
 

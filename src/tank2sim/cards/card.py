@@ -21,6 +21,7 @@ from tank2sim.cards.form import (
     ProgrammeSection,
     Propulsion,
     RigidBody,
+    Roll,
     ShipModel,
     ShipSection,
     SteeringGear,
@@ -146,6 +147,8 @@ class ManoeuvringCard(Card):
     spelt : mapping
         Place of an angle or a rate in SI (``effects.0.parameters.direction_rad``) to its place in the file
         (``effects.0.parameters.direction_deg``).
+    roll : Roll, optional
+        What makes roll a degree of freedom; its inertia is prime.
     effects : tuple
         Effects on top of the polynomial, in the order of the file.
     fitted_trials : tuple
@@ -159,6 +162,7 @@ class ManoeuvringCard(Card):
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)
     spelt: Mapping[str, str] = field(default_factory=dict)
+    roll: Roll | None = None
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
     effects: tuple[EffectEntry, ...] = ()
@@ -213,8 +217,8 @@ class MmgCard(ManoeuvringCard):
     def interaction_places(self) -> dict[str, str]:
         """Key of each number of ``[propeller]`` and ``[rudder]`` that is a coefficient, to its dotted place."""
         return {
-            **{key: f"propeller.{key}" for key in PROPELLER_COEFFICIENTS},
-            **{key: f"rudder.{key}" for key in RUDDER_COEFFICIENTS},
+            **{key: f"propeller.{key}" for key in PROPELLER_COEFFICIENTS if getattr(self.propeller, key) is not None},
+            **{key: f"rudder.{key}" for key in RUDDER_COEFFICIENTS if getattr(self.rudder, key) is not None},
         }
 
     def interaction_error(self, key: str) -> float:
@@ -227,9 +231,16 @@ class MmgCard(ManoeuvringCard):
         return float(getattr(section, key))
 
 
-PROPELLER_COEFFICIENTS = ("k_0", "k_1", "k_2", "t_P", "w_P0", "x_P", "C_1", "C_2_plus", "C_2_minus", "astern")
+WAKE_BY_DRIFT = (("C_1", "C_2_plus", "C_2_minus"), ("tau", "C_Pv", "C_Pr"))
+"""The keys of either form of the wake's change by drift and yaw."""
+
+CROSS_FLOW_AT_RUDDER = (("l_R", "gamma_R_plus", "gamma_R_minus"), ("C_Rv", "C_Rr", "C_Rrrr", "C_Rrrv"))
+"""The keys of either form of the cross flow to the rudder."""
+
+PROPELLER_COEFFICIENTS = ("k_0", "k_1", "k_2", "t_P", "w_P0", "x_P", *WAKE_BY_DRIFT[0], *WAKE_BY_DRIFT[1], "astern")
 RUDDER_COEFFICIENTS = (
-    *("f_alpha", "t_R", "a_H", "x_H", "x_R", "eps", "kappa", "l_R", "gamma_R_plus", "gamma_R_minus"),
+    *("f_alpha", "t_R", "a_H", "x_H", "x_R", "eta", "eps", "kappa"),
+    *(*CROSS_FLOW_AT_RUDDER[0], *CROSS_FLOW_AT_RUDDER[1]),
 )
 """Keys of the coefficients in ``[propeller]`` and ``[rudder]``, which are parameters ``mmg.*`` of the model."""
 

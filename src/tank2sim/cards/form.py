@@ -169,6 +169,27 @@ class RigidBody(CardSection):
     x_G: float
 
 
+class Roll(CardSection):
+    """``[roll]``: what makes roll a degree of freedom; ``ship.metacentric_height_m`` and terms of K belong to it.
+
+    Parameters
+    ----------
+    roll_inertia : float
+        I_x of the ship about the longitudinal axis through the origin.
+    z_G : float
+        Centre of gravity below the origin, over L.
+    z_R : float
+        Where the rudder's sway force acts below the origin, over L (z'_R of Son and Nomoto): K = -z_R L Y_R.
+    l_x : float
+        Where the added mass in surge acts below the origin, over L: K = m_x l_x L u r.
+    """
+
+    roll_inertia: Positive
+    z_G: float = 0.0
+    z_R: float = 0.0
+    l_x: float = 0.0
+
+
 class SteeringGear(CardSection):
     """``[steering_gear]``: first-order lag, rate and angle limits; absent means none."""
 
@@ -223,6 +244,8 @@ class MmgPropeller(CardSection):
         Place of the propeller over L, positive forward and (of the right one) to starboard.
     C_1, C_2_plus, C_2_minus : float, optional
         Change of the wake by drift; without them it is constant.
+    tau, C_Pv, C_Pr : float, optional
+        In their place: (1 - w_P0) + tau ((v' + x_P r')^2 + C_Pv v' + C_Pr r') instead of 1 - w_P.
     astern : float
         Thrust at rest with reversed revolutions over that with the same ahead.
     """
@@ -240,6 +263,9 @@ class MmgPropeller(CardSection):
     C_1: CardNotNegative | None = None
     C_2_plus: Positive | None = None
     C_2_minus: Positive | None = None
+    tau: Coefficient | None = None
+    C_Pv: Coefficient | None = None
+    C_Pr: Coefficient | None = None
     astern: CardNotNegative = ASTERN_THRUST
 
 
@@ -258,8 +284,12 @@ class MmgRudder(CardSection):
         Interaction with the hull; places over L, positive forward.
     y_R : float, optional
         Place of the right one of two, over L.
+    eta : float, optional
+        Share of the rudder in the propeller's race; by default D_P/H_R.
     eps, kappa, l_R, gamma_R_plus, gamma_R_minus : float
         Flow to the rudder; gamma_R for positive and for negative beta_R.
+    C_Rv, C_Rr, C_Rrrr, C_Rrrv : float, optional
+        In place of l_R and gamma_R: v_R' = -(C_Rv v' + C_Rr r' + C_Rrrr r'^3 + C_Rrrv r'^2 v').
     """
 
     number: Literal[1, 2] = 1
@@ -271,11 +301,16 @@ class MmgRudder(CardSection):
     x_H: Place
     x_R: Place = -0.5
     y_R: Place | None = None
+    eta: Annotated[float, Field(gt=0, le=1)] | None = None
     eps: Positive
     kappa: CardNotNegative
-    l_R: Place
+    l_R: Place | None = None
     gamma_R_plus: Coefficient | None = None
     gamma_R_minus: Coefficient | None = None
+    C_Rv: Coefficient | None = None
+    C_Rr: Coefficient | None = None
+    C_Rrrr: Coefficient | None = None
+    C_Rrrv: Coefficient | None = None
 
 
 class Surge(CardSection):
@@ -462,6 +497,7 @@ class ShipCard(CardSection):
     rigid_body: RigidBody
     derivatives: dict[str, float]
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
+    roll: Roll | None = None
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
     effects: list[EffectEntry] = []

@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS, MmgCard
+from tank2sim.cards.card import (
+    CROSS_FLOW_AT_RUDDER,
+    PROPELLER_COEFFICIENTS,
+    RUDDER_COEFFICIENTS,
+    WAKE_BY_DRIFT,
+    MmgCard,
+)
 from tank2sim.cards.form import MmgForm, MmgPropeller, MmgRudder, ShipCard
 from tank2sim.errors import InputError
 
@@ -40,7 +46,7 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     if rudder.number != propeller.number:
         problem = f"is {rudder.number} behind {propeller.number} propeller{'s' * (propeller.number > 1)}"
         raise InputError(source, "rudder.number", problem, "give as many rudders as propellers")
-    if form.ship.propeller_diameter_m / rudder.height_m > 1:
+    if rudder.eta is None and form.ship.propeller_diameter_m / rudder.height_m > 1:
         ratio = form.ship.propeller_diameter_m / rudder.height_m
         problem = f"is less than the propeller's diameter (eta = D_P/H_R = {ratio:.3g})"
         raise InputError(source, "rudder.height_m", problem, "check both: the race covers a share eta of the rudder")
@@ -78,18 +84,38 @@ def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
         update |= dict(zip(("k_0", "k_1", "k_2"), fit.coefficients.tolist(), strict=True))
     elif not polynomial:
         raise InputError(source, "propeller.k_0", "is missing", "give k_0, k_1, k_2 or points J, K_T of the curve")
-    if (section.C_1 is None) != (section.C_2_plus is None):
+    by_polynomial = _one_form(section, "propeller", WAKE_BY_DRIFT, source)
+    if not by_polynomial and (section.C_1 is None) != (section.C_2_plus is None):
         absent, there = ("C_1", "C_2_plus") if section.C_1 is None else ("C_2_plus", "C_1")
         raise InputError(
             source, f"propeller.{absent}", "is missing", f"{there} is given: give C_1, C_2_plus, C_2_minus"
         )
-    if section.C_1 is None:
+    if by_polynomial:
+        update |= {key: getattr(section, key) or 0.0 for key in WAKE_BY_DRIFT[1]}
+    elif section.C_1 is None:
         update |= {"C_1": 0.0, "C_2_plus": 1.0, "C_2_minus": 1.0}
     if section.number == 2 and section.y_P is None:
         raise InputError(
             source, "propeller.y_P", "is missing", "two propellers need their distance to midships, over L"
         )
     return section.model_copy(update=update)
+
+
+def _one_form(
+    section: MmgPropeller | MmgRudder, name: str, forms: tuple[tuple[str, ...], tuple[str, ...]], source: str
+) -> bool:
+    """True if a section has the second form of two, whose keys `forms` has.
+
+    Raises
+    ------
+    InputError
+        It has keys of both.
+    """
+    first, second = ([key for key in keys if getattr(section, key) is not None] for keys in forms)
+    if first and second:
+        remedy = f"give {', '.join(forms[0])} or {', '.join(forms[1])}"
+        raise InputError(source, f"{name}.{second[0]}", f"is given, and {first[0]} too", remedy)
+    return bool(second)
 
 
 class OpenWaterFit(NamedTuple):
@@ -118,15 +144,20 @@ def open_water_fit(J: list[float], K_T: list[float], source: str) -> OpenWaterFi
 
 
 def _rudder(section: MmgRudder, source: str) -> MmgRudder:
-    if section.gamma_R_plus is None:
+    update: dict[str, float] = {}
+    if _one_form(section, "rudder", CROSS_FLOW_AT_RUDDER, source):
+        update = {key: getattr(section, key) or 0.0 for key in CROSS_FLOW_AT_RUDDER[1]}
+    elif section.gamma_R_plus is None:
         raise InputError(source, "rudder.gamma_R_plus", "is missing", "give gamma_R_plus and gamma_R_minus")
+    elif section.l_R is None:
+        raise InputError(source, "rudder.l_R", "is missing", "give l_R, the effective place of the rudder in yaw")
     if section.f_alpha is None and section.aspect_ratio is None:
         raise InputError(source, "rudder.f_alpha", "is missing", "give f_alpha or aspect_ratio")
     if section.number == 2 and section.y_R is None:
         raise InputError(source, "rudder.y_R", "is missing", "two rudders need their distance to midships, over L")
-    if section.f_alpha is not None or section.aspect_ratio is None:
-        return section
-    return section.model_copy(update={"f_alpha": fujii(section.aspect_ratio)})
+    if section.f_alpha is None and section.aspect_ratio is not None:
+        update |= {"f_alpha": fujii(section.aspect_ratio)}
+    return section.model_copy(update=update)
 
 
 def equilibrium_revolutions(

@@ -31,6 +31,7 @@ from tank2sim.cards.form import (
     MmgForm,
     Propulsion,
     RigidBody,
+    Roll,
     ShipCard,
     SurgeCard,
     YawRigForm,
@@ -267,6 +268,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         return prime
 
     _refuse_doubled_effects(form.effects, source)
+    _refuse_half_of_roll(form, [*places.items(), *stated.items()], source)
     return ManoeuvringCard(
         source=source,
         text=text,
@@ -277,6 +279,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         derivatives=bounded("derivatives", places, form.derivatives),
         uncertainty={name: abs(error) for name, error in bounded("uncertainty", stated, form.uncertainty).items()},
         places=places,
+        roll=_prime_roll(form.roll, scales, source),
         steering_gear=form.steering_gear,
         propulsion=_prime_propulsion(form.propulsion, scales),
         effects=tuple(form.effects),
@@ -320,6 +323,34 @@ def _prime_rigid_body(body: RigidBody, scales: FileScales | None, source: str) -
     return body
 
 
+def _prime_roll(roll: Roll | None, scales: FileScales | None, source: str) -> Roll | None:
+    if roll is None:
+        return None
+    heights = {key: getattr(roll, key) / (scales.length if scales else 1.0) for key in ("z_G", "z_R", "l_x")}
+    for key, value in heights.items():
+        if abs(value) > 0.5:
+            remedy = "heights are measured from the origin, positive downwards, in lengths if scaling is prime"
+            raise InputError(source, f"roll.{key}", f"is {value:g} L from the origin", remedy)
+    inertia = roll.roll_inertia / (scales.inertia if scales else 1.0)
+    return roll.model_copy(update={"roll_inertia": inertia, **heights})
+
+
+def _refuse_half_of_roll(form: ShipCard, places: list[tuple[str, str]], source: str) -> None:
+    """Raise InputError if terms of roll have no ``[roll]``, or ``[roll]`` has no metacentric height or damping."""
+    if form.roll is None:
+        for name, key in places:
+            if known_term(name).of_roll:
+                remedy = "give [roll] with roll_inertia, and ship.metacentric_height_m"
+                raise InputError(source, f"derivatives.{key}", "is a term of a ship that rolls", remedy)
+        return
+    height = form.ship.metacentric_height_m
+    if height is None or height <= 0:
+        problem = "is missing" if height is None else f"is {height:g} m: the ship has no stable upright position"
+        raise InputError(source, "ship.metacentric_height_m", problem, "[roll] needs it, above zero")
+    if "Kp" not in dict(places):
+        raise InputError(source, "derivatives.Kp", "is missing", "[roll] needs the damping of roll (negative)")
+
+
 def _prime_propulsion(propulsion: Propulsion | None, scales: FileScales | None) -> Propulsion | None:
     if propulsion is None or scales is None:
         return propulsion
@@ -335,6 +366,7 @@ def _canonical_names(
         term = parse_term(aliases.get(key, (key, 1.0))[0])
         if term is None:
             remedy = "a name is X, Y or N and then v, r, d, u as often as they occur (Yvvr), 0 or udot, vdot, rdot"
+            remedy += "; with [roll] also K, p, phi and pdot"
             raise InputError(source, f"{section}.{key}", "is not a name of a derivative", remedy)
         if term.name in places:
             problem = f"is the same term as {places[term.name]}"

@@ -27,14 +27,15 @@ class Scales:
     def derivative(self, term: Term) -> Any:
         """SI value of a derivative whose prime value is 1.
 
-        F = 1/2 rho L^2 V^2 a' (v/V)^i (r L/V)^j d^k (Du/V)^l, and L times that for N; for acceleration derivatives V
-        cancels and only rho and L remain.
+        F = 1/2 rho L^2 V^2 a' (v/V)^i (r L/V)^j d^k (Du/V)^l, and L times that for N and K; p goes with L/V as r does,
+        phi as it is; for acceleration derivatives V cancels and only rho and L remain.
         """
-        arm = 1 if term.force == "N" else 0
+        arm = 1 if term.force in "KN" else 0
         if term.acceleration:
-            turning = 1 if term.acceleration == "r" else 0
+            turning = 1 if term.acceleration in "pr" else 0
             return 0.5 * self.density * self.length ** (3 + arm + turning)
-        return 0.5 * self.density * self.length ** (2 + arm + term.r) * self.speed ** (2 - term.v - term.r - term.u)
+        rates = term.r + term.p
+        return 0.5 * self.density * self.length ** (2 + arm + rates) * self.speed ** (2 - term.v - rates - term.u)
 
     @property
     def mass(self) -> Any:
@@ -110,7 +111,7 @@ class Bis:
         """Value of a derivative whose prime value is 1: each velocity takes one of the two powers of Fn."""
         if term.acceleration:
             return 1 / self.ship_mass
-        return self.froude ** (2 - term.v - term.r - term.u) / self.ship_mass
+        return self.froude ** (2 - term.v - term.r - term.p - term.u) / self.ship_mass
 
     @property
     def mass(self) -> float:

@@ -37,15 +37,22 @@ LINEAR_TERMS: dict[str, tuple[str, ...]] = {
 """Velocity and rudder terms of (3.5). Its X_delta is zero by symmetry (paper 2) and not among the names of a card."""
 
 
-def polynomial(names: Iterable[str], coefficients: Mapping[str, Any], v: Any, r: Any, d: Any, du: Any) -> Any:
-    """Sum of the named terms of (3.8): coefficient times its powers of v, r, rudder d and speed change du.
+def polynomial(names: Iterable[str], coefficients: Mapping[str, Any], **motion: Any) -> Any:
+    """Sum of the named terms of (3.8): each coefficient times the powers that its name states.
 
-    All arguments in one scaling (the prime system in the models); numbers or CasADi expressions.
+    Parameters
+    ----------
+    names : iterable of str
+        Of :mod:`tank2sim.cards.terms`.
+    coefficients : mapping
+        Name to coefficient.
+    **motion
+        ``v``, ``r``, rudder ``d``, speed change ``u``, and the rate of roll ``p`` and heel ``phi`` of a ship that
+        rolls, in one scaling (the prime system in the models); numbers, arrays or CasADi expressions; 0 if absent.
     """
     total: Any = 0
     for name in names:
-        term = known_term(name)
-        powers = [base**power for base, power in ((v, term.v), (r, term.r), (d, term.d), (du, term.u)) if power]
+        powers = known_term(name).powers
         # The powers by themselves, not one after the other onto the coefficient: Y and N then share them.
-        total += coefficients[name] * math.prod(powers)
+        total += coefficients[name] * math.prod(motion.get(letter, 0) ** power for letter, power in powers.items())
     return total

@@ -120,11 +120,11 @@ def _polynomials(hull: Hull, with_rudder: bool) -> Forces:
     """
     speed, scales = _scales_of_forces(hull)
     v, r, du = prime_motion(hull, speed)
-    primes = v, r, hull["rudder.effective"], du
+    primes = {"v": v, "r": r, "d": hull["rudder.effective"], "u": du}
     sums = []
     for force in "XYN":
         names = _terms(hull, force, with_rudder)
-        sums.append(polynomial(names, {name: hull.coefficient(name) for name in names}, *primes))
+        sums.append(polynomial(names, {name: hull.coefficient(name) for name in names}, **primes))
     force = (1 - hull.low_share) * scales.force
     return force * sums[0], force * sums[1], force * scales.length * sums[2]
 
@@ -143,7 +143,7 @@ def _ahead(hull: Hull, force: str, u: ca.SX, rudder: int = 0) -> ca.SX:
     terms = {name: known_term(name) for name in _terms(hull, force, with_rudder=rudder > 0)}
     names = [name for name, term in terms.items() if (term.v, term.r, term.d) == (0, 0, rudder)]
     coefficients = {name: hull.coefficient(name) for name in names}
-    value: ca.SX = hull.scales(speed).force * polynomial(names, coefficients, 0, 0, 1, (u - u0) / speed)
+    value: ca.SX = hull.scales(speed).force * polynomial(names, coefficients, d=1, u=(u - u0) / speed)
     return value
 
 
@@ -173,7 +173,7 @@ def _rudder_forces(hull: Hull) -> Forces:
     for name in "XYN":
         names = [name for name in _terms(hull, name, with_rudder=True) if _of_rudder_alone(name)]
         coefficients = {name: hull.coefficient(name) for name in names}
-        by_angle = polynomial(names, coefficients, 0, 0, hull["rudder.effective"], 0)
+        by_angle = polynomial(names, coefficients, d=hull["rudder.effective"])
         by_swing = 0 if name == "X" else hull.coefficient(f"{name}d") * swinging
         low.append(at_u0.force * (straight * by_angle + by_swing))
     share = hull.low_share

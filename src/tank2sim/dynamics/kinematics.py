@@ -65,6 +65,50 @@ def yaw_rate(nominal_radps: float) -> tuple[State, Parameter]:
     return state, start
 
 
+def heel(*, at_rest: bool = False) -> tuple[tuple[State, State], tuple[Parameter, ...]]:
+    """States ``motion.phi`` (rad) and ``motion.p`` (rad/s), and their starts ``initial.phi``, ``initial.p``.
+
+    Parameters
+    ----------
+    at_rest : bool
+        Without the starts: upright and at rest.
+
+    Returns
+    -------
+    tuple
+        The two states, whose rates are ``motion.phidot`` and ``motion.pdot``, and the two parameters, none `at_rest`.
+    """
+    described = (
+        ("phi", "rad", "Heel", "deg", 0.1),
+        ("p", "rad/s", "Rate of heel", "deg/s", 0.01),
+    )
+    states, starts = [], []
+    for letter, unit, name, shown, nominal in described:
+        start = Parameter(
+            name=f"initial.{letter}",
+            unit=unit,
+            description=f"{name} at the start, positive to starboard",
+            display_unit=shown,
+            start=0.0,
+            tunable=False,
+        )
+        starts.append(start)
+        states.append(
+            State(
+                name=f"motion.{letter}",
+                unit=unit,
+                description=f"{name}, positive to starboard",
+                display_unit=shown,
+                nominal=nominal,
+                derivative=f"motion.{letter}dot",
+                start=0.0 if at_rest else start.symbol,
+                steady=True,
+            )
+        )
+    angle, rate = states
+    return (angle, rate), () if at_rest else tuple(starts)
+
+
 def _starts() -> tuple[Parameter, ...]:
     described = (
         ("initial.x", "m", "Position to north at the start", None),

@@ -23,7 +23,11 @@ from tank2sim.dynamics.mmg.ship import MmgShip, mmg_forces, mmg_parameters, side
 from tank2sim.dynamics.model import Model, Parameter, State, Variable
 from tank2sim.dynamics.propulsion import propulsion, revolutions
 from tank2sim.dynamics.rigid_body import Inertia, inertia
+from tank2sim.dynamics.roll import roll_fault, roll_parameters, roll_terms, with_roll
 from tank2sim.dynamics.steering_gear import steering_gear
+
+OPPOSED = tuple(name for name, _ in OPPOSITE.values())
+"""Derivatives that the MMG method writes with the other sign, under a name of their own."""
 
 SINGULAR = "the mass matrix of sway and yaw is singular (f4 = 0)"
 NOT_POSITIVE = "mass with added mass is not positive (m - Xudot, m - Yvdot, J_z - Nrdot, f4)"
@@ -57,7 +61,12 @@ def ship_model(card: ManoeuvringCard) -> Model:
         engine = (*revolutions(card.propulsion), *mmg_parameters(card))
     elif card.propulsion:
         engine = propulsion(card.propulsion)
-    constants = (*_ship_parameters(card), *low_speed_parameters(card), *_derivative_parameters(card, names))
+    constants = (
+        *_ship_parameters(card),
+        *roll_parameters(card),
+        *low_speed_parameters(card),
+        *_derivative_parameters(card, names),
+    )
     position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
     symbols = {variable.name: variable.symbol for variable in position}
     position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
@@ -81,7 +90,8 @@ def ship_model(card: ManoeuvringCard) -> Model:
     )
     outputs = (*_OUTPUTS, *(["propeller.speed_actual"] if engine else []))
     forces = mmg_forces(MmgShip(hull, sides(card))) if isinstance(card, MmgCard) else polynomial_forces(hull)
-    return empty.extend(*given, *motion_quantities(hull, forces), outputs=outputs)
+    planar = empty.extend(*given, *motion_quantities(hull, forces), outputs=outputs)
+    return with_roll(planar, hull, card) if card.roll else planar
 
 
 def _without_yaw(card: ManoeuvringCard) -> list[str]:
@@ -107,27 +117,30 @@ KINDS = {"abkowitz": "third-order (Abkowitz)", "linear": "linear", "mmg": "MMG"}
 
 
 def _description(card: ManoeuvringCard) -> str:
-    return f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in surge, sway and yaw with steering gear"
+    motions = "surge, sway, roll and yaw" if card.roll else "surge, sway and yaw"
+    return f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in {motions} with steering gear"
 
 
 def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
     mmg = card.model.kind == "mmg"
     every, equations = (MMG_TERMS, "the MMG hull") if mmg else (ALL_TERMS, "(3.8)")
-    spelt = [*OPPOSITE, *(term for term in MMG_TERMS[: -len(ACCELERATION_TERMS)])] if mmg else list(ALL_TERMS)
+    spelt = [*OPPOSITE, *(term for term in MMG_TERMS if term not in OPPOSED)] if mmg else list(ALL_TERMS)
+    rolling = [name for name in card.derivatives if known_term(name).of_roll]
     for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
         for name in given:
-            if name not in every or (mmg and name in ("Yrdot", "Nvdot")):
+            of_roll_alone = mmg and not card.roll and name in ("Yrdot", "Nvdot")
+            if (name not in every and name not in rolling) or of_roll_alone:
                 key = card.places.get(name, name)
                 close = difflib.get_close_matches(name, spelt, n=1)
                 hint = f"did you mean {close[0]}? " if close else ""
                 remedy = f"{hint}{'an MMG hull' if mmg else 'the third-order model'} has {' '.join(spelt)}"
                 raise card.fault(f"{section}.{key}", f"is not a term of {equations}", remedy)
     if mmg:
-        return list(MMG_TERMS), []
+        return [*MMG_TERMS, *rolling], []
     if card.model.kind == "abkowitz":
-        return list(ALL_TERMS), []
-    names = [*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
+        return [*ALL_TERMS, *rolling], []
+    names = [*roll_terms(card), *LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
     unused = [name for name in card.derivatives if name not in names]
     return names, [f"the linear model leaves out {len(unused)} derivatives of the card"] if unused else []
 
@@ -142,6 +155,8 @@ def _refuse_singular_mass(card: ManoeuvringCard) -> None:
     if not _is_positive(matrix):
         remedy = "acceleration derivatives are negative: check their signs"
         raise card.fault("derivatives", NOT_POSITIVE, remedy)
+    if problem := roll_fault(card):
+        raise card.fault("roll.roll_inertia", problem, "check roll_inertia, z_G, Kpdot, Kvdot and Ypdot")
 
 
 def mass_fault(p: Mapping[str, float]) -> str:
@@ -235,14 +250,15 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
 
 
 def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Parameter, ...]:
+    symbols = {"d": "delta", "u": "Du"}
+
     def described(name: str) -> str:
         term = known_term(name)
         if term.acceleration:
             return f"Acceleration derivative of {term.force} by d{term.acceleration}/dt, prime system"
         powers = [
-            f"{symbol}^{power}" if power > 1 else symbol
-            for symbol, power in (("v", term.v), ("r", term.r), ("delta", term.d), ("Du", term.u))
-            if power
+            f"{symbols.get(letter, letter)}^{power}" if power > 1 else symbols.get(letter, letter)
+            for letter, power in term.powers.items()
         ]
         return f"Coefficient of {' '.join(powers) or '1'} in {term.force}, prime system, rudder + to starboard"
 

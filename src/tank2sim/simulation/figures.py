@@ -114,7 +114,16 @@ def _turn(run: Trajectory, side: float, length: float) -> Figures:
         "steady_rate_degps": math.degrees(rate) if steady else None,
         "steady_speed_mps": speed if steady else None,
         "speed_loss_percent": _speed_loss(run, speed) if steady else None,
+        **_largest_heel(run),
     }
+
+
+def _largest_heel(run: Trajectory) -> Figures:
+    """The largest heel (deg, positive to starboard) of a ship that rolls; no figure of one that does not."""
+    if "motion.phi" not in run.model:
+        return {}
+    heel = run["motion.phi"]
+    return {"largest_heel_deg": math.degrees(heel[np.argmax(np.abs(heel))])}
 
 
 def _is_steady(run: Trajectory, length: float) -> bool:
@@ -155,6 +164,7 @@ def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
         "reach_s": _first(returns),
         "period_s": float(returns[2] - returns[0]) if len(returns) > 2 else None,
         "speed_loss_percent": _speed_loss(run, float(run["motion.speed"].min())),
+        **_largest_heel(run),
     }
 
 

@@ -90,6 +90,8 @@ class LaneManoeuvres:
             raise NoLanesError("a ship that is trimmed first is not run in lanes")
         if not {*_BEGINS, "motion.u", "motion.v", "motion.r"} <= set(model.state_names):
             raise NoLanesError("the model is not that of a ship")
+        if "motion.phi" in model.state_names:
+            raise NoLanesError("the heel of a ship that rolls is no figure of lanes")
         self._runner = LaneRunner(model, lanes)
         arguments = [model.x, model.u, model.p]
         self._read = {

@@ -9,6 +9,7 @@ import numpy as np
 from tank2sim.analysis.conversion.origin import shift_matrix, shifted_body
 from tank2sim.cards.card import OPPOSITE, ManoeuvringCard, scales_of_file
 from tank2sim.cards.covariance import Covariance, not_referring, read_covariance
+from tank2sim.cards.form import Roll
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.cards.scaling import FileScales, file_factor
 from tank2sim.cards.terms import known_term
@@ -103,6 +104,8 @@ def _rewritten(
         "rigid_body.yaw_inertia": _written(body.yaw_inertia * of_inertia),
         "rigid_body.x_G": _written(body.x_G * of_length),
     }
+    if card.roll is not None:
+        changes |= roll_in_file(card.roll, of_inertia, of_length)
     if card.propulsion is not None and card.model.kind != "mmg":
         changes["propulsion.Xnn"] = _written(card.propulsion.Xnn * (scales.force if scales else 1.0))
     errors = np.sqrt(np.diag(covariance))
@@ -121,6 +124,21 @@ def _rewritten(
     sizes = np.array([factor(names[row]) for row in kept])
     matrix_in_file = covariance[np.ix_(kept, kept)] * np.outer(sizes, sizes)
     return replace(new, covariance=Covariance(tuple(places[names[row]] for row in kept), matrix_in_file))
+
+
+def roll_in_file(roll: Roll, inertia: float, length: float) -> dict[str, float]:
+    """``[roll]`` by dotted key, as a file has it.
+
+    Parameters
+    ----------
+    roll : Roll
+        In the prime system.
+    inertia, length : float
+        A number of the file over that of the prime system: of inertias and of lengths.
+    """
+    heights = {key: getattr(roll, key) for key in ("z_G", "z_R", "l_x")}
+    written = {f"roll.{key}": _written(value * length) for key, value in heights.items() if value}
+    return {"roll.roll_inertia": _written(roll.roll_inertia * inertia), **written}
 
 
 def _without_other_spellings(card: ManoeuvringCard, text: str) -> str:

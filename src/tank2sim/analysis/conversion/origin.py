@@ -9,6 +9,7 @@ the new origin afterwards: a difference of second order in a' r', which is not i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import comb
 
 import numpy as np
@@ -17,7 +18,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.form import RigidBody
 from tank2sim.cards.terms import Term, known_term
 
-_IN_SWAY = {("Y", "v"): "Yrdot", ("N", "v"): "Nrdot"}
+_IN_SWAY = {("Y", "v"): "Yrdot", ("N", "v"): "Nrdot", ("K", "v"): "Krdot"}
 
 
 def shifted_terms(name: str, ahead: float) -> dict[str, float]:
@@ -37,7 +38,7 @@ def _in_other_velocities(term: Term, ahead: float) -> dict[str, float]:
         other = _IN_SWAY.get((term.force, term.acceleration))
         return {term.name: 1.0, other: -ahead} if other else {term.name: 1.0}
     return {
-        Term(term.force, term.v - count, term.r + count, term.d, term.u).name: comb(term.v, count) * (-ahead) ** count
+        replace(term, v=term.v - count, r=term.r + count).name: comb(term.v, count) * (-ahead) ** count
         for count in range(term.v + 1)
     }
 

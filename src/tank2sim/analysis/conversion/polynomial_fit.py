@@ -5,25 +5,30 @@ X, Y, N without the ship's own inertia, over 1/2 rho L^2 U^2 (and L), is fitted 
 at nominal revolutions. Added masses are those of the card, X_nn is half the slope of X by n/n0 on the straight course.
 In linear terms it is then Y_r' - m_x', X_vr' + m_y', and the rudder's share of Y_v to N_r, as derived from the method;
 a kink (gamma_R, C_2) and X_vvvv have no term of their own and are fitted into others.
+
+The fit is linear in the forces, theta = A F(p), so that errors of the MMG card's numbers p carry over by its slopes:
+Cov(theta) = S Cov(p) S^T, S = A dF/dp, at held revolutions.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 import tomlkit
 
+from tank2sim.analysis.conversion.conventions import roll_in_file
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
-from tank2sim.cards.covariance import not_referring
+from tank2sim.cards.covariance import Covariance, not_referring, read_covariance
 from tank2sim.cards.reading import parse_card
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
-from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS
+from tank2sim.dynamics.card_parameters import JointErrors, card_parameters, joint_errors, study_model
 from tank2sim.dynamics.mmg.ship import is_symmetric
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
@@ -64,12 +69,15 @@ class PolynomialFit:
         Force to the root mean square of the residual over that of the force.
     ranges : mapping
         ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
+    covariance : array (k, k), optional
+        Of `derivatives`, in their order, by the errors of the MMG card; None if it states none.
     """
 
     derivatives: Mapping[str, float]
     Xnn: float
     residuals: Mapping[str, float]
     ranges: Mapping[str, tuple[float, float]]
+    covariance: Array | None = None
 
 
 def manoeuvre_motions(model: Model) -> Array:
@@ -134,11 +142,17 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
         The motions do not determine the terms.
     """
     forces, primes = _hydrodynamic_primes(card, model, motions)
-    derivatives = {name: card.derivatives.get(name, 0.0) for name in ("Xudot", "Yvdot", "Nrdot")}
+    kept = [*ACCELERATION_TERMS, *(name for name in card.derivatives if _of_heeling(name))]
+    derivatives = {name: card.derivatives[name] for name in kept if name in card.derivatives}
+    errors = joint_errors(card, card_parameters(card, study_model(card))) if _states_errors(card) else None
+    numbers = [] if errors is None else [p.name for p in errors.parameters if p.name in model.parameter_names]
+    slopes = _force_slopes(card, model, motions, numbers)
+    sensitivity = [[float(number == f"derivatives.{name}") for number in numbers] for name in derivatives]
     residuals = {}
     symmetric = is_symmetric(card)
-    for row, force in enumerate("XYN"):
-        names = [name for name in ABKOWITZ_TERMS[force] if not symmetric or _of_symmetric_ship(name)]
+    for row, force in enumerate("XYNK"[: len(forces)]):
+        every = ABKOWITZ_TERMS[force] if force != "K" else tuple(f"K{name[1:]}" for name in ABKOWITZ_TERMS["Y"])
+        names = [name for name in every if not symmetric or _of_symmetric_ship(name)]
         design = np.column_stack([_powers(name, primes) for name in names])
         sizes = np.sqrt(np.mean(design**2, axis=0))
         found, _, rank, _ = np.linalg.lstsq(design / np.where(sizes > 0, sizes, 1.0), forces[row], rcond=1e-12)
@@ -146,6 +160,7 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
             raise card.fault("model", "its motions do not determine a polynomial", "state wider ranges")
         coefficients = found / sizes
         derivatives |= dict(zip(names, coefficients.tolist(), strict=True))
+        sensitivity += (np.linalg.lstsq(design / sizes, slopes[row], rcond=1e-12)[0] / sizes[:, None]).tolist()
         error = design @ coefficients - forces[row]
         residuals[force] = float(np.sqrt(np.mean(error**2) / np.mean(forces[row] ** 2)))
     u0, speed = card.model.speed_mps, np.hypot(motions[:, 0], motions[:, 1])
@@ -156,12 +171,30 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
         "rudder_deg": np.degrees(motions[:, 3]),
     }
     ranges = {name: (float(np.quantile(v, 0.005)), float(np.quantile(v, 0.995))) for name, v in visited.items()}
-    return PolynomialFit(derivatives, _effect_of_revolutions(card, model), residuals, ranges)
+    covariance = None if errors is None else _carried(np.array(sensitivity), errors, numbers)
+    return PolynomialFit(derivatives, _effect_of_revolutions(card, model), residuals, ranges, covariance)
+
+
+def _states_errors(card: MmgCard) -> bool:
+    return bool(card.uncertainty or card.interaction_errors) or read_covariance(card) is not None
+
+
+def _carried(sensitivity: Array, errors: JointErrors, numbers: Sequence[str]) -> Array:
+    """S C S^T; C is the covariance of the card's `numbers`."""
+    rows = [[p.name for p in errors.parameters].index(name) for name in numbers]
+    covariance: Array = sensitivity @ errors.covariance[np.ix_(rows, rows)] @ sensitivity.T
+    return 0.5 * (covariance + covariance.T)
 
 
 def _of_symmetric_ship(name: str) -> bool:
     term = known_term(name)
     return (term.v + term.r + term.d) % 2 == (0 if term.force == "X" else 1)
+
+
+def _of_heeling(name: str) -> bool:
+    """True for a term of p or phi, and an acceleration derivative of a ship that rolls."""
+    term = known_term(name)
+    return term.p + term.phi > 0 or (term.of_roll and bool(term.acceleration))
 
 
 def _powers(name: str, primes: tuple[Array, Array, Array, Array]) -> Array:
@@ -174,27 +207,46 @@ def _powers(name: str, primes: tuple[Array, Array, Array, Array]) -> Array:
 def _hydrodynamic_primes(
     card: MmgCard, model: Model, motions: Array
 ) -> tuple[Array, tuple[Array, Array, Array, Array]]:
-    """X', Y', N' (3, n) without the ship's own inertia, and v', r', delta, Du'."""
+    """X', Y', N' and of a ship that rolls K' (3 or 4, n), upright, without its inertia, and v', r', delta, Du'."""
     u, v, r, delta = motions.T
     speed, length = np.hypot(u, v), card.ship.length_m
-    forces = _forces_at(model, motions, model.input_values())
+    forces = _forces_at(model, motions, model.input_values())[:, 0]
     body, scales = card.rigid_body, card.scales
-    inertial = inertial_forces(body.mass * scales.mass, body.x_G * length, u, v, r)
-    scale = 0.5 * scales.density * (length * speed) ** 2
-    primes = (forces - np.array(inertial)) / scale / np.array([[1.0], [1.0], [length]])
+    inertial = [*inertial_forces(body.mass * scales.mass, body.x_G * length, u, v, r)]
+    if card.roll is not None:
+        added = -card.derivatives.get("Xudot", 0.0) * card.roll.l_x
+        inertial.append((added + body.mass * card.roll.z_G) * scales.mass * length * u * r)
+    primes = (forces - np.array(inertial)) / _units(card, motions)[: len(forces)]
     return primes, (v / speed, r * length / speed, delta, (u - card.model.speed_mps) / speed)
 
 
-def _forces_at(model: Model, motions: Array, inputs: Array) -> Array:
-    """``force.X``, ``.Y``, ``.N`` (3, n), SI."""
-    wanted = model.expand(ca.vcat([model.symbol(f"force.{name}") for name in "XYN"]))
-    function = ca.Function("forces", [model.x, model.u, model.p], [wanted])
+def _units(card: MmgCard, motions: Array) -> Array:
+    """What X, Y, N, K (4, n) are divided by in the prime system: N, N, N m, N m."""
+    length = card.ship.length_m
+    unit = 0.5 * card.scales.density * length**2 * (motions[:, 0] ** 2 + motions[:, 1] ** 2)
+    return np.outer([1.0, 1.0, length, length], unit)
+
+
+def _force_slopes(card: MmgCard, model: Model, motions: Array, numbers: Sequence[str]) -> Array:
+    """dX'/dp, dY'/dp, dN'/dp and of a ship that rolls dK'/dp (3 or 4, n, k) by k parameters of the model."""
+    slopes = _forces_at(model, motions, model.input_values(), numbers)[:, 1:]
+    return np.moveaxis(slopes / _units(card, motions)[: len(slopes), None], 1, 2)
+
+
+def _forces_at(model: Model, motions: Array, inputs: Array, numbers: Sequence[str] = ()) -> Array:
+    """``force.X``, ``.Y``, ``.N`` and of a ship that rolls ``.K``, with their slopes by k parameters `numbers`
+    (3 or 4, 1 + k, n), SI; upright."""
+    names = [name for name in ("force.X", "force.Y", "force.N", "force.K") if name in model]
+    forces = model.expand(ca.vcat([model.symbol(name) for name in names]))
+    slopes = ca.jacobian(forces, ca.vcat([model.symbol(number) for number in numbers]))
+    function = ca.Function("forces", [model.x, model.u, model.p], [ca.densify(ca.vec(ca.horzcat(forces, slopes)))])
     p, count = model.parameter_values(), len(motions)
     states = np.tile(np.array(model.initial(p)), (1, count))
     for column, name in enumerate(_STATES):
         states[model.state_names.index(name)] = motions[:, column]
     arguments = states, np.tile(inputs[:, None], (1, count)), np.tile(p[:, None], (1, count))
-    return np.array(function.map(count)(*arguments))
+    found = np.array(function.map(count)(*arguments))
+    return found.reshape(1 + len(numbers), len(names), count).swapaxes(0, 1)
 
 
 def _effect_of_revolutions(card: MmgCard, model: Model) -> float:
@@ -205,7 +257,7 @@ def _effect_of_revolutions(card: MmgCard, model: Model) -> float:
     for side in (1, -1):
         inputs = model.input_values()
         inputs[place] *= 1 + side * change
-        at.append(float(_forces_at(model, straight, inputs)[0, 0]))
+        at.append(float(_forces_at(model, straight, inputs)[0, 0, 0]))
     return (at[0] - at[1]) / (4 * change) / float(card.scales.force)
 
 
@@ -236,16 +288,30 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     propulsion["Xnn"] = float(f"{fit.Xnn:.10g}")
     for name, value in fit.derivatives.items():
         derivatives[name] = float(f"{value:.10g}")
+    errors = {} if fit.covariance is None else dict(zip(fit.derivatives, np.sqrt(np.diag(fit.covariance)), strict=True))
+    uncertain = [name for name, error in errors.items() if error > 0]
+    uncertainty = tomlkit.table()
+    for name in uncertain:
+        uncertainty[name] = float(f"{errors[name]:.3g}")
+    if card.roll is not None:
+        # The rudder's moment about the longitudinal axis is in the terms of K.
+        document.pop("roll", None)
+        roll = roll_in_file(card.roll.model_copy(update={"z_R": 0.0}), 1.0, 1.0)
+        document["roll"] = {place.removeprefix("roll."): value for place, value in roll.items()}
     ship = document["ship"]
     assert isinstance(ship, dict)
     ship["source"] = f"{card.ship.source}; fitted by tank2sim convert to the MMG card {card.ship.name}"
     tables = {"model": model, "rigid_body": body, "propulsion": propulsion, "derivatives": derivatives}
-    document.update(tables)
+    document.update(tables | ({"uncertainty": uncertainty} if uncertain else {}))
     text = not_referring(tomlkit.dumps(_effects_last(document)))
     new = parse_card(text, card.source)
     assert isinstance(new, ManoeuvringCard)
     build(new)
-    return new
+    if fit.covariance is None:
+        return new
+    rows = [list(errors).index(name) for name in uncertain]
+    names = tuple(f"derivatives.{name}" for name in uncertain)
+    return replace(new, covariance=Covariance(names, fit.covariance[np.ix_(rows, rows)]))
 
 
 def _effects_last(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:

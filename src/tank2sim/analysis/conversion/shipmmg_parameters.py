@@ -21,7 +21,12 @@ def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
     """
     if card.propeller.number != 1:
         raise card.fault("propeller.number", "is 2, and shipmmg has one propeller", "convert it --to mss or pvs")
-    for name in ("Y0", "N0"):
+    if card.roll is not None:
+        raise card.fault("roll", "is given, and shipmmg's ship does not roll", "convert it --to mss or pvs")
+    for key, place in card.interaction_places().items():
+        if key in ("tau", "eta", "C_Rv"):
+            raise card.fault(place, "is no coefficient of shipmmg", "convert it --to mss or pvs")
+    for name in ("Y0", "N0", "Yrdot", "Nvdot"):
         if card.derivatives.get(name):
             raise card.fault(f"derivatives.{name}", "is no coefficient of shipmmg", "leave it out")
     length, scales, body = card.ship.length_m, card.scales, card.rigid_body
@@ -48,7 +53,7 @@ def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
         "x_H": card.rudder.x_H * length,
         "γ_R_minus": card.interaction("gamma_R_minus"),
         "γ_R_plus": card.interaction("gamma_R_plus"),
-        "l_R": card.rudder.l_R,
+        "l_R": card.interaction("l_R"),
         "κ": card.rudder.kappa,
         "t_P": card.propeller.t_P,
         "w_P0": card.propeller.w_P0,

@@ -288,8 +288,8 @@ def _forces_in_primes(
     scale = ca.SX(ratio) if nominal else ratio / (ca.sqrt(1 - v**2) - du)
     u, sway, yaw = ratio + du * scale, v * scale, r * scale
     card_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
-    primes = sway / card_scale, yaw / card_scale, d, (u - 1) / card_scale
-    X, Y, N = (card_scale**2 * polynomial(ABKOWITZ_TERMS[name], coefficients, *primes) for name in "XYN")
+    primes = {"v": sway / card_scale, "r": yaw / card_scale, "d": d, "u": (u - 1) / card_scale}
+    X, Y, N = (card_scale**2 * polynomial(ABKOWITZ_TERMS[name], coefficients, **primes) for name in "XYN")
     # Terms that each convention leaves to the equations: (3.8) with u, or none, because the coefficients include V.
     for each_card, sign in ((card, 1), (reference, -1)):
         if each_card.model.yaw_rate_terms == "hydrodynamic":

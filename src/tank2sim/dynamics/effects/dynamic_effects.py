@@ -10,6 +10,7 @@ from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymb
 from tank2sim.dynamics.effects.forces import scales, speed_of_scaling, with_forces
 from tank2sim.dynamics.effects.froude_scale import time_scale_passages
 from tank2sim.dynamics.effects.particulars import model_particular
+from tank2sim.dynamics.kinematics import heel
 from tank2sim.dynamics.model import Model, Quantity, State
 
 
@@ -77,27 +78,6 @@ def _natural_period(card: ManoeuvringCard) -> float:
     return 2 * math.pi * 0.4 * beam / math.sqrt(card.environment.gravity_mps2 * stable)
 
 
-def _heel() -> tuple[State, State]:
-    described = (
-        ("motion.phi", "rad", "Heel, positive to starboard", "deg", 0.1, "motion.phidot"),
-        ("motion.p", "rad/s", "Rate of heel, positive to starboard", "deg/s", 0.01, "motion.pdot"),
-    )
-    phi, p = (
-        State(
-            name=name,
-            unit=unit,
-            description=description,
-            display_unit=shown,
-            nominal=nominal,
-            derivative=derivative,
-            start=0.0,
-            steady=True,
-        )
-        for name, unit, description, shown, nominal, derivative in described
-    )
-    return phi, p
-
-
 def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Heel drives Y and N, and the turn drives heel, outwards:
 
@@ -110,7 +90,7 @@ def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
     """
     pulse = 2 * math.pi / given["roll_period"]
     driving = model.symbol("motion.u") * model.symbol("motion.r") / card.environment.gravity_mps2
-    phi, p = _heel()
+    (phi, p), _ = heel(at_rest=True)
     phidot = Quantity(
         name=phi.derivative,
         unit="rad/s",
@@ -163,4 +143,5 @@ ROLL_COUPLING = Effect(
         EffectParameter("heel_ratio", "outward heel in a steady turn over u r/g", 0.0, 20.0, 3.0),
     ),
     equations=_rolling,
+    in_roll=True,
 )

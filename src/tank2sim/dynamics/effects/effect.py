@@ -187,6 +187,8 @@ class Effect:
         Parameter to the signal of a trial that measures it (``wind_speed_mps``).
     in_mmg : bool
         True if the equations of the MMG method have it already: it is not for such a card.
+    in_roll : bool
+        True if a card with ``[roll]`` has it already: it is not for such a card.
     terminal : str
         What its inputs are together, a few words for the FMI terminal that joins them.
     """
@@ -208,6 +210,7 @@ class Effect:
     measured_as: Mapping[str, str] = field(default_factory=dict)
     terminal: str = ""
     in_mmg: bool = False
+    in_roll: bool = False
 
     @property
     def looks_like(self) -> str:
@@ -240,7 +243,7 @@ class Effect:
 
     def tried(self, card: ManoeuvringCard) -> bool:
         """True if a search can begin: this ship's model can have it, and required parameters have typical values."""
-        if self.in_mmg and card.model.kind == "mmg":
+        if (self.in_mmg and card.model.kind == "mmg") or (self.in_roll and card.roll):
             return False
         required = self.required()
         return all(parameter.typical_values(card) for parameter in self.parameters if parameter.name in required)
@@ -277,6 +280,8 @@ class Effect:
         """
         if self.in_mmg and card.model.kind == "mmg":
             raise card.fault("effects", f"{self.name} is part of the MMG method's own rudder", "leave it out")
+        if self.in_roll and card.roll:
+            raise card.fault("effects", f"{self.name} is part of the card's own [roll]", "leave one of the two out")
         variables = {
             parameter.stem: parameter.variable(self.name, parameter.value(values, card), card)
             for parameter in self.parameters
@@ -347,8 +352,13 @@ def with_steps_for(model: Model, name: str, share: float = 1.0) -> Model:
     """The model with a step, halved as often as needed, that resolves `share` of the parameter `name` (a time, s)."""
     parameter = model[name]
     assert isinstance(parameter, Parameter)
+    return with_steps_for_time(model, share * parameter.start)
+
+
+def with_steps_for_time(model: Model, time_s: float) -> Model:
+    """The model with a step, halved as often as needed, that resolves a time constant (s)."""
     step = model.step_s
-    while step * STEPS_PER_TIME_CONSTANT > share * parameter.start * (1 + 1e-9):
+    while step * STEPS_PER_TIME_CONSTANT > time_s * (1 + 1e-9):
         step /= 2
     return replace(model, step_s=step)
 

@@ -6,6 +6,8 @@ approach, for each rudder:
     Y_d = -(1 + a_H) k,   N_d = -(x_R' + a_H x_H') k
     Y_v + Y_d gamma_R U/u_R,   Y_r - m_x' + Y_d gamma_R l_R' U/u_R,   N likewise without m_x'
 
+(with C_Rv for gamma_R and C_Rr for gamma_R l_R' where a card gives those).
+
 The two sides differ by their gamma_R: there is no single linear ship at beta_R = 0.
 """
 
@@ -44,14 +46,22 @@ def linear_equivalent(card: MmgCard, model: Model, side: Literal["plus", "minus"
     rudder, known = card.rudder, card.derivatives
     ratio = straight_inflow(model) / card.model.speed_mps
     k = rudder.number * card.ship.rudder_area_m2 / card.ship.length_m**2 * (rudder.f_alpha or 0.0) * ratio**2
-    both = [card.interaction(f"gamma_R_{name}") for name in ("plus", "minus")]
-    # Of two rudders one always has the other side's.
-    gamma = (sum(both) / 2 if rudder.number == 2 else card.interaction(f"gamma_R_{side}")) / ratio
+    by_sway, by_yaw = (value / ratio for value in _cross_flow(card, side))
     slopes = {"Yd": -(1 + rudder.a_H) * k, "Nd": -(rudder.x_R + rudder.a_H * rudder.x_H) * k}
     found = dict(slopes)
     for force in "YN":
         slope = slopes[f"{force}d"]
-        found[f"{force}v"] = known.get(f"{force}v", 0.0) + slope * gamma
-        found[f"{force}r"] = known.get(f"{force}r", 0.0) + slope * gamma * rudder.l_R
+        found[f"{force}v"] = known.get(f"{force}v", 0.0) + slope * by_sway
+        found[f"{force}r"] = known.get(f"{force}r", 0.0) + slope * by_yaw
     found["Yr"] += known.get("Xudot", 0.0)
     return found
+
+
+def _cross_flow(card: MmgCard, side: Literal["plus", "minus"]) -> tuple[float, float]:
+    """-d(v_R/U)/dv' and -d(v_R/U)/dr' of straight motion: gamma_R and gamma_R l_R', or C_Rv and C_Rr."""
+    if card.rudder.C_Rv is not None:
+        return card.interaction("C_Rv"), card.interaction("C_Rr")
+    both = [card.interaction(f"gamma_R_{name}") for name in ("plus", "minus")]
+    # Of two rudders one always has the other side's.
+    gamma = sum(both) / 2 if card.rudder.number == 2 else card.interaction(f"gamma_R_{side}")
+    return gamma, gamma * card.interaction("l_R")

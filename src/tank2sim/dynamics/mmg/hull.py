@@ -25,7 +25,8 @@ HULL_TERMS: dict[str, tuple[str, ...]] = {
 """Terms of the bare hull in X, Y and N."""
 
 MMG_TERMS: tuple[str, ...] = (*HULL_TERMS["X"], *HULL_TERMS["Y"], *HULL_TERMS["N"], *ACCELERATION_TERMS)
-"""The derivatives of an MMG model: X0 = -R_0', Xudot = -m_x', Yvdot = -m_y', Nrdot = -J_z'; Yrdot = Nvdot = 0."""
+"""The derivatives of an MMG model: X0 = -R_0', Xudot = -m_x', Yvdot = -m_y', Nrdot = -J_z'; Yrdot and Nvdot
+are 0 unless the ship rolls."""
 
 
 def hull_polynomials(hull: Hull) -> Forces:
@@ -33,7 +34,7 @@ def hull_polynomials(hull: Hull) -> Forces:
     v, r, _ = prime_motion(hull, hull.speed)
     scales = hull.scales(hull.speed)
     X, Y, N = (
-        polynomial(names, {name: hull.coefficient(name) for name in names}, v, r, 0, 0) for names in HULL_TERMS.values()
+        polynomial(names, {name: hull.coefficient(name) for name in names}, v=v, r=r) for names in HULL_TERMS.values()
     )
     return scales.force * X, scales.force * Y, scales.force * scales.length * N
 

@@ -2,6 +2,7 @@
 
     T = rho n^2 D^4 K_T,   K_T = k_0 + k_1 J + k_2 J^2,   J = u_P/(n D),   u_P = (1 - w_P) u,   X_P = (1 - t_P) T
     (1 - w_P)/(1 - w_P0) = 1 + (1 - exp(-C_1 abs(beta_P))) (C_2 - 1),   beta_P = beta - x_P' r'
+    or   1 - w_P = (1 - w_P0) + tau ((v' + x_P' r')^2 + C_Pv v' + C_Pr r')        (Son and Nomoto 1982)
 
 C_2 is C_2+ for beta_P > 0, else C_2-. The ratio has a kink there: at beta_P = 0 its slopes are those of beta_P < 0.
 
@@ -31,9 +32,15 @@ def wake_ratio(p: Mapping[str, Any], beta_P: ca.SX) -> ca.SX:
     return ratio
 
 
-def propeller_inflow(p: Mapping[str, Any], u: ca.SX, beta_P: ca.SX) -> ca.SX:
-    """u_P (m/s), positive from ahead, at a surge velocity u (m/s); without wake when going astern."""
-    return ca.if_else(u > 0, (1 - p["w_P0"]) * wake_ratio(p, beta_P), 1) * u
+def wake_by_polynomial(p: Mapping[str, Any], v: ca.SX, r: ca.SX) -> ca.SX:
+    """1 - w_P at v' and r' (prime); `p` has w_P0, x_P, tau, C_Pv, C_Pr."""
+    ratio: ca.SX = (1 - p["w_P0"]) + p["tau"] * ((v + p["x_P"] * r) ** 2 + p["C_Pv"] * v + p["C_Pr"] * r)
+    return ratio
+
+
+def propeller_inflow(u: ca.SX, kept: ca.SX) -> ca.SX:
+    """u_P (m/s), positive from ahead, at a surge velocity u (m/s), of which 1 - w_P is `kept`; without wake astern."""
+    return ca.if_else(u > 0, kept, 1) * u
 
 
 def thrust_over_density(p: Mapping[str, Any], diameter: ca.SX, n: ca.SX, u_P: ca.SX) -> ca.SX:

@@ -18,11 +18,17 @@ from functools import cached_property
 import casadi as ca
 
 from tank2sim.cards.card import MmgCard
-from tank2sim.dynamics.hull import Hull, force_quantities, rudder_quantities
+from tank2sim.dynamics.hull import Hull, force_quantities, prime_motion, rudder_quantities
 from tank2sim.dynamics.low_speed import STILL_SPEED
 from tank2sim.dynamics.mmg.hull import bare_hull_forces, inertial_forces_with_water
-from tank2sim.dynamics.mmg.propeller import propeller_inflow, thrust_over_density
-from tank2sim.dynamics.mmg.rudder import normal_force, rudder_cross_flow, rudder_forces_of, rudder_inflow
+from tank2sim.dynamics.mmg.propeller import propeller_inflow, thrust_over_density, wake_by_polynomial, wake_ratio
+from tank2sim.dynamics.mmg.rudder import (
+    cross_flow_by_polynomial,
+    normal_force,
+    rudder_cross_flow,
+    rudder_forces_of,
+    rudder_inflow,
+)
 from tank2sim.dynamics.model import Parameter, Quantity
 
 DESCRIPTIONS: dict[str, str] = {
@@ -35,17 +41,25 @@ DESCRIPTIONS: dict[str, str] = {
     "C_1": "Change of the wake by drift, per rad",
     "C_2_plus": "Limit of (1 - w_P)/(1 - w_P0) at large beta_P > 0 (water from port)",
     "C_2_minus": "Limit of (1 - w_P)/(1 - w_P0) at large beta_P < 0 (water from starboard)",
+    "tau": "Change of 1 - w_P by the square of v' + x_P' r'",
+    "C_Pv": "Coefficient of v' in that change, over tau",
+    "C_Pr": "Coefficient of r' in that change, over tau",
     "astern": "Thrust at rest with reversed revolutions over that ahead",
     "f_alpha": "Slope of the rudder's normal force by angle, on 1/2 rho A_R U_R^2",
     "t_R": "Steering resistance deduction",
     "a_H": "Force on the hull by the rudder over that of the rudder",
     "x_H": "Where that force acts, over L, positive forward of midships",
     "x_R": "Place of the rudder over L, positive forward of midships",
+    "eta": "Share of the rudder in the race of the propeller",
     "eps": "Ratio of wake at rudder and propeller, (1 - w_R)/(1 - w_P)",
     "kappa": "Share of the propeller's acceleration that reaches the rudder",
     "l_R": "Effective place of the rudder in yaw over L, positive forward of midships",
     "gamma_R_plus": "Flow straightening for beta_R > 0 (water from port at the rudder)",
     "gamma_R_minus": "Flow straightening for beta_R < 0 (water from starboard at the rudder)",
+    "C_Rv": "Cross flow at the rudder by v', positive v_R from starboard",
+    "C_Rr": "Cross flow at the rudder by r', positive v_R from starboard",
+    "C_Rrrr": "Cross flow at the rudder by r'^3, positive v_R from starboard",
+    "C_Rrrv": "Cross flow at the rudder by r'^2 v', positive v_R from starboard",
 }
 """Coefficient of ``[propeller]`` and ``[rudder]`` to what it is."""
 
@@ -100,6 +114,8 @@ def is_symmetric(card: MmgCard) -> bool:
     if card.propeller.number == 2:
         return True
     propeller, rudder = card.propeller, card.rudder
+    if propeller.C_Pv or propeller.C_Pr:
+        return False
     return propeller.C_2_plus == propeller.C_2_minus and rudder.gamma_R_plus == rudder.gamma_R_minus
 
 
@@ -148,7 +164,7 @@ class MmgShip:
     @cached_property
     def p(self) -> Mapping[str, ca.SX]:
         """Symbols of the coefficients of propeller and rudder."""
-        coefficients = {key: self.hull[f"mmg.{key}"] for key in DESCRIPTIONS}
+        coefficients = {key: self.hull[f"mmg.{key}"] for key in DESCRIPTIONS if f"mmg.{key}" in self.hull.symbols}
         return {**coefficients, "rudder_astern": self.hull["low_speed.rudder_astern"]}
 
     @cached_property
@@ -195,6 +211,17 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
     beta_P = ship.drift - p["x_P"] * r * length / hull.speed
     n = hull["propeller.speed_actual"] / (2 * ca.pi)
 
+    speed, mirrored = hull.speed, side.mirror
+    v_prime, r_prime, _ = prime_motion(hull, speed)
+    by_polynomial = mirrored * v_prime, mirrored * r_prime
+    kept = wake_by_polynomial(p, *by_polynomial) if "tau" in p else (1 - p["w_P0"]) * wake_ratio(p, mirrored * beta_P)
+    drift_speed, swing = mirrored * speed * ship.drift, mirrored * length * r
+    if "C_Rr" in p:
+        across = cross_flow_by_polynomial(p, speed, *by_polynomial)
+    else:
+        across = rudder_cross_flow(p, drift_speed, swing)
+    in_race = p["eta"] if "eta" in p else diameter / hull["ship.rudder_height"]
+
     def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
         return Quantity(name=f"{name}{side.suffix}", unit=unit, description=description, value=value)
 
@@ -202,7 +229,7 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
         "propeller.inflow",
         "m/s",
         "Flow to the propeller u_P, positive from ahead",
-        propeller_inflow(p, hull["motion.u"] - side.y_P * length * r, side.mirror * beta_P),
+        propeller_inflow(hull["motion.u"] - side.y_P * length * r, kept),
     )
     thrust = quantity(
         "propeller.thrust",
@@ -215,14 +242,13 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
         "rudder.inflow",
         "m/s",
         "Flow to the rudder u_R, positive from ahead",
-        rudder_inflow(p, diameter / hull["ship.rudder_height"], u_P.symbol, race, ship.still),
+        rudder_inflow(p, in_race, u_P.symbol, race, ship.still),
     )
-    drift_speed, swing = side.mirror * hull.speed * ship.drift, side.mirror * length * r
     v_R = quantity(
         "rudder.cross_flow",
         "m/s",
         "Cross flow to the rudder v_R, positive from port",
-        side.mirror * rudder_cross_flow(p, drift_speed, swing),
+        mirrored * across,
     )
     F_N = quantity(
         "rudder.normal_force",

@@ -105,7 +105,7 @@ def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array
         term = parse_term(name.partition(" ")[0])
         assert term is not None
         acts = not term.acceleration and not term.u and " " not in name
-        value = polynomial([term.name], {term.name: 1.0}, v, r, rudder, 0.0) if acts else 0.0
+        value = polynomial([term.name], {term.name: 1.0}, v=v, r=r, d=rudder) if acts else 0.0
         columns.append(value * np.ones(len(v)))
     return np.column_stack(columns) if columns else np.zeros((len(v), 0))
 

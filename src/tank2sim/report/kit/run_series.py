@@ -20,6 +20,12 @@ SHIP_SIGNALS = {
 """What the time histories of a ship show, from top to bottom, and the words on each axis."""
 
 
+def shown_signals(model: Model) -> dict[str, str]:
+    """What the time histories of a model of a ship show: :data:`SHIP_SIGNALS`, and heel if it has it."""
+    heel = {"motion.phi": "heel, + to starboard"} if "motion.phi" in model else {}
+    return SHIP_SIGNALS | heel
+
+
 def track_data(label: str, run: Trajectory) -> TrackData:
     """The track of a run."""
     return TrackData(label=label, x_m=run["motion.x"], y_m=run["motion.y"], time_s=run.t)
@@ -34,9 +40,8 @@ def run_chart(label: str, run: Trajectory) -> alt.VConcatChart:
     """Track and time histories of one run, one under the other."""
     track = track_chart([track_data(label, run)], title=label)
     track.usermeta = alt.Undefined  # only a chart by itself may carry it
-    return alt.vconcat(
-        track, history_chart([history_of(label, run, SHIP_SIGNALS)], signals_of(run.model, SHIP_SIGNALS))
-    )
+    signals = shown_signals(run.model)
+    return alt.vconcat(track, history_chart([history_of(label, run, signals)], signals_of(run.model, signals)))
 
 
 def signals_of(model: Model, titles: Mapping[str, str]) -> list[Signal]:

@@ -13,6 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import read_covariance
 from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
@@ -20,6 +21,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.model import Model, Quantity
+from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
@@ -159,7 +161,7 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
     """
     free = {}
     for name in {**card.derivatives, **card.uncertainty}:
-        if name in ACCELERATION_TERMS and not inertia:
+        if known_term(name).acceleration and not inertia:
             continue
         error = card.standard_error(name)
         if error > 0 and name in _used(card):
@@ -357,8 +359,9 @@ def rounded(value: float, error: float) -> float:
 
 
 def _used(card: ManoeuvringCard) -> set[str]:
+    by_roll = roll_terms(card)
     if card.model.kind == "abkowitz":
-        return set(ALL_TERMS)
+        return {*ALL_TERMS, *by_roll}
     if card.model.kind == "mmg":
-        return set(MMG_TERMS)
-    return {*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS}
+        return {*MMG_TERMS, *by_roll}
+    return {*by_roll, *LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS}
