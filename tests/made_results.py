@@ -44,6 +44,13 @@ def _glide_programme(folder: Path) -> Result:
     return t2s.load("kulikovsky-velikanov").glide([-30, -45], as_printed=True, **options)
 
 
+def _convention(folder: Path) -> Result:
+    rows = "length_m,175\nbeam_m,25.4\ndraught_m,8.5\nblock_coefficient,0.57\nspeed_mps,7\n"
+    rows += "Yv,-0.012\nYr,-0.0052\nNv,-0.0038\nNr,-0.0024\nYd,0.0026\nNd,-0.0013\n"
+    (folder / "table.csv").write_text(rows, encoding="utf-8")
+    return t2s.convention(folder / "table.csv")
+
+
 def _check(folder: Path) -> Result:
     return t2s.check_fmu(t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2).path)
 
@@ -67,6 +74,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "autopilot along a track": lambda _: t2s.load("mariner").autopilot(track=[[0, 0], [3000, 0], [6000, 1500]]),
     "check": _check,
     "compare": lambda _: t2s.compare(["mariner", "kvlcc2-captive"], members=2),
+    "convention": _convention,
     "convert": lambda _: t2s.convert("kvlcc2-l7-mmg"),
     "convert to another scaling": lambda _: t2s.convert("mariner", scaling="dimensional"),
     "export": lambda folder: t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2),

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tank2sim.api.bridge import PilotCardResult, PosterResult
     from tank2sim.api.bundled_ships import ShipsResult
     from tank2sim.api.comparison import ComparisonResult, compare
+    from tank2sim.api.convention import ConventionResult, convention
     from tank2sim.api.conversion import ConversionResult, convert
     from tank2sim.api.demo import DemoResult, run_demo
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
@@ -48,6 +49,7 @@ _HOMES = {
     "CaptiveRunResult": "api.captive_run",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
+    "ConventionResult": "api.convention",
     "ConversionResult": "api.conversion",
     "DemoResult": "api.demo",
     "ExportResult": "api.fmu",
@@ -80,6 +82,7 @@ _HOMES = {
     "audit": "api.audit",
     "check_fmu": "api.fmu",
     "compare": "api.comparison",
+    "convention": "api.convention",
     "convert": "api.conversion",
     "find_gap": "api.gap",
     "guess": "api.guess",
@@ -107,6 +110,7 @@ __all__ = [
     "CaptiveRunResult",
     "CheckResult",
     "ComparisonResult",
+    "ConventionResult",
     "ConversionResult",
     "DemoResult",
     "ExportResult",
@@ -139,6 +143,7 @@ __all__ = [
     "audit",
     "check_fmu",
     "compare",
+    "convention",
     "convert",
     "find_gap",
     "guess",

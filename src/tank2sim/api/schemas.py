@@ -686,6 +686,32 @@ class ConvertKeys(_Keys):
     notices: list[str]
 
 
+class ReadingKeys(_Part):
+    """A reading of a table: its conventions, its probability, its figures, and what speaks against it."""
+
+    rudder_sign: str
+    scaling: str
+    yaw_rate_terms: str
+    origin: str
+    probability: float
+    C_prime: Number
+    turning_index: Number
+    advance_lengths: Number
+    tactical_diameter_lengths: Number
+    overshoot_1_deg: Number
+    vanished: list[str]
+    against: list[str]
+
+
+class ConventionKeys(_Keys):
+    """Readings of a table of derivatives, the most probable first."""
+
+    source: str
+    stated: dict[str, str]
+    readings: list[ReadingKeys]
+    notices: list[str]
+
+
 class ShipsKeys(_Keys):
     """The bundled ships."""
 
@@ -836,6 +862,7 @@ KEYS: dict[str, Any] = {
     "autopilot": AutopilotKeys,
     "check": CheckKeys,
     "compare": CompareKeys,
+    "convention": ConventionKeys,
     "convert": ConvertKeys,
     "demo": DemoKeys,
     "export": ExportKeys,

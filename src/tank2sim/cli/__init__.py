@@ -50,6 +50,7 @@ GROUPS = {
     },
     "Export": {
         "convert": "a card in another language: MMG as a polynomial, other conventions, other programs",
+        "convention": "what a table of derivatives with unstated conventions means",
         "export": "the FMU, Model Exchange and Co-Simulation",
         "check": "an FMU validated, and compared with its reference",
     },

@@ -127,6 +127,21 @@ class ShipDimensions:
         return self.speed_kn * KNOT_MPS
 
 
+def rudder_by_rules(length_m: float, beam_m: float, draught_m: float, area_m2: float | None = None) -> float:
+    """-Y_d' of a rudder of the area that rules of classification require, in the slipstream of its propeller.
+
+    Parameters
+    ----------
+    length_m, beam_m, draught_m : float
+        Of the ship.
+    area_m2 : float, optional
+        Of the rudder, where it is known.
+    """
+    # Rules of Det Norske Veritas: A = L T/100 (1 + 25 (B/L)^2), as in Molland and Turnock (2007), Marine Rudders.
+    area = length_m * draught_m / 100 * (1 + 25 * (beam_m / length_m) ** 2) if area_m2 is None else area_m2
+    return _HULL_FORCE * _RUDDER_SLOPE * _SLIPSTREAM * area / length_m**2
+
+
 def prior_card(ship: ShipDimensions, name: str) -> ManoeuvringCard:
     """The card of a ship of which the dimensions are known alone, with standard errors of all that is estimated."""
     x_G = _TRIM_SLOPE * (ship.block - _BLOCK_OF_EVEN_TRIM)
@@ -145,9 +160,7 @@ def prior_card(ship: ShipDimensions, name: str) -> ManoeuvringCard:
     _, _, inertia_source = inertia = found.pop("yaw_inertia")
     value, _, source = found["Yr"]
     found["Yr"] = value, _YR_ERROR * math.pi * (ship.draught_m / ship.length_m) ** 2, source
-    # Rules of Det Norske Veritas: A = L T/100 (1 + 25 (B/L)^2), as in Molland and Turnock (2007), Marine Rudders.
-    area = ship.length_m * ship.draught_m / 100 * (1 + 25 * (ship.beam_m / ship.length_m) ** 2)
-    side = _HULL_FORCE * _RUDDER_SLOPE * _SLIPSTREAM * area / ship.length_m**2
+    side = rudder_by_rules(ship.length_m, ship.beam_m, ship.draught_m)
     rudder = "ESTIMATED: rudder of the area by rule, slope by Fujii"
     found["Yd"] = -side, _SLIPSTREAM_ERROR * side, rudder
     found["Nd"] = _ARM * side, _ARM_ERROR * _ARM * side, rudder
