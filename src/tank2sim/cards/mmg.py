@@ -77,7 +77,9 @@ def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
     for keys, given in ((("k_0", "k_1", "k_2"), polynomial), (("J", "K_T"), table)):
         for key in keys:
             if given and key not in given:
-                raise InputError(source, f"propeller.{key}", "is missing", f"{given[0]} is given: give all of {keys}")
+                raise InputError(
+                    source, f"propeller.{key}", "is missing", f"{given[0]} is given: give {', '.join(keys)}"
+                )
     update: dict[str, float] = {}
     if section.J is not None and section.K_T is not None:
         fit = open_water_fit(section.J, section.K_T, source)
@@ -210,3 +212,32 @@ def nominal_revolutions(card: MmgCard, stated: float | None) -> float:
         remedy = "check R0, k_0 to k_2, t_P and w_P0, or give propulsion.nominal_rpm"
         raise card.fault(f"derivatives.{card.places.get('X0', 'R0')}", problem, remedy)
     return 2 * math.pi * n
+
+
+_SLENDER_WING = (0.3, 8.0)
+"""Y_v' over that of a slender wing, -pi (d/L)^2 (Jones 1946), between which a hull is: Clarke, Gedling and Hine (1983)
+have 1 + 0.4 C_B B/d, 1.5 to 2.5 times it. Prime II taken for prime, or the other way, is a factor of L/d = 8 to 25. The
+bounds are a project choice."""
+
+
+def refuse_other_scaling(card: MmgCard) -> None:
+    """Raise InputError if Y_v is of another scaling, length or draught than the card's.
+
+    Parameters
+    ----------
+    card : MmgCard
+
+    Raises
+    ------
+    InputError
+        Y_v is not within :data:`_SLENDER_WING`.
+    """
+    draught, value = card.ship.draught_m, card.derivatives.get("Yv", 0.0)
+    if draught is None or not value:
+        return
+    ratio = -value / (math.pi * (draught / card.ship.length_m) ** 2)
+    if not _SLENDER_WING[0] < ratio < _SLENDER_WING[1]:
+        problem = (
+            f'is {ratio:.2g} times -pi (d/L)^2 by scaling = "{card.model.scaling}"; hulls have 1.5 to 2.5 times it'
+        )
+        raise card.fault("derivatives.Yv", problem, "check its sign, scaling, length_m and draught_m")

@@ -37,7 +37,7 @@ from tank2sim.cards.form import (
     YawRigForm,
 )
 from tank2sim.cards.form_faults import form_fault, short, suggestion
-from tank2sim.cards.mmg import mmg_fields, nominal_revolutions
+from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
 from tank2sim.cards.scaling import FileScales, file_factor
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
@@ -115,6 +115,7 @@ def parse_card(text: str, source: str) -> Card:
     if isinstance(form, MmgForm):
         own, others = mmg_fields(form, source)
         card = MmgCard(**vars(replace(_manoeuvring_card(others, text, source), spelt=spelt)), **own)
+        refuse_other_scaling(card)
         nominal = nominal_revolutions(card, form.propulsion.nominal_radps if form.propulsion else None)
         # X_nn, the effect of revolutions on surge, is that of the propeller's own equations.
         return replace(card, propulsion=Propulsion(nominal_radps=nominal, Xnn=0.0))
@@ -267,6 +268,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
                 raise InputError(source, f"{section}.{keys[name]}", problem, f"at most {LARGEST_PRIME:g} was expected")
         return prime
 
+    _refuse_other_mass(form, body, source)
     _refuse_doubled_effects(form.effects, source)
     _refuse_half_of_roll(form, [*places.items(), *stated.items()], source)
     return ManoeuvringCard(
@@ -321,6 +323,22 @@ def _prime_rigid_body(body: RigidBody, scales: FileScales | None, source: str) -
         remedy = "x_G is measured from midships, positive forward, in lengths if scaling is prime"
         raise InputError(source, "rigid_body.x_G", f"puts the centre of gravity {body.x_G:g} L from midships", remedy)
     return body
+
+
+_MASS_RATIO = 2.0
+"""Ratio of a card's mass to its displacement beyond which one of them is of another scaling or size. Project choice:
+mass in prime for prime II is off by the ratio of length to draught, 10 to 25."""
+
+
+def _refuse_other_mass(form: ShipCard, body: RigidBody, source: str) -> None:
+    """Raise InputError if the mass is not that of the displacement, where the card states one."""
+    stated = form.ship.displacement_kg
+    if stated is None:
+        return
+    mass = body.mass * 0.5 * form.environment.water_density_kgpm3 * form.ship.length_m**3
+    if not 1 / _MASS_RATIO < mass / stated < _MASS_RATIO:
+        problem = f'is {mass:.4g} kg by scaling = "{form.model.scaling}", and ship.displacement_kg is {stated:.4g}'
+        raise InputError(source, "rigid_body.mass", problem, "check scaling, length_m, draught_m and displacement_kg")
 
 
 def _prime_roll(roll: Roll | None, scales: FileScales | None, source: str) -> Roll | None:

@@ -164,6 +164,46 @@ def test_in_small_motions_the_fit_is_the_linear_map_of_the_method() -> None:
     assert abs(found["X0"]) < 1e-6
 
 
+def test_errors_are_carried_through_the_fit_as_the_linear_map_has_them() -> None:
+    """Yd = -(1 + a_H) k and Nd = -(x_R + a_H x_H) k go with a_H; Yv = Yv_hull + Yd gamma_R U/u_R with both."""
+    stated = "".join(
+        f"{key} = 0.0\n" for key in "R0 Xvv Xvr Xrr Xvvvv Yr Yvvv Yvvr Yvrr Yrrr Nv Nr Nvvv Nvvr Nvrr".split()
+    )
+    stated += "".join(
+        f"{key} = 0.0\n" for key in "Nrrr mx my Jz k_0 k_1 k_2 t_P w_P0 x_P C_1 C_2_plus C_2_minus".split()
+    )
+    stated += "".join(
+        f"{key} = 0.0\n" for key in "f_alpha t_R x_H x_R eps kappa l_R gamma_R_plus gamma_R_minus".split()
+    )
+    card = mmg_ship(f"{ALIKE.replace('C_1 = 2.0', 'C_1 = 0.0')}\n[uncertainty]\nYv = 0.012\na_H = 0.03\n{stated}").card
+    assert isinstance(card, MmgCard)
+    size, U = 1e-2, 1.179
+    spread = np.random.default_rng(1).uniform(-1, 1, (4000, 4)) * size
+    fit = fit_polynomial(card, build(card), np.array([U, 0, 0, 0]) + spread * np.array([3 * U, U, U / 7, 1]))
+    assert fit.covariance is not None
+    names = list(fit.derivatives)
+    in_prime_ii = fit.covariance * (7 / 0.46) ** 2
+    k = 0.0539 / (7 * 0.46) * 2.747 * 1.063344**2
+    slopes = {"Yd": -k, "Nd": 0.464 * k, "Yv": -k * 0.640 / 1.063344, "Nv": 0.464 * k * 0.640 / 1.063344}
+    for first, second in (("Yd", "Yd"), ("Nd", "Nd"), ("Yd", "Nd"), ("Yv", "Yv"), ("Nv", "Nv"), ("Yv", "Yd")):
+        expected = slopes[first] * slopes[second] * 0.03**2 + (0.012**2 if first == second == "Yv" else 0.0)
+        found = in_prime_ii[names.index(first), names.index(second)]
+        assert found == pytest.approx(expected, rel=5e-3), (first, second)
+
+
+def test_a_polynomial_of_a_card_with_errors_has_its_covariance_next_to_it(tmp_path: Path) -> None:
+    text = f"{TEXT}\n[uncertainty]\nYv = 0.012\nNv = 0.006\nNr = 0.002\neps = 0.05\n"
+    made = t2s.convert(mmg_ship(text))
+    made.save(tmp_path / "ship.toml")
+    assert (tmp_path / "ship.covariance.json").is_file()
+    bands = [
+        ship.simulate("turn:35", members=60).to_dict()["ensemble"]["figures"]["tactical_diameter_m"]  # type: ignore[index]
+        for ship in (mmg_ship(text), t2s.load(tmp_path / "ship.toml"))
+    ]
+    widths = [band["p95"] - band["p5"] for band in bands]
+    assert widths[1] == pytest.approx(widths[0], rel=0.25)
+
+
 def test_the_polynomial_follows_standard_manoeuvres_and_says_how_well() -> None:
     made = t2s.convert("kvlcc2-l7-mmg")
     found = {(entry["manoeuvre"], entry["figure"]): entry for entry in made.to_dict()["figures"]}  # type: ignore[attr-defined]
