@@ -144,13 +144,11 @@ class ComparisonResult(Result):
         return list(enumerate(self.labels))[1:]
 
     def _farthest(self, place: int, label: str) -> ResultTable:
-        rows = [
-            (abs(difference.standard_errors), row, difference)
-            for row in self.comparison.rows
-            for difference in [row.differences[place - 1]]
-            if difference.standard_errors is not None
-        ]
-        rows.sort(key=lambda entry: -entry[0])
+        every = [(row, row.differences[place - 1]) for row in self.comparison.rows]
+        known = [(abs(found.standard_errors), row, found) for row, found in every if found.standard_errors is not None]
+        # Without any standard error (two languages) by their share.
+        by_share = [(abs(found.percent), row, found) for row, found in every if found.percent]
+        rows = sorted(known or by_share, key=lambda entry: -entry[0])
         columns = ("coefficient", self.labels[0], label, "difference (%)", "standard errors")
         cells = [
             [row.name, row.cards[0].value, row.cards[place].value, difference.percent, difference.standard_errors]

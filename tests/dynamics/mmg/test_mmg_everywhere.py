@@ -158,11 +158,23 @@ def test_reports_describe_the_method_and_keep_bare_hull_and_polynomial_apart(tmp
     paths = written(ship_of(TEXT), tmp_path)
     page = t2s.validate("kvlcc2-l7-mmg", paths[:1], members=0).page()
     assert "MMG standard method" in page
-    rows = t2s.compare(["kvlcc2-l7-mmg", "kvlcc2-l7"], members=0).to_dict()["coefficients"]
-    apart = {row["name"]: row["differences"][0] for row in rows}  # type: ignore[attr-defined]
-    for name in ("Yv", "Nr", "Xvr"):
-        assert apart[name]["standard_errors"] is None and "bare hull" in str(apart[name]), name
-    assert apart["Nrdot"]["percent"] is not None
+
+
+def test_the_two_languages_are_compared_by_their_linear_terms_with_the_rudder(tmp_path: Path) -> None:
+    """Of the method they are Yv + Yd gamma_R U/u_R, Yr - m_x' + ..., of a fit near them; mean of both sides."""
+    t2s.convert("kvlcc2-l7-mmg").save(tmp_path / "polynomial.toml")
+    rows = t2s.compare(["kvlcc2-l7-mmg", tmp_path / "polynomial.toml"], members=0).to_dict()["coefficients"]
+    found = {row["name"]: row for row in rows}  # type: ignore[attr-defined]
+    k = 0.0539 / (7 * 0.46) * 2.747 * 1.0633**2
+    Yd, Nd, gamma = -1.312 * k, (0.5 + 0.312 * 0.464) * k, 0.5 * (0.640 + 0.395) / 1.0633
+    expected = {"Yd": Yd, "Nd": Nd, "Yv": -0.315 + Yd * gamma, "Nv": -0.137 + Nd * gamma}
+    expected |= {"Yr": 0.083 - 0.022 - 0.71 * Yd * gamma, "Nr": -0.049 - 0.71 * Nd * gamma}
+    for name, value in expected.items():
+        assert found[name]["cards"][0]["value"] == pytest.approx(value * 0.46 / 7, rel=1e-3), name
+        assert found[name]["differences"][0]["standard_errors"] is None
+        assert abs(found[name]["differences"][0]["percent"]) < 25, name
+    assert found["Nrdot"]["differences"][0]["percent"] == pytest.approx(0, abs=1e-6)
+    assert "Xvr" not in found and "Yvvr" not in found
 
 
 def test_hull_and_rudder_are_scaled_to_turn_through_two_points(tmp_path: Path) -> None:

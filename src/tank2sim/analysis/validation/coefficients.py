@@ -21,11 +21,13 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.scaling import file_factor
 from tank2sim.cards.terms import Term, known_term
+from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, polynomial
 from tank2sim.dynamics.card_parameters import card_parameters
+from tank2sim.dynamics.mmg.equivalent import linear_form
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
 
@@ -104,9 +106,19 @@ class Expansion:
 
 
 def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[str, ...]]:
-    """All coefficients of the cards (the first is the reference), with notes on conversions."""
+    """All coefficients of the cards (the first is the reference), with notes on conversions.
+
+    Between an MMG card and a polynomial the linear terms are compared: those of the straight course with propeller and
+    rudder, the mean of both sides of the flow to the rudder.
+    """
+    mixed = len({card.model.kind == "mmg" for card in cards}) > 1
+    of_mmg = [mixed and isinstance(card, MmgCard) for card in cards]
+    cards = [linear_form(card, build(card)) if mixed and isinstance(card, MmgCard) else card for card in cards]
     reference = cards[0]
-    expansions = [expanded_as(card, reference) for card in cards]
+    expansions = [
+        _without_errors(found) if straight else found
+        for found, straight in zip((expanded_as(card, reference) for card in cards), of_mmg, strict=True)
+    ]
     rows = []
     for name in (*_RIGID_BODY, *ALL_TERMS, *_OF_MMG_ALONE):
         if not any(name in expansion.coefficients for expansion in expansions):
@@ -119,7 +131,22 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
             for expansion, expansion_row in zip(expansions[1:], found[1:], strict=True)
         )
         rows.append(CoefficientRow(name, found, differences))
-    return tuple(rows), tuple(note for expansion in expansions[1:] for note in expansion.notes)
+    notes = [note for expansion in expansions[1:] for note in expansion.notes]
+    if mixed:
+        notes.append(
+            "of MMG cards the linear terms on a straight course are compared, with propeller and rudder, the mean of "
+            "both sides of gamma_R; their standard errors are not known"
+        )
+    return tuple(rows), tuple(notes)
+
+
+def _without_errors(found: Expansion) -> Expansion:
+    """The same without standard errors of the velocity and rudder terms."""
+    coefficients = {
+        name: coefficient if name in (*_RIGID_BODY, *ACCELERATION_TERMS) else CardCoefficient(coefficient.value)
+        for name, coefficient in found.coefficients.items()
+    }
+    return replace(found, coefficients=coefficients)
 
 
 def _in_sign_of(reference: ManoeuvringCard, name: str, found: CardCoefficient | None) -> CardCoefficient:
@@ -186,7 +213,7 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     """The coefficients of a card in the speed, scaling and inertial convention of another."""
     ratio = _froude(reference) / _froude(card)
     linear = "linear" in (card.model.kind, reference.model.kind)
-    mmg = "mmg" in (card.model.kind, reference.model.kind)  # whose hull has no terms in the speed
+    mmg = card.model.kind == "mmg"  # whose hull has no terms in the speed
     if abs(ratio - 1) < _SAME_SPEED or linear or mmg:
         ratio = 1.0
     names, matrix, constant = _conversion(card, reference, ratio)
@@ -232,9 +259,6 @@ def _linear_names() -> tuple[str, ...]:
 
 def _refused(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float, linear: bool) -> dict[str, str]:
     found = {}
-    if (card.model.kind == "mmg") != (reference.model.kind == "mmg"):
-        # Without propeller and rudder in one of them, and X_vr, Y_r without added mass.
-        return {name: "of the bare hull in the MMG card alone" for name in ALL_TERMS if name not in ACCELERATION_TERMS}
     if linear:
         found = {name: "not in the linear model" for name in ALL_TERMS if name not in _linear_names()}
     if ratio != 1 and not (card.propulsion and reference.propulsion):

@@ -13,11 +13,13 @@ The two sides differ by their gamma_R: there is no single linear ship at beta_R 
 
 from __future__ import annotations
 
-from typing import Literal
+from dataclasses import fields
+from typing import Any, Literal
 
 import casadi as ca
 
-from tank2sim.cards.card import MmgCard
+from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS
 from tank2sim.dynamics.model import Model
 
 
@@ -65,3 +67,26 @@ def _cross_flow(card: MmgCard, side: Literal["plus", "minus"]) -> tuple[float, f
     # Of two rudders one always has the other side's.
     gamma = sum(both) / 2 if card.rudder.number == 2 else card.interaction(f"gamma_R_{side}")
     return gamma, gamma * card.interaction("l_R")
+
+
+def linear_form(card: MmgCard, model: Model) -> ManoeuvringCard:
+    """The ship as a linear card, for comparison: :func:`linear_equivalent`, mean of both sides, and its added masses.
+
+    It states no standard error of the velocity terms.
+
+    Parameters
+    ----------
+    card : MmgCard
+    model : Model
+        Of the card.
+    """
+    plus, minus = (linear_equivalent(card, model, side) for side in ("plus", "minus"))
+    derivatives = {name: 0.5 * (plus[name] + minus[name]) for name in plus}
+    derivatives |= {name: card.derivatives[name] for name in ACCELERATION_TERMS if name in card.derivatives}
+    own: dict[str, Any] = {field.name: getattr(card, field.name) for field in fields(ManoeuvringCard)}
+    own |= {
+        "model": card.model.model_copy(update={"kind": "linear"}),
+        "derivatives": derivatives,
+        "uncertainty": {name: error for name, error in card.uncertainty.items() if name in ACCELERATION_TERMS},
+    }
+    return ManoeuvringCard(**own)
