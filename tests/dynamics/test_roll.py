@@ -273,3 +273,30 @@ def test_terms_of_roll_are_found_in_trials_that_measured_heel(tmp_path: Path) ->
     found = t2s.identify(tmp_path / "start.toml", paths[1], holdout=paths[0]).card
     for name, value in true.items():
         assert abs(found.derivatives[name] - value) < 3 * found.uncertainty[name] < free[name], name
+
+
+@pytest.mark.slow
+def test_a_slow_gear_of_a_ship_that_rolls_is_found_and_nothing_where_nothing_is_missing(tmp_path: Path) -> None:
+    generator, paths = np.random.default_rng(4), {}
+    noise = {"u_mps": 0.02, "v_mps": 0.02, "r_degps": 0.01, "psi_deg": 0.1, "x_m": 0.5, "y_m": 0.5, "phi_deg": 0.05}
+    for kind, rate in (("slow", 1.5), ("right", 5.0)):
+        (tmp_path / f"{kind}.toml").write_text(TEXT.replace("max_rate_degps = 5.0", f"max_rate_degps = {rate}"))
+        ship, paths[kind] = t2s.load(tmp_path / f"{kind}.toml"), []
+        for name, run in (
+            ("turn", ship.turn(10, duration_s=300.0)),
+            ("zigzag", ship.zigzag(10, 10)),
+            ("other", ship.zigzag(-10, 10)),
+        ):
+            frame = run.df.iloc[::5].drop(columns="delta_deg")
+            for column, size in noise.items():
+                frame[column] += generator.normal(size=len(frame)) * size
+            paths[kind].append(tmp_path / f"{kind}_{name}.csv")
+            frame.to_csv(paths[kind][-1], index=False)
+    effects = ["rudder_rate_limit", "cross_flow_drag", "wind"]
+    found = t2s.find_gap("container", paths["slow"][:2], holdout=paths["slow"][2], effects=effects).to_dict()
+    named = {effect["name"]: effect for effect in found["effects"]}  # type: ignore[attr-defined]
+    assert set(named) == {"rudder_rate_limit"}
+    before, after = (found["misfit"][card]["holdout"] for card in ("before", "after"))  # type: ignore[index]
+    assert before > 4 and after < 0.4 * before
+    nothing = t2s.find_gap("container", paths["right"][:2], holdout=paths["right"][2], effects=effects).to_dict()
+    assert nothing["effects"] == []

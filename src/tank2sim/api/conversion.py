@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from tank2sim.analysis.conversion.conventions import Conventions, in_conventions
+from tank2sim.analysis.conversion.mmg_programs import mmgdynamics_text, shipmmg_text
 from tank2sim.analysis.conversion.polynomial_fit import (
     SCATTER,
     FigureChange,
@@ -18,7 +19,6 @@ from tank2sim.analysis.conversion.polynomial_fit import (
     scattered_motions,
 )
 from tank2sim.analysis.conversion.program_code import mss_function, pvs_class
-from tank2sim.analysis.conversion.shipmmg_parameters import shipmmg_text
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import ManoeuvringCard
@@ -32,11 +32,13 @@ LANGUAGES = {
     "abkowitz": "a card with a third-order polynomial",
     "mmg": "a card of the MMG method, in another scaling",
     "shipmmg": "a Python file with the parameters of shipmmg",
+    "mmgdynamics": "a Python file with a vessel of mmgdynamics",
     "mss": "a function for MATLAB or Octave, as the ships of MSS are",
     "pvs": "a Python file with a vehicle for the Python Vehicle Simulator",
 }
 """What a card can be converted to."""
 
+_OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
 _SCALINGS = ("prime", "prime_ii", "bis", "dimensional")
 
 
@@ -207,7 +209,7 @@ def convert(
     if abs(origin_m) > given.ship.length_m:
         raise InputError("--origin", f"{origin_m:g}", "is more than a length from midships", "give it in m")
     wanted = Conventions(scaling, rudder_sign, origin_m)
-    if to in ("shipmmg", "mss", "pvs"):
+    if to not in ("abkowitz", "mmg"):
         if not wanted.unchanged:
             raise InputError("--to", to, "has conventions of its own", "leave --scaling, --rudder-sign, --origin out")
         return _program(ship, given, to)
@@ -247,19 +249,17 @@ def _fitted(
 
 
 def _program(ship: Ship, card: ManoeuvringCard, to: str) -> ConversionResult:
-    if to == "shipmmg":
+    if to in _OF_MMG:
         if not isinstance(card, MmgCard):
-            raise card.fault(
-                "model.kind", f"is {card.model.kind}, and shipmmg is a program of the MMG method", "use mss"
-            )
+            raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
         notices = [
-            "shipmmg has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
+            f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
             "more tightly than the card"
         ]
         if card.effects:
             notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
         if card.ship.beam_m is None:
             notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
-        return ConversionResult(ship, to, ConvertedText(shipmmg_text(card)), tuple(notices))
+        return ConversionResult(ship, to, ConvertedText(_OF_MMG[to](card)), tuple(notices))
     write = mss_function if to == "mss" else pvs_class
     return ConversionResult(ship, to, ConvertedText(write(card, build(card))), ())

@@ -154,6 +154,8 @@ def run_gap_workflow(
     """
     options = options or GapOptions()
     given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
+    if card.roll is not None:
+        fitted, held = _without_heel(fitted), _without_heel(held)
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
         gap, trials = _search_once(card, (fitted, held), options, progress, pool)
@@ -169,6 +171,22 @@ def run_gap_workflow(
                 break
             gap, trials = combine_passes(gap, further), found_trials
         return replace(gap, notices=(*lowered_bound_notice(given, card), *gap.notices))
+
+
+def _without_heel(group: Measured) -> Measured:
+    """Trials of a ship that rolls, without the heel that they measured.
+
+    Roll follows from the measured motion, whose errors excite it; the filter corrects the motion alone, and heel would
+    show an oscillation that is not the ship's.
+    """
+    if not any("phi_rad" in trial.signals for trial in group.trials):
+        return group
+    trials = tuple(
+        replace(trial, signals={name: values for name, values in trial.signals.items() if name != "phi_rad"})
+        for trial in group.trials
+    )
+    notice = "heel is computed and not compared: only what it changes of the motion in the plane is seen"
+    return replace(group, trials=trials, notices=(*group.notices, notice))
 
 
 def _search_once(

@@ -295,7 +295,7 @@ def test_shipmmg_sails_the_same_path_where_it_has_the_same_equations() -> None:
         assert values == pytest.approx(np.interp(t, run.t_s, run[name]), abs=0.02)
 
 
-def test_shipmmg_parameters_are_in_its_units() -> None:
+def test_mmg_programs_are_in_its_units() -> None:
     scope = {"Mmg3DofBasicParams": dict, "Mmg3DofManeuveringParams": dict}
     text = t2s.convert("kvlcc2-l7-mmg", to="shipmmg").text
     exec(compile(text.replace("from shipmmg.mmg_3dof import", "# "), "parameters.py", "exec"), scope)
@@ -309,6 +309,62 @@ def test_shipmmg_parameters_are_in_its_units() -> None:
     assert len(hull) == 20
 
 
+def test_a_vessel_of_mmgdynamics_has_the_forces_of_the_method(tmp_path: Path) -> None:
+    """Its keys, in its units, put into its formulas: hull, thrust and rudder in a turn, without drift at the screw."""
+    text = (
+        TEXT.replace("C_1 = 2.0", "C_1 = 0.0")
+        .replace("x_G = 0.0357143", "x_G = 0.0")
+        .replace("0.0185045", "0.01813444")
+    )
+    ship = mmg_ship(text.replace("w_P0 = 0.40", "w_P0 = 0.0"))
+    scope: dict[str, object] = {}
+    exec(compile(t2s.convert(ship, to="mmgdynamics").text, "vessel.py", "exec"), scope)
+    p = scope["vessel"]
+    assert isinstance(p, dict) and p["m"] == pytest.approx(3270, rel=1e-5) and p["x_P"] == pytest.approx(-3.36)
+    u, v, r, delta, n = 1.0, -0.2, 0.05, 0.3, scope["nps"]
+    U, J = math.hypot(u, v), u / (n * p["D_p"])  # type: ignore[operator]
+    K_T = p["k_0"] + p["k_1"] * J + p["k_2"] * J**2
+    beta_R = math.atan2(-v, u) - p["l_R"] * r * p["Lpp"] / U
+    race = 1 + p["kappa"] * (math.sqrt(1 + 8 * K_T / (math.pi * J**2)) - 1)
+    u_R = u * p["epsilon"] * math.sqrt(p["eta"] * race**2 + 1 - p["eta"])
+    v_R = U * p["gamma_R_plus"] * beta_R
+    area = 0.5 * p["A_R"] * p["rho"] * p["f_alpha"]
+    F_N = area * (u_R**2 + v_R**2) * math.sin(delta - math.atan2(v_R, u_R))
+    v_, r_ = v / U, r * p["Lpp"] / U
+    hull = sum(
+        p[f"N_{term}_dash"] * v_ ** term.count("v") * r_ ** term.count("r") for term in "v r vvv vvr vrr rrr".split()
+    )
+    N = 0.5 * p["rho"] * p["Lpp"] ** 2 * p["d"] * U**2 * hull
+    N -= (-p["Lpp"] / 2 + p["a_H"] * p["x_H_dash"] * p["Lpp"]) * F_N * math.cos(delta)
+    inertia = p["I_zG"] + p["J_z_dash"] * 0.5 * p["rho"] * p["Lpp"] ** 4 * p["d"]
+    model = ship.model
+    states = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": delta}
+    x = [states.get(name, 0.0) for name in model.state_names]
+    rates = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
+    assert rates[model.state_names.index("motion.r")] == pytest.approx(N / inertia, rel=1e-4)
+
+
+def test_mmgdynamics_has_the_rates_of_the_model_where_it_has_the_same_equations() -> None:
+    """Where it is installed (it is on no package index): without wake and with G midship."""
+    mmgdynamics = pytest.importorskip("mmgdynamics.dynamics")
+    text = (
+        TEXT.replace("C_1 = 2.0", "C_1 = 0.0")
+        .replace("x_G = 0.0357143", "x_G = 0.0")
+        .replace("0.0185045", "0.01813444")
+    )
+    ship = mmg_ship(text.replace("w_P0 = 0.40", "w_P0 = 0.0"))
+    scope: dict[str, object] = {}
+    exec(compile(t2s.convert(ship, to="mmgdynamics").text, "vessel.py", "exec"), scope)
+    motion = np.array([1.0, -0.2, 0.05, 0.3, scope["nps"]])
+    rates = mmgdynamics.mmg_dynamics(0.0, motion, scope["vessel"], 0.0, None, None, scope["nps"], 0.3)
+    model = ship.model
+    states = {"motion.u": 1.0, "motion.v": -0.2, "motion.r": 0.05, "rudder.angle": 0.3}
+    x = [states.get(name, 0.0) for name in model.state_names]
+    expected = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
+    for place, name in enumerate(("motion.u", "motion.v", "motion.r")):
+        assert rates[place] == pytest.approx(expected[model.state_names.index(name)], rel=1e-4)
+
+
 # -- refusals ------------------------------------------------------------------------------------------------------
 
 
@@ -317,6 +373,8 @@ def test_shipmmg_parameters_are_in_its_units() -> None:
     [
         ("mariner", {"to": "mmg"}, ["model.kind", "cannot be split"]),
         ("mariner", {"to": "shipmmg"}, ["model.kind"]),
+        ("mariner", {"to": "mmgdynamics"}, ["model.kind"]),
+        ("container", {"to": "mmgdynamics"}, ["roll"]),
         ("mariner", {"to": "abkowits"}, ["--to", "abkowitz"]),
         ("mariner", {"scaling": "bis"}, ["ship.displacement_kg", "bis"]),
         ("mariner", {"scaling": "imperial"}, ["--scaling"]),

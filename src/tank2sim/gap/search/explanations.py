@@ -173,8 +173,10 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
             for thetas in sets
         ]
     )
+    if most == 1 or not fitting.has(1):
+        return
     best = fitting.best(1)
-    if most > 1 and best.hypothesis.each and best.score < fitting.best(2).score + _FAR:
+    if best.hypothesis.each and (not fitting.has(2) or best.score < fitting.best(2).score + _FAR):
         fitting.fit(
             [
                 Proposal(proposed.thetas, [best.logs], ROUNDS, best.score + _FAR, each=best.hypothesis.each)

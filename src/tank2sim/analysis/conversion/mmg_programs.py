@@ -1,0 +1,203 @@
+"""The parameters of other MMG programs for an MMG card, as a Python file: shipmmg and mmgdynamics.
+
+shipmmg (https://pypi.org/project/shipmmg): its wake is w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and its U and beta
+are of v - x_G r. mmgdynamics (https://github.com/nikpau/mmgdynamics): the same; its wake with C_1, C_2 lacks a bracket,
+which leaves (3 - C_2)(1 - w_P0) straight ahead, so that they are not given to it; its rudder is at -L/2. The files hold
+what they can.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tank2sim.cards.card import MmgCard
+from tank2sim.dynamics.mmg.hull import HULL_TERMS
+
+
+def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
+    """Keyword arguments of ``Mmg3DofBasicParams`` and ``Mmg3DofManeuveringParams``.
+
+    Raises
+    ------
+    InputError
+        The ship has two propellers, or an asymmetric hull (Y0, N0).
+    """
+    _refuse_what_others_lack(card, "shipmmg")
+    length, scales, body = card.ship.length_m, card.scales, card.rigid_body
+    mass = body.mass * scales.mass
+    known = card.derivatives
+    basic = {
+        "L_pp": length,
+        "B": card.ship.beam_m if card.ship.beam_m is not None else math.nan,
+        "d": card.ship.draught_m,
+        "x_G": body.x_G * length,
+        "D_p": card.ship.propeller_diameter_m,
+        "m": mass,
+        "I_zG": (body.yaw_inertia - body.mass * body.x_G**2) * scales.inertia,
+        "A_R": card.ship.rudder_area_m2,
+        "η": card.ship.propeller_diameter_m / card.rudder.height_m,
+        "m_x": -known.get("Xudot", 0.0) * scales.mass,
+        "m_y": -known.get("Yvdot", 0.0) * scales.mass,
+        "J_z": -known.get("Nrdot", 0.0) * scales.inertia,
+        "f_α": card.interaction("f_alpha"),
+        "ϵ": card.rudder.eps,
+        "t_R": card.rudder.t_R,
+        "x_R": card.rudder.x_R * length,
+        "a_H": card.rudder.a_H,
+        "x_H": card.rudder.x_H * length,
+        "γ_R_minus": card.interaction("gamma_R_minus"),
+        "γ_R_plus": card.interaction("gamma_R_plus"),
+        "l_R": card.interaction("l_R"),
+        "κ": card.rudder.kappa,
+        "t_P": card.propeller.t_P,
+        "w_P0": card.propeller.w_P0,
+        "x_P": card.propeller.x_P,
+    }
+    hull = _hull_in_prime_ii(card)
+    return {key: float(value) for key, value in basic.items()}, {key: float(value) for key, value in hull.items()}
+
+
+def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
+    """The dictionary of a vessel of mmgdynamics: SI, and Prime II where a name ends in ``_dash``.
+
+    Its moment of the rudder is (-L/2 + a_H x_H) F_N cos(delta): x_H is such that the sum is that of the card.
+
+    Parameters
+    ----------
+    card : MmgCard
+
+    Raises
+    ------
+    InputError
+        As :func:`shipmmg_values`, or the card has no beam, or x_R is not -0.5 and a_H is 0.
+    """
+    _refuse_what_others_lack(card, "mmgdynamics")
+    ship, rudder, length, scales = card.ship, card.rudder, card.ship.length_m, card.scales
+    if ship.beam_m is None:
+        raise card.fault("ship.beam_m", "is missing, and mmgdynamics needs it", "add it")
+    arm = rudder.x_R + rudder.a_H * rudder.x_H
+    if not rudder.a_H and rudder.x_R != -0.5:
+        raise card.fault("rudder.x_R", f"is {rudder.x_R:g}, and mmgdynamics has -0.5", "convert it --to mss or pvs")
+    mass = card.rigid_body.mass * scales.mass
+    ratio = length / ship.draught_m
+    added = {name: -card.derivatives.get(name, 0.0) * ratio for name in ("Xudot", "Yvdot", "Nrdot")}
+    values = {
+        "rho": card.environment.water_density_kgpm3,
+        "C_b": mass / card.environment.water_density_kgpm3 / (length * ship.beam_m * ship.draught_m),
+        "Lpp": length,
+        "B": ship.beam_m,
+        "d": ship.draught_m,
+        "m": mass,
+        "x_G": card.rigid_body.x_G * length,
+        "I_zG": (card.rigid_body.yaw_inertia - card.rigid_body.mass * card.rigid_body.x_G**2) * scales.inertia,
+        "D_p": ship.propeller_diameter_m,
+        "x_P": card.propeller.x_P * length,
+        "w_P0": card.propeller.w_P0,
+        "t_P": card.propeller.t_P,
+        "A_R": ship.rudder_area_m2,
+        "eta": ship.propeller_diameter_m / rudder.height_m,
+        "f_alpha": card.interaction("f_alpha"),
+        "epsilon": rudder.eps,
+        "kappa": rudder.kappa,
+        "t_R": rudder.t_R,
+        "a_H": rudder.a_H,
+        "x_H_dash": (arm + 0.5) / rudder.a_H if rudder.a_H else rudder.x_H,
+        "l_R": card.interaction("l_R"),
+        "gamma_R_plus": card.interaction("gamma_R_plus"),
+        "gamma_R_minus": card.interaction("gamma_R_minus"),
+        "m_x_dash": added["Xudot"],
+        "m_y_dash": added["Yvdot"],
+        "J_z_dash": added["Nrdot"],
+        **_hull_in_prime_ii(card),
+    }
+    return {key: float(value) for key, value in values.items()}
+
+
+def _refuse_what_others_lack(card: MmgCard, program: str) -> None:
+    """Raise InputError if the ship has two propellers, an asymmetric hull (Y0, N0), rolls, or has other forms."""
+    remedy = "convert it --to mss or pvs"
+    if card.propeller.number != 1:
+        raise card.fault("propeller.number", f"is 2, and {program} has one propeller", remedy)
+    if card.roll is not None:
+        raise card.fault("roll", f"is given, and the ships of {program} do not roll", remedy)
+    for key, place in card.interaction_places().items():
+        if key in ("tau", "eta", "C_Rv"):
+            raise card.fault(place, f"is no coefficient of {program}", remedy)
+    for name in ("Y0", "N0", "Yrdot", "Nvdot"):
+        if card.derivatives.get(name):
+            raise card.fault(f"derivatives.{name}", f"is no coefficient of {program}", "leave it out")
+
+
+def _hull_in_prime_ii(card: MmgCard) -> dict[str, float]:
+    """``k_0`` to ``k_2``, ``R_0_dash``, ``Y_v_dash`` and so on."""
+    ratio = card.ship.length_m / card.ship.draught_m
+    hull = {key: card.interaction(key) for key in ("k_0", "k_1", "k_2")}
+    hull["R_0_dash"] = -card.derivatives.get("X0", 0.0) * ratio
+    for force, names in HULL_TERMS.items():
+        for name in names:
+            if not name.endswith("0"):
+                hull[f"{force}_{name[1:]}_dash"] = card.derivatives.get(name, 0.0) * ratio
+    return hull
+
+
+def mmgdynamics_text(card: MmgCard) -> str:
+    """A Python file with the dictionary ``vessel``, and ``u0``, ``nps``, of a card.
+
+    Parameters
+    ----------
+    card : MmgCard
+
+    Raises
+    ------
+    InputError
+        As :func:`mmgdynamics_values`.
+    """
+    entries = "".join(f'    "{key}": {_number_text(value)},\n' for key, value in mmgdynamics_values(card).items())
+    n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
+    title = f"{card.ship.name}: a vessel of mmgdynamics, written by tank2sim convert."
+    return (
+        f'"""{_plain(title)}\n\n'
+        "SI, and Prime II where a name ends in _dash; rudder positive to starboard. C_1 and C_2 of the wake are left\n"
+        "out: the wake is w_P0 exp(-4 beta_P^2), as in shipmmg.\n"
+        f'Source of the coefficients: {_plain(card.ship.source)}\n"""\n\n'
+        f"u0 = {card.model.speed_mps!r}  # m/s, the approach\n"
+        f"nps = {n!r}  # 1/s, revolutions of the approach\n\n"
+        f"vessel = {{\n{entries}}}\n"
+    )
+
+
+def shipmmg_text(card: MmgCard) -> str:
+    """A Python file that makes ``basic_params``, ``maneuvering_params``, ``u0``, ``nps``, ``rho`` of a card.
+
+    Raises
+    ------
+    InputError
+        As :func:`shipmmg_values`.
+    """
+    basic, hull = shipmmg_values(card)
+
+    def call(values: dict[str, float]) -> str:
+        return "".join(f"    {key}={_number_text(value)},\n" for key, value in values.items())
+
+    n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
+    title = f"{card.ship.name}: parameters for shipmmg, written by tank2sim convert."
+    return (
+        f'"""{_plain(title)}\n\n'
+        "SI; rudder positive to starboard. shipmmg has another wake than the card: w_P0 exp(-4 beta_P^2), no C_1\n"
+        f'and C_2. Source of the coefficients: {_plain(card.ship.source)}\n"""\n\n'
+        "from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams\n\n"
+        f"u0 = {card.model.speed_mps!r}  # m/s, the approach\n"
+        f"nps = {n!r}  # 1/s, revolutions of the approach\n"
+        f"rho = {card.environment.water_density_kgpm3!r}  # kg/m3\n\n"
+        f"basic_params = Mmg3DofBasicParams(\n{call(basic)})\n\n"
+        f"maneuvering_params = Mmg3DofManeuveringParams(\n{call(hull)})\n"
+    )
+
+
+def _number_text(value: float) -> str:
+    return 'float("nan")' if math.isnan(value) else repr(value)
+
+
+def _plain(text: str) -> str:
+    """Text that ends no string and opens no escape."""
+    return text.replace("\\", "/").replace('"', "'").replace("\n", " ")
