@@ -51,6 +51,18 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 }
 """Signals with bands over time, to their variable and the factor to their unit."""
 
+
+def signals_with_bands(model: Model) -> Mapping[str, tuple[str, float]]:
+    """:data:`ENSEMBLE_SIGNALS`, and ``phi_deg`` of a ship that heels.
+
+    Parameters
+    ----------
+    model : Model
+    """
+    heel = {"phi_deg": ("motion.phi", math.degrees(1.0))} if "motion.phi" in model else {}
+    return {**ENSEMBLE_SIGNALS, **heel}
+
+
 EVERY = 10
 """Steps between two kept samples: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
@@ -86,7 +98,7 @@ class ShipText:
 
 @dataclass(frozen=True, eq=False)
 class OfManoeuvre:
-    """Figures of a manoeuvre, and :data:`ENSEMBLE_SIGNALS` at `times` (n,), s."""
+    """Figures of a manoeuvre, and :func:`signals_with_bands` at `times` (n,), s."""
 
     ship: ShipText
     manoeuvre: Manoeuvre
@@ -101,7 +113,7 @@ class OfManoeuvre:
     def prepared(self) -> Ask | AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = study_model(self.ship.card())
-        signals = {name for name, _ in ENSEMBLE_SIGNALS.values()}
+        signals = {name for name, _ in signals_with_bands(model).values()}
         lanes = _lanes_of(model) if runs_in_lanes(self.manoeuvre) and signals <= set(model.state_names) else None
         if lanes is not None:
             return AskTogether(self._in_lanes(model, lanes))
@@ -126,8 +138,9 @@ class OfManoeuvre:
     def _in_lanes(self, model: Model, lanes: LaneManoeuvres) -> Callable[[int, Mapping[str, Array], bool], BatchResult]:
         """Joint runs of the members of a batch."""
         assert isinstance(self.manoeuvre, Turn | Zigzag)
-        manoeuvre, rows = self.manoeuvre, [model.state_names.index(name) for name, _ in ENSEMBLE_SIGNALS.values()]
-        factors = np.array([factor for _, factor in ENSEMBLE_SIGNALS.values()])
+        signals = signals_with_bands(model).values()
+        manoeuvre, rows = self.manoeuvre, [model.state_names.index(name) for name, _ in signals]
+        factors = np.array([factor for _, factor in signals])
 
         def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
             p, troubles = _ships(model, count, values)
@@ -307,10 +320,11 @@ def _parameters(model: Model) -> dict[str, float]:
 
 def _reading_off(model: Model, *names: str) -> Model:
     states = set(model.state_names)
-    wanted = [*names, "motion.speed", *(name for name, _ in ENSEMBLE_SIGNALS.values())]
+    wanted = [*names, "motion.speed", *(name for name, _ in signals_with_bands(model).values())]
     return replace(model, outputs=tuple(dict.fromkeys(name for name in wanted if name not in states)))
 
 
 def _sampled(run: Trajectory, times: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    rows = [factor * np.interp(times, run.t, run[name], right=np.nan) for name, factor in ENSEMBLE_SIGNALS.values()]
+    signals = signals_with_bands(run.model).values()
+    rows = [factor * np.interp(times, run.t, run[name], right=np.nan) for name, factor in signals]
     return np.array(rows, dtype=np.float32)

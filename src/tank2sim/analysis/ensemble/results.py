@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.questions import OfCriteria, OfFigures, OfManoeuvre, ShipText, signals_with_bands
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
@@ -177,7 +177,7 @@ def manoeuvre_bands(
     found = ensemble(question, draws, request.members, executor)
     if request.members > KEPT:
         notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
-    shown, histories, track = history_bands(found, times, tuple(ENSEMBLE_SIGNALS))
+    shown, histories, track = history_bands(found, times, tuple(signals_with_bands(build(card))))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")

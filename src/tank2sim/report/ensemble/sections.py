@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS
+from tank2sim.analysis.ensemble.questions import signals_with_bands
 from tank2sim.analysis.ensemble.results import ManoeuvreBands
 from tank2sim.report.ensemble.charts import curve_charts
 from tank2sim.report.kit.charts import History, TrackData, history_chart, track_chart
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
-from tank2sim.report.kit.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
+from tank2sim.report.kit.run_series import history_of, shown_signals, signals_of, track_data
 from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
 from tank2sim.simulation.bands import small_edge_first
 from tank2sim.simulation.trajectory import Trajectory
@@ -47,15 +47,15 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
         ]
     track = track_chart(tracks, title=label)
     track.usermeta = alt.Undefined  # only a chart by itself may carry it
-    names = {variable: (name, factor) for name, (variable, factor) in ENSEMBLE_SIGNALS.items()}
-    histories = [history_of(label, run, SHIP_SIGNALS)]
+    names = {variable: (name, factor) for name, (variable, factor) in signals_with_bands(run.model).items()}
+    shown = shown_signals(run.model)
+    histories = [history_of(label, run, shown)]
     for quantile, name in ((LOW, "low"), (MIDDLE, "median"), (HIGH, "high")):
         quantile_values = {
-            variable: getattr(bands.histories[names[variable][0]], name) / names[variable][1]
-            for variable in SHIP_SIGNALS
+            variable: getattr(bands.histories[names[variable][0]], name) / names[variable][1] for variable in shown
         }
         histories.append(History(label=quantile, time_s=bands.times_s, values=quantile_values))
-    return alt.vconcat(track, history_chart(histories, signals_of(run.model, SHIP_SIGNALS)))
+    return alt.vconcat(track, history_chart(histories, signals_of(run.model, shown)))
 
 
 def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> PageSection:
