@@ -129,6 +129,7 @@ class ConventionResult(Result):
                 }
                 for entry in self.readings
             ],
+            "assumed": list(self.table.assumed),
             "notices": list(self.notices),
         }
 
@@ -188,6 +189,9 @@ class ConventionResult(Result):
 
     def _notices(self) -> tuple[str, ...]:
         first, found = self.readings[0], []
+        if self.table.assumed:
+            sizes = ", ".join(f"{key} = {getattr(self.table, key):.4g}" for key in self.table.assumed)
+            found.append(f"ASSUMED, for the table does not have them: {sizes}")
         if first.against:
             found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
         if len(self.readings) > 1 and self.alike(first, self.readings[1]) and first.probability < SURE_READING:
@@ -204,8 +208,8 @@ def convention(table: str | Path) -> ConventionResult:
     ----------
     table : str or path
         ``.toml`` like a ship card, in which conventions may be missing, or rows ``name,value`` with ``length_m``,
-        ``beam_m``, ``draught_m``, ``displacement_kg`` (or ``block_coefficient``), ``speed_mps``, at least Yv, Yr, Nv,
-        Nr, and what else there is (``mass``, ``yaw_inertia``, ``centre_of_gravity_m`` forward of midships).
+        ``speed_mps``, at least Yv, Yr, Nv, Nr, and what else there is (``beam_m``, ``draught_m``, ``displacement_kg``
+        or ``block_coefficient``, ``mass``, ``yaw_inertia``, ``centre_of_gravity_m`` forward of midships).
 
     Raises
     ------

@@ -708,6 +708,7 @@ class ConventionKeys(_Keys):
 
     source: str
     stated: dict[str, str]
+    assumed: list[str]
     readings: list[ReadingKeys]
     notices: list[str]
 

@@ -45,6 +45,10 @@ _SIZES = {
 }
 """Known sizes of a ship and their bounds: wider than any ship or model of one."""
 
+_LENGTH_TO_BEAM, _BEAM_TO_DRAUGHT, _BLOCK = 6.5, 2.7, 0.7
+"""Of an ordinary merchant ship, where a table has no beam, draught or displacement. Project choices: the bundled ships
+have 5.5 to 6.9, 2.4 to 3.1 and 0.56 to 0.83."""
+
 _BODY = {"mass": "mass", "m": "mass", "xG": "x_G"}
 _BODY |= dict.fromkeys(("yawinertia", "Iz", "Izz", "Jzz"), "yaw_inertia")
 _PRINTED = re.compile(r"[\s_'′{}$\\^]")
@@ -74,6 +78,8 @@ class CoefficientTable:
         Forward of midships.
     rudder_area_m2 : float, optional
     environment : Environment
+    assumed : tuple of str
+        Sizes that the file does not have: those of an ordinary ship of its length.
     """
 
     source: str
@@ -88,6 +94,7 @@ class CoefficientTable:
     centre_of_gravity_m: float | None = None
     rudder_area_m2: float | None = None
     environment: Environment = field(default_factory=Environment)
+    assumed: tuple[str, ...] = ()
 
     @property
     def block(self) -> float:
@@ -154,15 +161,18 @@ def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, s
         low, high = _SIZES[key]
         if not low <= value <= high:
             raise InputError(source, key, f"is {value:g}", f"{low:g} to {high:g} was expected")
-    for key in ("length_m", "beam_m", "draught_m", "speed_mps"):
+    for key in ("length_m", "speed_mps"):
         if key not in sizes:
-            raise InputError(source, key, "is missing", "give length_m, beam_m, draught_m and speed_mps")
+            raise InputError(source, key, "is missing", "give length_m and speed_mps, and beam_m, draught_m if known")
+    assumed = tuple(key for key in ("beam_m", "draught_m") if key not in sizes)
+    sizes.setdefault("beam_m", sizes["length_m"] / _LENGTH_TO_BEAM)
+    sizes.setdefault("draught_m", sizes["beam_m"] / _BEAM_TO_DRAUGHT)
     density = sizes.pop("water_density_kgpm3", None)
     water = Environment() if density is None else Environment(water_density_kgpm3=density)
     block = sizes.pop("block_coefficient", None)
     if "displacement_kg" not in sizes:
         if block is None:
-            raise InputError(source, "displacement_kg", "is missing", "give it, or block_coefficient")
+            block, assumed = _BLOCK, (*assumed, "displacement_kg")
         volume = block * sizes["length_m"] * sizes["beam_m"] * sizes["draught_m"]
         sizes["displacement_kg"] = volume * water.water_density_kgpm3
     derivatives: dict[str, float] = {}
@@ -176,7 +186,13 @@ def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, s
         raise InputError(source, section.rstrip("."), f"lacks {', '.join(missing)}", "give at least Yv Yr Nv Nr")
     body = {key: _number(stated[key], key, source) for key in dict.fromkeys(_BODY.values()) if key in stated}
     table = CoefficientTable(
-        source=source, derivatives=derivatives, body=body, conventions=conventions, environment=water, **sizes
+        source=source,
+        derivatives=derivatives,
+        body=body,
+        conventions=conventions,
+        environment=water,
+        assumed=assumed,
+        **sizes,
     )
     if not 0.2 <= table.block <= 1.0:
         problem = f"is that of a block coefficient of {table.block:.3g}"

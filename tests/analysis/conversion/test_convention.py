@@ -134,6 +134,15 @@ def test_the_card_of_the_first_reading_is_the_published_ship(tmp_path: Path) -> 
     assert turns[1] == pytest.approx(turns[0], rel=0.02)
 
 
+def test_sizes_that_a_table_lacks_are_assumed_and_said_so(tmp_path: Path) -> None:
+    lines = [line for line in S175.splitlines() if not line.startswith(("beam_m", "draught_m", "displacement_kg"))]
+    found = t2s.convention(written(tmp_path, "\n".join(lines)))
+    assert found.to_dict()["assumed"] == ["beam_m", "draught_m", "displacement_kg"]
+    assert any(notice.startswith("ASSUMED") for notice in found.notices)
+    first = found.readings[0].reading
+    assert (first.rudder_sign, first.scaling, first.yaw_rate_terms) == ("starboard", "prime", "total")
+
+
 def test_where_the_numbers_do_not_settle_the_origin_it_is_said_so(tmp_path: Path) -> None:
     found = t2s.convention(written(tmp_path, S175 + "centre_of_gravity_m,-3\n"))
     assert 0.5 < found.readings[0].probability < 0.9

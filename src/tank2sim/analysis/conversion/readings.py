@@ -47,6 +47,9 @@ PRIOR: Mapping[str, Mapping[str, float]] = {
 _TAIL = 4.0
 _MASS_ERROR = 0.05
 """Relative difference of a printed mass from the displacement: rounded dimensions. Project choice."""
+_ASSUMED_ERRORS, _ASSUMED_MASS_ERROR = 2.0, 0.3
+"""Factor on the errors of estimates where beam or draught are assumed, and relative error of a mass by assumed sizes.
+Project choices: (T/L)^2 of ships varies by a factor of two either way."""
 _CENTRE_ERROR = 0.02
 """Standard deviation of x_G over L among ships. Project choice: 0.035 is the most of those bundled."""
 _P_MEDIAN, _P_SPREAD = 0.35, 0.5
@@ -273,6 +276,8 @@ def _weigh_coefficients(found: _Evidence, table: CoefficientTable, reading: Read
         if name not in table.derivatives:
             continue
         value, error = ship.derivatives.get(name, 0.0), about.standard_error
+        if {"beam_m", "draught_m"} & set(table.assumed):
+            error *= _ASSUMED_ERRORS
         factor = abs(file_factor(known_term(name), scales, rudder_to_port=False))
         z = (value - about.value) / error
         words = f"{name} = {value:.3g}, {abs(z):.0f} standard errors from {about.source.partition(',')[0]}"
@@ -280,7 +285,7 @@ def _weigh_coefficients(found: _Evidence, table: CoefficientTable, reading: Read
         found.total -= math.log(error * factor)
     of_length = scales.length if scales else 1.0
     if table.body.get("mass", 0.0) > 0:
-        z = math.log(ship.body.mass / _mass(table)) / _MASS_ERROR
+        z = math.log(ship.body.mass / _mass(table)) / (_ASSUMED_MASS_ERROR if table.assumed else _MASS_ERROR)
         found.add(_log_density(z), _log_density(0), f"mass {ship.body.mass / _mass(table):.3g} times the displacement")
     if table.body.get("yaw_inertia", 0.0) > 0:
         radius = math.sqrt(max(ship.body.yaw_inertia / ship.body.mass, 1e-12))
