@@ -13,6 +13,7 @@ from tank2sim.analysis.conversion.readings import (
     possible_readings,
     read_as,
     read_card_text,
+    scaled_with_nominal_speed,
     weigh,
     with_diameter,
     with_probabilities,
@@ -130,6 +131,7 @@ class ConventionResult(Result):
                 for entry in self.readings
             ],
             "assumed": list(self.table.assumed),
+            "scaled_with_nominal_speed": scaled_with_nominal_speed(self.table),
             "notices": list(self.notices),
         }
 
@@ -194,6 +196,13 @@ class ConventionResult(Result):
             found.append(f"ASSUMED, for the table does not have them: {sizes}")
         if first.against:
             found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
+        if scaled_with_nominal_speed(self.table):
+            found.append(
+                "terms by Du' are those of forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
+                'speed_scale = "nominal", by which speed counts once'
+            )
+            if self.table.speed_scale == "instantaneous":
+                found.append('the file states speed_scale = "instantaneous", by which speed counts twice')
         if len(self.readings) > 1 and self.alike(first, self.readings[1]) and first.probability < SURE_READING:
             found.append("the first two readings are one ship in practice: their figures differ by less than 5 %")
         if first.ship.vanished:

@@ -709,6 +709,7 @@ class ConventionKeys(_Keys):
     source: str
     stated: dict[str, str]
     assumed: list[str]
+    scaled_with_nominal_speed: bool | None
     readings: list[ReadingKeys]
     notices: list[str]
 

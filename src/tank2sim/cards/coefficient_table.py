@@ -78,6 +78,8 @@ class CoefficientTable:
         Forward of midships.
     rudder_area_m2 : float, optional
     environment : Environment
+    speed_scale : str, optional
+        As the file states it: ``instantaneous`` or ``nominal``.
     assumed : tuple of str
         Sizes that the file does not have: those of an ordinary ship of its length.
     """
@@ -95,6 +97,7 @@ class CoefficientTable:
     rudder_area_m2: float | None = None
     environment: Environment = field(default_factory=Environment)
     assumed: tuple[str, ...] = ()
+    speed_scale: str | None = None
 
     @property
     def block(self) -> float:
@@ -125,7 +128,7 @@ def _of_toml(text: str, source: str) -> CoefficientTable:
         if not isinstance(sections[name], dict):
             raise InputError(source, name, "is not a section", f"write [{name}]")
     stated: dict[str, Any] = {}
-    places = (("ship", _SIZES), ("environment", _SIZES), ("model", ("speed_mps", *STATED_CONVENTIONS)))
+    places = (("ship", _SIZES), ("environment", _SIZES), ("model", ("speed_mps", "speed_scale", *STATED_CONVENTIONS)))
     for name, keys in places:
         stated |= {key: value for key, value in sections[name].items() if key in keys}
     stated |= {_BODY[_plain(key)]: value for key, value in sections["rigid_body"].items() if _plain(key) in _BODY}
@@ -144,18 +147,20 @@ def _of_rows(text: str, source: str) -> CoefficientTable:
         if name.lower() in ("name", "coefficient", "derivative"):
             continue
         name = _BODY.get(_plain(name), name)
-        into = stated if name in _SIZES or name in STATED_CONVENTIONS or name in _BODY.values() else derivatives
+        of_words = name in STATED_CONVENTIONS or name == "speed_scale"
+        into = stated if name in _SIZES or of_words or name in _BODY.values() else derivatives
         if name in into:
             raise InputError(source, name, "is given twice", "give each number once")
-        into[name] = written if name in STATED_CONVENTIONS else _number(written, name, source)
+        into[name] = written if of_words else _number(written, name, source)
     return _table(stated, derivatives, source, "")
 
 
 def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, section: str) -> CoefficientTable:
+    known = {**STATED_CONVENTIONS, "speed_scale": ("instantaneous", "nominal")}
+    for key, choices in known.items():
+        if key in stated and stated[key] not in choices:
+            raise InputError(source, key, f"is {stated[key]!r}", close_name(str(stated[key]), choices))
     conventions = {key: value for key, value in stated.items() if key in STATED_CONVENTIONS}
-    for key, value in conventions.items():
-        if value not in STATED_CONVENTIONS[key]:
-            raise InputError(source, key, f"is {value!r}", close_name(str(value), STATED_CONVENTIONS[key]))
     sizes = {key: _number(stated[key], key, source) for key in _SIZES if key in stated}
     for key, value in sizes.items():
         low, high = _SIZES[key]
@@ -192,6 +197,7 @@ def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, s
         conventions=conventions,
         environment=water,
         assumed=assumed,
+        speed_scale=stated.get("speed_scale"),
         **sizes,
     )
     if not 0.2 <= table.block <= 1.0:

@@ -134,6 +134,19 @@ def test_the_card_of_the_first_reading_is_the_published_ship(tmp_path: Path) -> 
     assert turns[1] == pytest.approx(turns[0], rel=0.02)
 
 
+def test_the_speed_of_the_scaling_shows_in_the_terms_by_speed(tmp_path: Path) -> None:
+    """The Mariner's Yvu = Yv, Ydu = 2 Yd are those of u v and u^2 delta scaled with u0; those of a fit are not."""
+    found = t2s.convention(mariner_without(tmp_path, "speed_scale", "scaling"))
+    assert found.to_dict()["scaled_with_nominal_speed"] is True
+    assert found.ship.card.model.speed_scale == "nominal"  # type: ignore[union-attr]
+    as_stated = t2s.load("mariner", {"model.speed_scale": "nominal"}).turn(35).figures["tactical_diameter_lengths"]
+    assert found.ship.turn(35).figures["tactical_diameter_lengths"] == pytest.approx(as_stated, rel=0.02)
+    assert 4.8 < as_stated < 5.1  # scaled with the speed at any time it is 6.4
+    t2s.convert("kvlcc2-l7-mmg").save(tmp_path / "fit.toml")  # scaled with the speed at any time
+    assert t2s.convention(tmp_path / "fit.toml").to_dict()["scaled_with_nominal_speed"] is False
+    assert t2s.convention(written(tmp_path, S175)).to_dict()["scaled_with_nominal_speed"] is None
+
+
 def test_sizes_that_a_table_lacks_are_assumed_and_said_so(tmp_path: Path) -> None:
     lines = [line for line in S175.splitlines() if not line.startswith(("beam_m", "draught_m", "displacement_kg"))]
     found = t2s.convention(written(tmp_path, "\n".join(lines)))

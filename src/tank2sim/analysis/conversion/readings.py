@@ -11,6 +11,9 @@ inertia and with the rudder to starboard. Its weight is p(reading) p(t | reading
 - where the table has surge too, the tactical diameter at 35 deg;
 - a term that a reading makes vanish to the printed digits: a wrong one does so only by chance.
 
+By which speed the numbers are scaled, that of the ship at any time or u0, is no part of a reading: linear terms are the
+same. It shows in the terms by Du' (:func:`scaled_with_nominal_speed`).
+
 Densities have heavy tails (Student's t, 4 degrees of freedom), so that no single number decides.
 """
 
@@ -156,6 +159,40 @@ def possible_readings(table: CoefficientTable) -> list[Reading]:
     return [Reading(*values) for values in itertools.product(*choices.values())]
 
 
+_SIGNATURE = {"v": (1.0,), "r": (1.0,), "d": (2.0, 1.0)}
+"""Of a force that goes with u v, u r, u^2 delta, scaled with u0: coefficients of Du', Du'^2 over that of the term."""
+_LEAST_SIGNATURE = 3
+_SAME_SHARE = 0.02
+
+
+def scaled_with_nominal_speed(table: CoefficientTable) -> bool | None:
+    """Whether terms by Du' are those of numbers scaled with u0; None where too few are given.
+
+    A lift goes with u v, u r and u^2 delta. Scaled with u0, so that u = u0 (1 + Du'), this is Y_vu = Y_v, Y_ru = Y_r,
+    Y_du = 2 Y_d, Y_duu = Y_d, N alike; scaled with the speed at any time, all of these are about zero.
+
+    Parameters
+    ----------
+    table : CoefficientTable
+    """
+    known = table.derivatives
+    shares = [
+        known[f"{force}{letter}{'u' * power}"] / (share * known[f"{force}{letter}"])
+        for force in "YN"
+        for letter, expected in _SIGNATURE.items()
+        for power, share in enumerate(expected, start=1)
+        if known.get(f"{force}{letter}") and f"{force}{letter}{'u' * power}" in known
+    ]
+    if len(shares) < _LEAST_SIGNATURE:
+        return None
+    return sum(abs(share - 1) < _SAME_SHARE for share in shares) > len(shares) / 2
+
+
+def _speed_scale(table: CoefficientTable) -> str:
+    """As the file states it, else by its terms."""
+    return table.speed_scale or ("nominal" if scaled_with_nominal_speed(table) else "instantaneous")
+
+
 def file_scales(table: CoefficientTable, scaling: str) -> FileScales | None:
     """What the table's numbers are in by a scaling; None for the prime system."""
     ship = ShipSection(
@@ -180,7 +217,8 @@ def read_as(table: CoefficientTable, reading: Reading) -> ReadShip:
     """The ship that the table is by a reading.
 
     Hydrodynamic terms from total ones: Y_r + m', N_r + m' x_G', X_vr - m', X_rr - m' x_G', with x_G of the table's
-    origin; those of X only where the table has terms in v or r of X. Then the origin is moved to midships.
+    origin, and scaled with u0 Y_ru + m', N_ru + m' x_G'; those of X only where the table has terms in v or r of X. Then
+    the origin is moved to midships.
     """
     scales = file_scales(table, reading.scaling)
     to_port = reading.rudder_sign == "port"
@@ -194,6 +232,8 @@ def read_as(table: CoefficientTable, reading: Reading) -> ReadShip:
     inertial: dict[str, float] = {}
     if reading.yaw_rate_terms == "total":
         inertial = {"Yr": body.mass, "Nr": body.mass * body.x_G}
+        if _speed_scale(table) == "nominal":  # m u r is m (1 + Du') r'
+            inertial |= {"Yru": inertial["Yr"], "Nru": inertial["Nr"]}
         if any(known_term(name).force == "X" and known_term(name).v + known_term(name).r > 0 for name in numbers):
             inertial |= {"Xvr": -body.mass, "Xrr": -body.mass * body.x_G}
     names = tuple(dict.fromkeys([*numbers, *(name for name, value in inertial.items() if value)]))
@@ -418,7 +458,8 @@ def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
     environment["water_density_kgpm3"] = table.environment.water_density_kgpm3
     model = tomlkit.table()
     model["kind"], model["speed_mps"], model["scaling"] = "abkowitz" if third else "linear", table.speed_mps, "prime"
-    model["speed_scale"], model["yaw_rate_terms"] = "instantaneous", "hydrodynamic"
+    model["speed_scale"] = _speed_scale(table)
+    model["yaw_rate_terms"] = "hydrodynamic"
     model["rudder_sign"] = "starboard"
     body, derivatives = tomlkit.table(), tomlkit.table()
     for key, value in ship.body.model_dump().items():
