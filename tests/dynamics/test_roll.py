@@ -17,6 +17,7 @@ from tank2sim.cards import parse_card
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics import build
+from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.roll import natural_period_s
 from tank2sim.errors import InputError
@@ -273,6 +274,35 @@ def test_terms_of_roll_are_found_in_trials_that_measured_heel(tmp_path: Path) ->
     found = t2s.identify(tmp_path / "start.toml", paths[1], holdout=paths[0]).card
     for name, value in true.items():
         assert abs(found.derivatives[name] - value) < 3 * found.uncertainty[name] < free[name], name
+
+
+def test_an_external_moment_heels_the_ship_as_far_as_its_stability_holds() -> None:
+    """At rest K = W GM phi; a force above the origin heels to its side, as its moment does."""
+    model = with_external_forces(build(rolling_card()))
+    moment = 0.02 * 21752550.0 * 9.81 * 0.3
+    upright = np.array(model.initial(model.parameter_values())).ravel()
+    upright[model.state_names.index("motion.u")] = 0.0
+    upright[model.state_names.index("motion.phi")] = 0.02
+    inputs = {"external.K": moment, "propeller.speed": 0.0}
+    at_rest = np.array(model.rhs(upright, model.input_values(inputs), model.parameter_values())).ravel()
+    assert at_rest[model.state_names.index("motion.p")] == pytest.approx(0.0, abs=1e-9)
+    by_force = np.array(
+        model.rhs(
+            upright,
+            model.input_values({"external.Y": moment / 5, "external.z": -5.0, "propeller.speed": 0.0}),
+            model.parameter_values(),
+        )
+    ).ravel()
+    pushed = np.array(
+        model.rhs(
+            upright,
+            model.input_values({"external.Y": moment / 5, "propeller.speed": 0.0, "external.K": moment}),
+            model.parameter_values(),
+        )
+    ).ravel()
+    assert by_force == pytest.approx(pushed, rel=1e-12, abs=1e-15)
+    with pytest.raises(InputError, match="rolls"):
+        t2s.load("mariner").simulate("turn:10", external={"K": 1e6})
 
 
 @pytest.mark.slow

@@ -160,7 +160,7 @@ def simulate_manoeuvre(
     """
     if external and ensemble.members:
         raise InputError("external", "", "cannot act on an ensemble", "leave out either the members or the force")
-    inputs = external_inputs(external or {})
+    inputs = external_inputs(external or {}, rolls="force.K" in ship.model)
     run = simulate(
         with_external_forces(ship.model) if inputs else ship.model, manoeuvre, duration_s=duration_s, inputs=inputs
     )

@@ -11,6 +11,9 @@ from tank2sim.errors import InputError
 EXTERNAL_INPUTS = tuple(f"external.{name}" for name in ("X", "Y", "N", "x", "y"))
 """Inputs of :func:`with_external_forces`."""
 
+EXTERNAL_INPUTS_OF_ROLL = ("external.K", "external.z")
+"""Further inputs of a ship that rolls."""
+
 
 def with_external_forces(model: Model) -> Model:
     """The model with inputs for a force and a moment from outside, zero unless set.
@@ -20,6 +23,9 @@ def with_external_forces(model: Model) -> Model:
     starboard) is a moment in addition. About midships the moment is N + x Y - y X. They are added to ``force.X``,
     ``force.Y`` and ``force.N``, after all effects, so that no effect scales them. A model without these quantities is
     returned as it is.
+
+    A ship that rolls also has ``external.z`` (m, the point below the origin) and ``external.K`` (N m, positive to
+    starboard); its rolling moment is K - z Y, added to ``force.K``.
     """
     if not all(f"force.{name}" in model for name in "XYN"):
         return model
@@ -38,11 +44,31 @@ def with_external_forces(model: Model) -> Model:
         for name, (unit, description), nominal in zip(EXTERNAL_INPUTS, described, usual, strict=True)
     ]
     X, Y, N, x, y = (variable.symbol for variable in inputs)
-    return with_forces(model.extend(*inputs), X=X, Y=Y, N=N + x * Y - y * X)
+    forced = with_forces(model.extend(*inputs), X=X, Y=Y, N=N + x * Y - y * X)
+    if "force.K" not in model:
+        return forced
+    of_roll = (
+        ("N.m", "External rolling moment, in addition to that of the force at its point, positive to starboard"),
+        ("m", "Point of the external force below the origin"),
+    )
+    rolling = [
+        Input(name=name, unit=unit, description=description, nominal=nominal)
+        for name, (unit, description), nominal in zip(
+            EXTERNAL_INPUTS_OF_ROLL, of_roll, (force * float(length) / 20, float(length) / 20), strict=True
+        )
+    ]
+    K, z = (variable.symbol for variable in rolling)
+    return forced.extend(*rolling).redefine("force.K", lambda moment: moment + K - z * Y)
 
 
-def external_inputs(given: Mapping[str, float]) -> dict[str, float]:
+def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[str, float]:
     """Inputs of the model by name, from ``X``, ``Y`` (N), ``N`` (N m), ``x`` and ``y`` (m).
+
+    Parameters
+    ----------
+    given : mapping
+    rolls : bool
+        Of a ship that rolls, which also has ``K`` (N m) and ``z`` (m).
 
     Raises
     ------
@@ -51,8 +77,10 @@ def external_inputs(given: Mapping[str, float]) -> dict[str, float]:
     """
     inputs = {f"external.{name}": float(value) for name, value in given.items()}
     for name in inputs:
-        if name not in EXTERNAL_INPUTS:
+        if name not in (*EXTERNAL_INPUTS, *(EXTERNAL_INPUTS_OF_ROLL if rolls else ())):
             remedy = "X and Y (N), N (N m), x and y (m) are known"
+            if name in EXTERNAL_INPUTS_OF_ROLL:
+                remedy = "it acts on a ship that rolls: give [roll] on the card"
             raise InputError("external", name.removeprefix("external."), "is not an external force", remedy)
     return inputs
 
