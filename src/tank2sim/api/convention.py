@@ -196,6 +196,8 @@ class ConventionResult(Result):
             found.append(f"ASSUMED, for the table does not have them: {sizes}")
         if first.against:
             found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
+        if self.table.left_out:
+            found.append(f"not read, and not on the card of a reading: {', '.join(self.table.left_out)}")
         if scaled_with_nominal_speed(self.table):
             found.append(
                 "terms by Du' are those of forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "

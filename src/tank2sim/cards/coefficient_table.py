@@ -13,7 +13,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,8 @@ class CoefficientTable:
         Forward of midships.
     rudder_area_m2 : float, optional
     environment : Environment
+    left_out : tuple of str
+        Sections of the file that are of no table: gear, propulsion, effects.
     speed_scale : str, optional
         As the file states it: ``instantaneous`` or ``nominal``.
     assumed : tuple of str
@@ -97,6 +99,7 @@ class CoefficientTable:
     rudder_area_m2: float | None = None
     environment: Environment = field(default_factory=Environment)
     assumed: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
     speed_scale: str | None = None
 
     @property
@@ -123,7 +126,8 @@ def _of_toml(text: str, source: str) -> CoefficientTable:
     with faults_of_toml(source):
         content = tomllib.loads(text)
     sections = {}
-    for name in ("ship", "model", "rigid_body", "derivatives", "environment"):
+    read = ("ship", "model", "rigid_body", "derivatives", "environment")
+    for name in read:
         sections[name] = content.get(name, {})
         if not isinstance(sections[name], dict):
             raise InputError(source, name, "is not a section", f"write [{name}]")
@@ -132,7 +136,8 @@ def _of_toml(text: str, source: str) -> CoefficientTable:
     for name, keys in places:
         stated |= {key: value for key, value in sections[name].items() if key in keys}
     stated |= {_BODY[_plain(key)]: value for key, value in sections["rigid_body"].items() if _plain(key) in _BODY}
-    return _table(stated, sections["derivatives"], source, "derivatives.")
+    left_out = tuple(name for name in content if name not in (*read, "format", "uncertainty"))
+    return replace(_table(stated, sections["derivatives"], source, "derivatives."), left_out=left_out)
 
 
 def _of_rows(text: str, source: str) -> CoefficientTable:

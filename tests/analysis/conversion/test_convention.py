@@ -124,6 +124,7 @@ def test_a_card_without_its_conventions_is_a_table_and_what_it_states_is_taken(t
     first = found.readings[0].reading
     assert (first.rudder_sign, first.yaw_rate_terms, first.origin) == ("port", "total", "midships")
     assert found.readings[0].ship.vanished == ("Xvr",)  # the printed X_vr' is m'
+    assert any("steering_gear" in notice for notice in found.notices)
 
 
 def test_the_card_of_the_first_reading_is_the_published_ship(tmp_path: Path) -> None:
