@@ -203,7 +203,13 @@ def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, s
         environment=water,
         assumed=assumed,
         speed_scale=stated.get("speed_scale"),
-        **sizes,
+        length_m=sizes["length_m"],
+        beam_m=sizes["beam_m"],
+        draught_m=sizes["draught_m"],
+        speed_mps=sizes["speed_mps"],
+        displacement_kg=sizes["displacement_kg"],
+        centre_of_gravity_m=sizes.get("centre_of_gravity_m"),
+        rudder_area_m2=sizes.get("rudder_area_m2"),
     )
     if not 0.2 <= table.block <= 1.0:
         problem = f"is that of a block coefficient of {table.block:.3g}"
