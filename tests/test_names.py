@@ -43,11 +43,9 @@ def test_no_test_imports_from_another_test() -> None:
 
 PRIVATE_WORDS = re.compile(
     r"\b(told|tells?|foretells?|foretold|foretelling|mended|mends?|wish|wishes|stands|stood|beside|ours|she|her|anew|bears"
-    r"|strangers|but for|no such)\b",
+    r"|hers|strangers|but for|no such)\b|(?<!here )\bis no (?!less|more|longer)[a-z]",
     re.IGNORECASE,
 )
-KEYS_OF_FILES = re.compile(r'"(told|mended|wishes)"')
-"""Keys of JSON results that scripts rely on."""
 QUOTED = {"CHANGELOG.md"}  # names that moved
 
 
@@ -61,7 +59,7 @@ def test_the_words_of_a_private_language_do_not_come_back() -> None:
         if lines := [
             f"{number}: {line.strip()[:100]}"
             for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
-            if PRIVATE_WORDS.search(KEYS_OF_FILES.sub("", line))
+            if PRIVATE_WORDS.search(line)
         ]:
             found[path.relative_to(ROOT).as_posix()] = lines
     assert found == {}

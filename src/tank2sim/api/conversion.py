@@ -85,7 +85,7 @@ class ConversionResult(Result):
             No card was made, but a file of another program.
         """
         if self.made.card is None:
-            raise LookupError(f"{self.language} is no card")
+            raise LookupError(f"{self.language} is not a card")
         return Ship(self.made.card)
 
     def files(self, path: str | Path) -> dict[Path, str | bytes]:

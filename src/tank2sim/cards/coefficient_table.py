@@ -115,7 +115,7 @@ def read_coefficients(path: str | Path) -> CoefficientTable:
     Raises
     ------
     InputError
-        The file is missing or not of this form, a name is no derivative, or a size is missing.
+        The file is missing or not of this form, a name is not that of a derivative, or a size is missing.
     """
     source = str(path)
     text = read_text(Path(path)).removeprefix(BYTE_ORDER_MARK)
@@ -147,7 +147,7 @@ def _of_rows(text: str, source: str) -> CoefficientTable:
     for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=";" if any(";" in line for line in lines) else ","):
         cells = [cell.strip() for cell in row]
         if len(cells) < 2:
-            raise InputError(source, cells[0], "is no row of name and value", "write: Yv, -0.0116")
+            raise InputError(source, cells[0], "is not a row of name and value", "write: Yv, -0.0116")
         name, written = cells[0], cells[1]
         if name.lower() in ("name", "coefficient", "derivative"):
             continue

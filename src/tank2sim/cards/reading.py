@@ -183,7 +183,7 @@ def linear_card(card: Card) -> ManoeuvringCard:
     Raises
     ------
     InputError
-        It is an MMG card, whose rudder is no polynomial.
+        It is an MMG card, whose rudder is not a polynomial.
     """
     if isinstance(card, MmgCard):
         raise card.fault("model.kind", "is mmg, which has no linear form of its own", "convert it to abkowitz first")

@@ -50,7 +50,7 @@ _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
 
 _INSTANCES = ("I", "C", "Inst")
 _COMMONEST = 3
-"""Status of a GPS fix in three dimensions (GPS_STATUS of ArduPilot); less is no fix, except 2, a fix in two."""
+"""Status of a GPS fix in three dimensions (GPS_STATUS of ArduPilot); less is not a fix, except 2, a fix in two."""
 
 
 def read_ardupilot_bin(path: Path) -> VesselLog:

@@ -91,7 +91,7 @@ class LaneManoeuvres:
         if not {*_BEGINS, "motion.u", "motion.v", "motion.r"} <= set(model.state_names):
             raise NoLanesError("the model is not that of a ship")
         if "motion.phi" in model.state_names:
-            raise NoLanesError("the heel of a ship that rolls is no figure of lanes")
+            raise NoLanesError("the heel of a ship that rolls is not a figure of lanes")
         self._runner = LaneRunner(model, lanes)
         arguments = [model.x, model.u, model.p]
         self._read = {

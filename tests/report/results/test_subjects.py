@@ -48,9 +48,9 @@ ENSEMBLE = {"members": 5, "t_s": TIMES, "histories": {"u_mps": BAND, "x_m": BAND
 AUDITED = {
     "findings": [
         {"file": "a/turn.csv", "column": "psi [deg]", "what": "2 spikes", "likely_truth": "disturbed readings"}
-        | {"kind": "note", "mended": True, "evidence": {}, "places_s": [[1.0, 1.0]]},
+        | {"kind": "note", "repaired": True, "evidence": {}, "places_s": [[1.0, 1.0]]},
         {"file": "a/turn.csv", "column": "t_s", "what": "1 gaps", "likely_truth": "rows were not recorded"}
-        | {"kind": "note", "mended": False, "evidence": {}, "places_s": [[2.0, 3.0]]},
+        | {"kind": "note", "repaired": False, "evidence": {}, "places_s": [[2.0, 3.0]]},
     ],
     "trials": [
         {"file": "a/turn.csv", "columns": ["psi [deg]", "u_mps"], "notices": []}

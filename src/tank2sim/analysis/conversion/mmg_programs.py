@@ -122,10 +122,10 @@ def _refuse_what_others_lack(card: MmgCard, program: str) -> None:
         raise card.fault("roll", f"is given, and the ships of {program} do not roll", remedy)
     for key, place in card.interaction_places().items():
         if key in ("tau", "eta", "C_Rv"):
-            raise card.fault(place, f"is no coefficient of {program}", remedy)
+            raise card.fault(place, f"is not a coefficient of {program}", remedy)
     for name in ("Y0", "N0", "Yrdot", "Nvdot"):
         if card.derivatives.get(name):
-            raise card.fault(f"derivatives.{name}", f"is no coefficient of {program}", "leave it out")
+            raise card.fault(f"derivatives.{name}", f"is not a coefficient of {program}", "leave it out")
 
 
 def _hull_in_prime_ii(card: MmgCard) -> dict[str, float]:

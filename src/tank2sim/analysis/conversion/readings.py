@@ -11,8 +11,8 @@ inertia and with the rudder to starboard. Its weight is p(reading) p(t | reading
 - where the table has surge too, the tactical diameter at 35 deg;
 - a term that a reading makes vanish to the printed digits: a wrong one does so only by chance.
 
-By which speed the numbers are scaled, that of the ship at any time or u0, is no part of a reading: linear terms are the
-same. It shows in the terms by Du' (:func:`scaled_with_nominal_speed`).
+By which speed the numbers are scaled, that of the ship at any time or u0, is not part of a reading: linear terms are
+the same. It shows in the terms by Du' (:func:`scaled_with_nominal_speed`).
 
 Densities have heavy tails (Student's t, 4 degrees of freedom), so that no single number decides.
 """
@@ -162,7 +162,9 @@ def possible_readings(table: CoefficientTable) -> list[Reading]:
 _SIGNATURE = {"v": (1.0,), "r": (1.0,), "d": (2.0, 1.0)}
 """Of a force that goes with u v, u r, u^2 delta, scaled with u0: coefficients of Du', Du'^2 over that of the term."""
 _LEAST_SIGNATURE = 3
+"""Shares from which the scale is judged. Project choice: one or two may agree by chance."""
 _SAME_SHARE = 0.02
+"""Project choice: by how much a share may differ from one, that of terms printed to two digits or more."""
 
 
 def scaled_with_nominal_speed(table: CoefficientTable) -> bool | None:

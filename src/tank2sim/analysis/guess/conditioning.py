@@ -231,7 +231,7 @@ def _refuse_impossible(figure: GivenFigure, prior: Array) -> None:
         return
     low, high = np.quantile(prior, [0.01, 0.99])
     remedy = f"98 % of ships of these dimensions lie between {low:.3g} and {high:.3g}: check the figure and its unit"
-    raise InputError(f"--{figure.manoeuvre}", figure.text, "is no figure of a ship of these dimensions", remedy)
+    raise InputError(f"--{figure.manoeuvre}", figure.text, "is not a figure of a ship of these dimensions", remedy)
 
 
 def _refuse_contradiction(

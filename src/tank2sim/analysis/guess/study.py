@@ -145,7 +145,7 @@ def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
     Raises
     ------
     InputError
-        A word is no figure of the manoeuvre or is given twice, or a number is not positive.
+        A word is not a figure of the manoeuvre or is given twice, or a number is not positive.
     """
     option, words, found = f"--{manoeuvre}", FIGURES[manoeuvre], {}
     for part in text.split():

@@ -121,7 +121,7 @@ class Tuned:
             "reached": self.reached,
             "by": self.means.by,
             "within_standard_errors": self.means.within,
-            "wishes": {
+            "targets": {
                 target.text: {
                     "figure": target.figure.text,
                     "wanted": target.value,

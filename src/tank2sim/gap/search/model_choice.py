@@ -214,7 +214,7 @@ def _change(fit: ExplanationFit, name: str) -> float:
 
 def _change_of_gear(fit: ExplanationFit, name: str) -> float:
     """Change of the card's steering-gear data for the worse, in their standard errors; infinite if the card states
-    none. A gear that is better than the card states is no fault of the gear."""
+    none. A gear that is better than the card states is not a fault of the gear."""
     ((_, values, _),) = [found for found in estimates(fit) if found[0] == name]
     ((key, value),) = values.items()
     worse = next((parameter.worse for parameter in EFFECTS[name].parameters if parameter.name == key), 0)

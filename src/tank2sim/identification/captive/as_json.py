@@ -13,7 +13,6 @@ from tank2sim.identification.captive.plot_data import plots_as_json
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
-from tank2sim.identification.captive.selection import Choice
 from tank2sim.identification.captive.tables import by_the_papers_order, prediction_errors
 from tank2sim.identification.captive.uncertainty_budget import (
     BUDGET_SOURCES,
@@ -46,8 +45,7 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         "warnings": warnings,
         "methods": {force: _methods(result) for force, result in reduction.forces.items()},
         "selection": {
-            force: [_choice(choice) for choice in result.selection.choices]
-            for force, result in reduction.forces.items()
+            force: [asdict(choice) for choice in result.selection.choices] for force, result in reduction.forces.items()
         },
         "spread": {force: _spread(result) for force, result in reduction.forces.items()},
         "systematic_errors": [{**asdict(error), "message": error.message} for error in reduction.systematic],
@@ -103,11 +101,6 @@ def _delay(reduction: Reduction) -> dict[str, Any] | None:
         return None
     corrected = any(error.corrected for error in reduction.systematic)
     return {**asdict(reduction.delay), "corrected": corrected}
-
-
-def _choice(choice: Choice) -> dict[str, Any]:
-    found = asdict(choice)
-    return {"told" if key == "explanation" else key: value for key, value in found.items()}
 
 
 def _derivative(reduction: Reduction, card: Contents, name: str) -> dict[str, Any]:

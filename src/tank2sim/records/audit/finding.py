@@ -69,7 +69,7 @@ class Finding:
             "what": self.what,
             "likely_truth": self.likely_truth,
             "kind": self.kind,
-            "mended": self.safe and self.repair is not None,
+            "repaired": self.safe and self.repair is not None,
             "evidence": dict(self.evidence),
             "places_s": [list(place) for place in self.places_s],
         }

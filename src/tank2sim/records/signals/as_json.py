@@ -24,7 +24,7 @@ def analysis_as_json(analysis: TrialAnalysis) -> dict[str, Any]:
 def effect_as_json(effect: FilterEffect) -> dict[str, Any]:
     """What a filter does."""
     return {
-        "told": effect.sentence,
+        "explanation": effect.sentence,
         "frequency_hz": effect.frequency_hz,
         "gain": effect.gain,
         "phase_rad": effect.phase_rad,

@@ -158,7 +158,7 @@ def _budget(budget: Json) -> list[PageSection]:
 
 def _left_out(selection: Json) -> PageTable:
     rows: list[list[Cell]] = [
-        [choice["name"], choice["reason"], choice["told"]]
+        [choice["name"], choice["reason"], choice["explanation"]]
         for choices in selection.values()
         for choice in choices
         if choice["reason"] in LEFT_OUT

@@ -64,7 +64,7 @@ def _targets_of(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json]
     """Figure to its target, and whether that is met."""
     return {
         target["figure"]: (target, Verdict.FAILED if text in tuned["contradiction"] else Verdict.PASSED)
-        for text, target in tuned.get("wishes", {}).items()
+        for text, target in tuned.get("targets", {}).items()
     }
 
 

@@ -157,7 +157,7 @@ def from_the_bridge(result: Json) -> list[PageSection]:
 
 
 def _findings(found: Sequence[Mapping[str, Json]]) -> PageTable:
-    heads = {"kind": "", "column": "column", "what": "what", "likely_truth": "likely truth", "mended": "mended"}
+    heads = {"kind": "", "column": "column", "what": "what", "likely_truth": "likely truth", "repaired": "repaired"}
     rows = [[finding.get(key) for key in heads] for finding in found]
     return PageTable(caption="Findings", columns=[Column(title=head) for head in heads.values()], rows=rows)
 
