@@ -18,6 +18,7 @@ from tank2sim.gap.result import Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.gap import made_up
 from tests.identification.captive.made_runs import oscillation
+from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
 from tests.yaw_truth import Truth, record, written
 
 NO_TRIALS = Measured((), "angle", ())
@@ -106,6 +107,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "run and repeat": lambda folder: t2s.reduce_runs(
         [oscillation(folder, name) for name in ("a.csv", "b.csv")], type="pure_yaw"
     ),
+    "reduce to MMG": lambda folder: t2s.reduce_to_mmg(write_campaign(folder, KVLCC2)),
     "ships": lambda _: list_ships(),
     "signals": lambda folder: t2s.signals(_trials(folder)),
     "signals with a filter": lambda folder: t2s.signals(_trials(folder), "r_degps", filter="lowpass:0.1"),

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.log import LogResult, log
     from tank2sim.api.manoeuvre import ManoeuvreResult
+    from tank2sim.api.mmg_reduction import MmgReductionResult, reduce_to_mmg
     from tank2sim.api.reduction import ReductionResult, reduce
     from tank2sim.api.report import ReportResult, make_report
     from tank2sim.api.result import Result, ResultTable
@@ -61,6 +62,7 @@ _HOMES = {
     "InputError": "errors",
     "LogResult": "api.log",
     "ManoeuvreResult": "api.manoeuvre",
+    "MmgReductionResult": "api.mmg_reduction",
     "PilotCardResult": "api.bridge",
     "PosterResult": "api.bridge",
     "ReductionResult": "api.reduction",
@@ -94,6 +96,7 @@ _HOMES = {
     "read_trial": "api.trial",
     "reduce": "api.reduction",
     "reduce_runs": "api.captive_run",
+    "reduce_to_mmg": "api.mmg_reduction",
     "run_demo": "api.demo",
     "ships": "api.ship",
     "signals": "api.signals",
@@ -122,6 +125,7 @@ __all__ = [
     "InputError",
     "LogResult",
     "ManoeuvreResult",
+    "MmgReductionResult",
     "PilotCardResult",
     "PosterResult",
     "ReductionResult",
@@ -155,6 +159,7 @@ __all__ = [
     "read_trial",
     "reduce",
     "reduce_runs",
+    "reduce_to_mmg",
     "run_demo",
     "ships",
     "signals",

@@ -316,6 +316,30 @@ class ReduceKeys(_Keys):
     resistance: dict[str, Any] | None
 
 
+class MmgCoefficientKeys(_Part):
+    """A coefficient of the MMG method; hull in prime II."""
+
+    value: float
+    standard_error: float
+    origin: str
+
+
+class ReduceMmgKeys(_Keys):
+    """Steady captive tests reduced to the MMG method."""
+
+    campaign: str
+    model: str
+    coefficients: dict[str, MmgCoefficientKeys]
+    yaw_arm: dict[str, float]
+    rudder_angle_of_no_force_deg: float | None
+    channels: dict[str, dict[str, Any]]
+    open_water: dict[str, Number]
+    readings: dict[str, dict[str, Any]]
+    conditions: list[str]
+    not_excited: list[str]
+    notices: list[str]
+
+
 class EstimateKeys(_Part):
     """A coefficient identified from trials, and what was known of it before."""
 
@@ -876,7 +900,7 @@ KEYS: dict[str, Any] = {
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
-    "reduce": ReduceKeys,
+    "reduce": ReduceKeys | ReduceMmgKeys,
     "run": RunKeys,
     "ships": ShipsKeys,
     "signals": SignalsKeys,

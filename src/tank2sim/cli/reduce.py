@@ -6,15 +6,24 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.mmg_reduction import reduce_to_mmg
 from tank2sim.api.reduction import reduce
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.errors import InputError
 from tank2sim.identification.captive.result_card import FILLS
 
 
 @click.command("reduce")
 @click.argument("campaign", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the ship card.")
+@click.option(
+    "--model",
+    type=click.Choice(("polynomial", "mmg")),
+    default="polynomial",
+    help="Into what: a polynomial, or hull, propeller and rudder of the MMG method (steady tests with thrust and "
+    "normal force of the rudder).",
+)
 @click.option(
     "--fill",
     type=click.Choice(tuple(FILLS)),
@@ -40,6 +49,7 @@ from tank2sim.identification.captive.result_card import FILLS
 def command(
     campaign: Path,
     output: Path | None,
+    model: str,
     fill: str | None,
     scale: str | None,
     keep_going: bool,
@@ -53,6 +63,14 @@ def command(
     json_file: Path | None,
 ) -> None:
     """Reduce the captive tests in CAMPAIGN (campaign.toml) to derivatives with standard errors."""
+    if model == "mmg":
+        polynomial = {"--fill": fill, "--scale": scale, "--keep-going": keep_going, "--keep-fast": keep_fast}
+        polynomial |= {"--off-speed": off_speed, "--all-terms": all_terms, "--test-symmetry": test_symmetry}
+        for option, given in {**polynomial, "--budget": budget}.items():
+            if given:
+                raise InputError(option, "", "is of the polynomial reduction", "leave it out with --model mmg")
+        _reduce_to_mmg(campaign, output, page, plots, json_file)
+        return
     result = reduce(
         campaign,
         fill=fill,
@@ -71,3 +89,17 @@ def command(
     show_result(result)
     if output:
         screen.print(f"{output}: {len(result.contents.entries)} derivatives", soft_wrap=True, markup=False)
+
+
+def _reduce_to_mmg(
+    campaign: Path, output: Path | None, page: Path | None, plots: Path | None, json_file: Path | None
+) -> None:
+    result = reduce_to_mmg(campaign)
+    form = result.fit.tests.form
+    tables = [section.file for section in (form.averages, form.open_water) if section and section.file]
+    files = result.card.files(output) if output else {}
+    inputs = [campaign, *(campaign.parent / table for table in tables)]
+    write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
+    show_result(result)
+    if output:
+        screen.print(f"{output}: {len(result.coefficients)} coefficients", soft_wrap=True, markup=False)

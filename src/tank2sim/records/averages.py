@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +28,7 @@ the smallest of them, is about 1e-3 in prime, and no gauge resolves a millionth 
 class Condition:
     """One row of averages: SI, radians, rudder positive to starboard, forces in the sense of the file.
 
-    ``name`` states file and line.
+    ``name`` states file and line; the normal force of the rudder is positive to port, as that of the MMG method.
     """
 
     name: str
@@ -39,6 +39,9 @@ class Condition:
     Y_N: float
     N_Nm: float
     propeller_radps: float | None
+    yaw_rate_radps: float = 0.0
+    thrust_N: float | None = None
+    rudder_normal_force_N: float | None = None
 
 
 def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
@@ -94,6 +97,29 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
     return conditions, [text] if repeated else []
 
 
+def read_columns(file: Path, headings: Mapping[str, str]) -> dict[str, list[float]]:
+    """Columns of a table by their headings: `headings` has key to heading, the result key to values.
+
+    Raises
+    ------
+    InputError
+        The table cannot be read, lacks a column, or has text where a number is expected.
+    """
+    lines, rows, _ = _cells(file)
+    heads = rows.pop(0)
+    found = {}
+    for key, heading in headings.items():
+        if heading not in heads:
+            problem = f"the table has no column {heading!r}"
+            raise InputError(file, "header", problem, f"its columns are {', '.join(heads)}")
+        place = heads.index(heading)
+        found[key] = [
+            _number(file, (line, heading), row[place] if place < len(row) else "")
+            for line, row in zip(lines[1:], rows, strict=True)
+        ]
+    return found
+
+
 def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
     """Line numbers and cells of the lines that are neither empty nor comments, the first the header; units if any."""
     try:
@@ -117,7 +143,8 @@ def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
 
 def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:
     """Refuse a unit under a heading that is not the one in which the column is read."""
-    suffix = {"X": "N", "Y": "N", "N": "Nm"}.get(key, key.rpartition("_")[2])
+    forces = {"X": "N", "Y": "N", "N": "Nm", "thrust": "N", "rudder_normal_force": "N"}
+    suffix = forces.get(key, key.rpartition("_")[2])
     if unit in ("", "-", "1") or (key == "propeller_radps"):
         return
     size = unit_factor(unit, suffix)
@@ -147,16 +174,32 @@ def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignF
     if speed <= 0:
         raise InputError(file, f"line {line}", f"the speed is {speed:g} m/s", "a positive one was expected")
     scales = Scales(form.test.water_density_kgpm3, form.model.length_m, speed)
-    units: Sequence[float] = (1.0, 1.0, 1.0)
-    if form.averages.scaling == "prime":
-        units = (scales.force, scales.force, scales.force * scales.length)
+    unit = _unit_of_force(form, scales)
+    arm = 1.0 if form.averages.scaling == "dimensional" else form.model.length_m
+    yaw_rate = at.get("yaw_rate_radps", at.get("yaw_rate_prime", 0.0) * speed / form.model.length_m)
+    to_port = 1.0 if form.averages.normal_force_sign == "port" else -1.0
     return Condition(
         name=f"{file.name} line {line}",
         drift_rad=at.get("drift_rad", 0.0),
         rudder_rad=at.get("rudder_rad", 0.0),
         speed_mps=speed,
-        X_N=at["X"] * units[0],
-        Y_N=at["Y"] * units[1],
-        N_Nm=at["N"] * units[2],
+        X_N=at["X"] * unit,
+        Y_N=at["Y"] * unit,
+        N_Nm=at["N"] * unit * arm,
         propeller_radps=at.get("propeller_radps", form.test.propeller_radps),
+        yaw_rate_radps=yaw_rate,
+        thrust_N=at["thrust"] * unit if "thrust" in at else None,
+        rudder_normal_force_N=at["rudder_normal_force"] * unit * to_port if "rudder_normal_force" in at else None,
     )
+
+
+def _unit_of_force(form: CampaignFile, scales: Scales) -> float:
+    """What a force of one in the table is, N: by 1/2 rho L^2 U^2 (prime), 1/2 rho L d U^2 (prime II), or itself."""
+    assert form.averages is not None
+    if form.averages.scaling == "dimensional":
+        return 1.0
+    draught = form.model.draught_m
+    if form.averages.scaling == "prime_ii" and draught is None:
+        raise InputError(form.averages.file, "model.draught_m", "is missing, by which prime_ii is scaled", "add it")
+    share = (draught or 0.0) / form.model.length_m if form.averages.scaling == "prime_ii" else 1.0
+    return float(scales.force) * share

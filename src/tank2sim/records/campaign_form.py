@@ -218,12 +218,24 @@ class RunSheet(CardSection):
 
 
 class AverageColumns(CardSection):
-    """``[averages.columns]``: quantity to the heading of its column."""
+    """``[averages.columns]``: quantity to the heading of its column.
+
+    Parameters
+    ----------
+    yaw_rate_radps, yaw_rate_prime
+        Yaw rate of rotating-arm and circular-motion tests, positive to starboard; prime: r L/U.
+    thrust, rudder_normal_force
+        Of the propeller, positive forward, and of the water on the rudder; in the scaling of the forces.
+    """
 
     drift_rad: str | None = None
     rudder_rad: str | None = None
     speed_mps: str | None = None
     propeller_radps: str | None = None
+    yaw_rate_radps: str | None = None
+    yaw_rate_prime: str | None = None
+    thrust: str | None = None
+    rudder_normal_force: str | None = None
     X: str
     Y: str
     N: str
@@ -233,9 +245,49 @@ class AveragesSection(CardSection):
     """``[averages]``: a table of static conditions, one a row, in place of ``[[runs]]``."""
 
     file: Text
-    scaling: Literal["prime", "dimensional"]
+    scaling: Literal["prime", "prime_ii", "dimensional"]
     rudder_sign: Literal["starboard", "port"] | None = None
+    normal_force_sign: Literal["starboard", "port"] = "port"
     columns: AverageColumns
+
+
+class OpenWaterSection(CardSection):
+    """``[open_water]``: points of the propeller's open-water curve, in the file or a table of their own.
+
+    Parameters
+    ----------
+    J, K_T
+        Points; or, with ``file``, the headings of their columns.
+    """
+
+    file: Text | None = None
+    J: list[float] | Text = "J"
+    K_T: list[float] | Text = "K_T"
+
+
+class PropellerTest(CardSection):
+    """``[propeller]``: the place of the propeller over L, positive forward of midships."""
+
+    x_P: Annotated[float, Field(gt=-1, lt=1)] = -0.5
+
+
+class RudderTest(CardSection):
+    """``[rudder]``: the rudder as tested.
+
+    Parameters
+    ----------
+    height_m
+        The race covers the share D_P/H_R of it.
+    aspect_ratio, f_alpha
+        One of the two: f_alpha, the slope of the normal force, by Fujii's formula from the aspect ratio.
+    x_R
+        Its place over L, positive forward of midships.
+    """
+
+    height_m: Positive
+    aspect_ratio: Positive | None = None
+    f_alpha: Positive | None = None
+    x_R: Annotated[float, Field(gt=-1, lt=1)] = -0.5
 
 
 class CampaignFile(CardSection):
@@ -248,6 +300,9 @@ class CampaignFile(CardSection):
     uncertainty: UncertaintySection = UncertaintySection()
     full_scale: FullScaleSection | None = None
     averages: AveragesSection | None = None
+    open_water: OpenWaterSection | None = None
+    propeller: PropellerTest = PropellerTest()
+    rudder: RudderTest | None = None
     files: FilesSection = FilesSection()
     columns: ColumnMap = Field(default_factory=dict)
     runs: tuple[RunSheet, ...] = ()

@@ -372,6 +372,9 @@ def _rate_of(table: CsvTable, psi: Array | None, time: Array) -> Array:
 
 def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
     assert form.averages is not None
+    if condition.yaw_rate_radps:
+        remedy = "reduce --model mmg takes turning tests; or leave such rows out"
+        raise InputError(form.averages.file, condition.name.rpartition(".csv ")[2], "turns steadily", remedy)
     kind: RunType = "drift_and_rudder"
     if condition.rudder_rad == 0.0:
         kind = "static_drift"

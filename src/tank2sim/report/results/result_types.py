@@ -55,6 +55,12 @@ RESULT_TYPES = (
     ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
+    ResultType(
+        "Captive tests to MMG",
+        "reduce",
+        ("campaign", "coefficients", "yaw_arm"),
+        ("coefficients.w_P0.value",),
+    ),
     ResultType("Captive tests", "reduce", ("campaign", "derivatives"), ("test.speed_mps",)),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Towed vehicle", "tow", ("tows", "methods", "mass_kg"), ("readings",)),

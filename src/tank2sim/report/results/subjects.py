@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tank2sim.report.autopilot.page import autopilot_page
+from tank2sim.report.captive.mmg_page import mmg_reduction_page
 from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
@@ -90,6 +91,11 @@ _PAGES: Mapping[str, _Page] = {
             "imo": list,
             "notices": list,
         },
+    ),
+    "Captive tests to MMG": _Page(
+        mmg_reduction_page,
+        {"coefficients": dict, "channels": dict, "readings": dict, "yaw_arm": dict, "conditions": list}
+        | {"model": str, "notices": list},
     ),
     "Towed vehicle": _Page(
         tow_page, {"tows_of_the_paper": bool, "speeds": dict, "models": list, "tow_by_tow": dict, "methods": dict}

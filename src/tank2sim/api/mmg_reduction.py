@@ -1,0 +1,241 @@
+"""Steady captive tests reduced to the coefficients of the MMG method, as a result with its card."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.ship import Ship
+from tank2sim.cards import Card, parse_card
+from tank2sim.cards.card import PROPELLER_COEFFICIENTS
+from tank2sim.cards.covariance import Covariance
+from tank2sim.dynamics.mmg.hull import MMG_TERMS
+from tank2sim.errors import InputError
+from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, mmg_card_text
+from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit, fit_mmg
+from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, read_steady_tests
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_UNEXPLAINED = 0.5
+"""Share of a channel (rms of what is left over rms of the readings) from which the method is not that of the
+ship, and the result is refused. Project choice: a wrong sign leaves more than 1, HMRI's KVLCC2 at most 0.13."""
+_FAR = 3.0
+"""Deviations from ordinary ships from which a coefficient is named (project choice)."""
+_UNITS = ("N", "N", "N.m", "N", "N")
+
+
+@dataclass(frozen=True)
+class MmgCoefficient:
+    """One coefficient of the method.
+
+    Parameters
+    ----------
+    value, standard_error : float
+        Of the hull by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them.
+    origin : str
+        ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open``: that of ordinary ships.
+    """
+
+    value: float
+    standard_error: float
+    origin: str
+
+
+class MmgReductionResult(PagedResult):
+    """Coefficients of the MMG method from steady captive tests.
+
+    Parameters
+    ----------
+    fit : MmgFit
+
+    Raises
+    ------
+    InputError
+        The method does not describe a channel: its sign, unit or scale is another.
+    """
+
+    command = "reduce"
+
+    def __init__(self, fit: MmgFit) -> None:
+        self.fit = fit
+        for channel, share in zip(CHANNELS, self.unexplained, strict=True):
+            if share > _UNEXPLAINED:
+                problem = f"{channel}: the MMG method leaves {100 * share:.0f} % of the readings unexplained"
+                remedy = "check sign, unit and scaling of the column, normal_force_sign and the revolutions"
+                raise InputError(fit.tests.path, "averages.columns", problem, remedy)
+        self.notices = self._notices()
+
+    @cached_property
+    def unexplained(self) -> tuple[float, ...]:
+        """rms of what is left over rms of the readings, of each channel."""
+        left = np.sqrt(np.mean(self.fit.residuals**2, axis=0) / np.mean(self.fit.tests.readings**2, axis=0))
+        return tuple(map(float, left))
+
+    @cached_property
+    def coefficients(self) -> Mapping[str, MmgCoefficient]:
+        """Coefficients by the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot."""
+        fit, found = self.fit, {}
+        for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
+            if name == "rudder_offset":
+                continue
+            key, sign = _card_key(name)
+            origin = "estimated" if name in MASS_KEYS else "open" if name in fit.open else "measured"
+            found[key] = MmgCoefficient(sign * float(value), float(error), origin)
+        for name, (mean, deviation) in ORDINARY.items():
+            if name not in found:
+                found[name] = MmgCoefficient(mean, deviation, "open")
+        return found
+
+    @cached_property
+    def card(self) -> Card:
+        """The MMG card found, with the covariance of its coefficients; ``card.save("ship.toml")`` writes it."""
+        fit = self.fit
+        values = {name: mean for name, (mean, _) in ORDINARY.items()} | dict(
+            zip(fit.names, map(float, fit.values), strict=True)
+        )
+        values = {name: 0.0 for name in fit.not_excited if name not in ("Y0", "N0")} | values
+        errors = {name: deviation for name, (_, deviation) in ORDINARY.items()} | dict(
+            zip(fit.names, map(float, fit.errors), strict=True)
+        )
+        path = fit.tests.path
+        source = f"{path.resolve().parent.name}/{path.name}"
+        note = f"tank2sim reduce --model mmg {source}: {len(fit.tests.names)} steady conditions"
+        card = parse_card(mmg_card_text(fit.tests, values, errors, note), "the reduced card")
+        kept = [i for i, name in enumerate(fit.names) if name != "rudder_offset"]
+        keys = [_card_key(fit.names[i]) for i in kept]
+        signs = np.array([sign for _, sign in keys])
+        matrix = fit.covariance[np.ix_(kept, kept)] * np.outer(signs, signs)
+        return replace(card, covariance=Covariance(tuple(_place(key) for key, _ in keys), matrix))
+
+    @property
+    def ship(self) -> Ship:
+        """The ship of the card found."""
+        return Ship(self.card)
+
+    @property
+    def derivatives(self) -> pd.DataFrame:
+        """Coefficients by name: value, standard error, origin; hull in prime II."""
+        import pandas as pd
+
+        rows = {name: asdict(coefficient) for name, coefficient in self.coefficients.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        fit = self.fit
+        arm, arm_error = fit.yaw_arm()
+        computed = fit.tests.readings - fit.residuals
+        offset = fit.names.index("rudder_offset") if "rudder_offset" in fit.names else None
+        return {
+            "campaign": str(fit.tests.path),
+            "model": fit.tests.form.model.name,
+            "coefficients": {name: asdict(coefficient) for name, coefficient in self.coefficients.items()},
+            "yaw_arm": {"value": arm, "standard_error": arm_error},
+            "rudder_angle_of_no_force_deg": None if offset is None else -float(np.degrees(fit.values[offset])),
+            "channels": {
+                name: {"unit": unit, "standard_deviation": float(deviation), "unexplained": share}
+                for name, unit, deviation, share in zip(CHANNELS, _UNITS, fit.sigmas, self.unexplained, strict=False)
+            },
+            "open_water": {"points": len(fit.tests.open_water), "standard_deviation": float(fit.sigmas[-1])},
+            "readings": {
+                name: {"unit": unit, "measured": fit.tests.readings[:, i], "computed": computed[:, i]}
+                for i, (name, unit) in enumerate(zip(CHANNELS, _UNITS, strict=True))
+            },
+            "conditions": list(fit.tests.names),
+            "not_excited": list(fit.not_excited),
+            "notices": list(self.notices),
+        }
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """How many coefficients of how many conditions."""
+        origins = [coefficient.origin for coefficient in self.coefficients.values()]
+        tests = self.fit.tests
+        text = f"{tests.form.model.name}: {origins.count('measured')} coefficients of the MMG method from "
+        text += f"{len(tests.names)} steady conditions"
+        if origins.count("open"):
+            text += f"; {origins.count('open')} are open, and those of ordinary ships"
+        return (f"{text}.",)
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Coefficients, and how well the readings are computed."""
+        rows = [
+            (name, f"{found.value:.4g} ± {found.standard_error:.2g}", found.origin)
+            for name, found in self.coefficients.items()
+        ]
+        arm, error = self.fit.yaw_arm()
+        rows.append(("x_R + a_H x_H", f"{arm:.4g} ± {error:.2g}", "measured"))
+        left = [
+            (name, unit, f"{deviation:.3g}", f"{100 * share:.2g}")
+            for name, unit, deviation, share in zip(CHANNELS, _UNITS, self.fit.sigmas, self.unexplained, strict=False)
+        ]
+        return (
+            ResultTable("Coefficients (hull: prime II, by 1/2 rho L d U²)", ("", "value", ""), rows),
+            ResultTable("What is left of the readings", ("", "unit", "standard deviation", "% of the rms"), left),
+        )
+
+    def _notices(self) -> tuple[str, ...]:
+        fit, found = self.fit, list(self.fit.tests.remarks)
+        if opened := [name for name, entry in self.coefficients.items() if entry.origin == "open"]:
+            found.append(f"The tests leave open, and the card has the values of ordinary ships: {', '.join(opened)}.")
+        if missing := [name for name in fit.not_excited if name not in ("Y0", "N0")]:
+            found.append(
+                f"No condition shows {', '.join(missing)}: they are zero on the card, and a turn simulated "
+                "with it is as wrong as that."
+            )
+        for name, (mean, deviation) in ORDINARY.items():
+            entry = self.coefficients[name]
+            if abs(entry.value - mean) > _FAR * deviation:
+                found.append(f"{name} is {entry.value:.3g}; ordinary ships have {mean:g} ± {deviation:g}.")
+        if "rudder_offset" in fit.names:
+            angle = -np.degrees(fit.value("rudder_offset"))
+            found.append(
+                f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of "
+                "the propeller or the zero of the gear; the card does not have it."
+            )
+        if fit.tests.form.uncertainty.model_fields_set:
+            found.append("[uncertainty] of the campaign is not in these standard errors, which are of the scatter.")
+        found.append("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated.")
+        return tuple(found)
+
+
+def _card_key(name: str) -> tuple[str, float]:
+    """Key of a coefficient on an MMG card, and its sign there."""
+    if name == "X0":
+        return "R0", -1.0
+    return (MASS_KEYS[name], -1.0) if name in MASS_KEYS else (name, 1.0)
+
+
+def _place(key: str) -> str:
+    if key in MMG_TERMS or key in ("R0", *MASS_KEYS.values()):
+        return f"derivatives.{key}"
+    return f"propeller.{key}" if key in PROPELLER_COEFFICIENTS else f"rudder.{key}"
+
+
+def reduce_to_mmg(campaign: str | Path) -> MmgReductionResult:
+    """Reduce steady captive tests with thrust and rudder normal force to the coefficients of the MMG method.
+
+    One weighted regression of X, Y, N, thrust and normal force of all conditions, with the open-water points, gives the
+    hull (R_0' to N_rrr'), t_P, w_P0, C_1, C_2+-, t_R, a_H, x_H', eps, kappa, l_R' and gamma_R+- with standard errors
+    (Yasukawa and Yoshimura 2015; :mod:`tank2sim.identification.captive_mmg.regression`).
+
+    Parameters
+    ----------
+    campaign : path
+        ``campaign.toml`` with ``[averages]``, ``[open_water]``, ``[propeller]`` and ``[rudder]``.
+
+    Raises
+    ------
+    InputError
+        A file is missing or at fault, the tests do not show hull or rudder, or the method does not describe a channel.
+    """
+    return MmgReductionResult(fit_mmg(read_steady_tests(Path(campaign))))

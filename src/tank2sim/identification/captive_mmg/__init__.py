@@ -1,0 +1,1 @@
+"""Steady captive tests with thrust and rudder normal force, reduced to a ship by the MMG method."""

@@ -1,0 +1,102 @@
+"""The MMG card of a tested model, with what was found and what had to be estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import tomlkit
+
+from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS
+from tank2sim.cards.mmg import fujii
+from tank2sim.dynamics.mmg.hull import HULL_TERMS
+from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
+from tank2sim.identification.estimates import Particulars, estimate
+
+MASS_KEYS = {"Xudot": "mx", "Yvdot": "my", "Nrdot": "Jz"}
+"""Derivative to its name on an MMG card, of which it is the negative."""
+
+
+def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> str:
+    """The text of a card.
+
+    Parameters
+    ----------
+    tests : SteadyTests
+    values, errors : mapping
+        Coefficients of hull (prime II, by 1/2 rho L d U^2), propeller and rudder by name, and their standard errors.
+    note : str
+        Of where they are from.
+    """
+    form = tests.form
+    model, rudder = form.model, form.rudder
+    assert rudder is not None and model.draught_m is not None and model.beam_m is not None
+    volume_unit = 0.5 * form.test.water_density_kgpm3 * model.length_m**2 * model.draught_m
+    inertia = model.yaw_inertia_kgm2 or model.mass_kg * ((0.25 * model.length_m) ** 2 + model.x_G_m**2)
+    document = tomlkit.document()
+    document["format"] = "tank2sim-ship/1"
+    document["ship"] = {
+        "name": model.name,
+        "length_m": model.length_m,
+        "beam_m": model.beam_m,
+        "draught_m": model.draught_m,
+        "displacement_kg": model.mass_kg,
+        "propeller_diameter_m": model.propeller_diameter_m,
+        "rudder_area_m2": model.rudder_area_m2,
+        "source": note,
+    }
+    document["environment"] = {
+        "water_density_kgpm3": form.test.water_density_kgpm3,
+        "gravity_mps2": form.test.gravity_mps2,
+    }
+    document["model"] = {"kind": "mmg", "speed_mps": form.test.speed_mps}
+    document["rigid_body"] = {
+        "mass": _rounded(model.mass_kg / volume_unit),
+        "yaw_inertia": _rounded(inertia / (volume_unit * model.length_m**2)),
+        "x_G": _rounded(model.x_G_m / model.length_m),
+    }
+    derivatives, uncertainty = tomlkit.table(), tomlkit.table()
+    of_hull = [name for names in HULL_TERMS.values() for name in names if name in values]
+    for name in of_hull:
+        key, sign = ("R0", -1.0) if name == "X0" else (name, 1.0)
+        derivatives[key] = _rounded(sign * values[name])
+        if name in errors:
+            uncertainty[key] = _rounded(errors[name], 3)
+    for name, (value, error) in estimated_masses(tests).items():
+        number = tomlkit.item(_rounded(-values.get(name, value)))
+        derivatives[MASS_KEYS[name]] = number.comment("ESTIMATED, not from steady tests")
+        uncertainty[MASS_KEYS[name]] = _rounded(errors.get(name, error), 3)
+    propeller, of_rudder = tomlkit.table(), tomlkit.table()
+    propeller["x_P"] = form.propeller.x_P
+    of_rudder["height_m"] = rudder.height_m
+    of_rudder["f_alpha"] = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
+    of_rudder["x_R"] = rudder.x_R
+    for name in (name for name in values if name in PROPELLER_COEFFICIENTS or name in RUDDER_COEFFICIENTS):
+        (propeller if name in PROPELLER_COEFFICIENTS else of_rudder)[name] = _rounded(values[name])
+        if name in errors:
+            uncertainty[name] = _rounded(errors[name], 3)
+    document["derivatives"], document["propeller"], document["rudder"] = derivatives, propeller, of_rudder
+    document["uncertainty"] = uncertainty
+    return tomlkit.dumps(document)
+
+
+def estimated_masses(tests: SteadyTests) -> dict[str, tuple[float, float]]:
+    """X_udot, Y_vdot, N_rdot (prime II) and their standard errors, from :mod:`tank2sim.identification.estimates`."""
+    form = tests.form
+    model = form.model
+    assert model.beam_m is not None and model.draught_m is not None
+    particulars = Particulars(
+        length_m=model.length_m,
+        beam_m=model.beam_m,
+        draught_m=model.draught_m,
+        density_kgpm3=form.test.water_density_kgpm3,
+        mass_kg=model.mass_kg,
+        block_coefficient=model.block_coefficient,
+        x_G_m=model.x_G_m,
+    )
+    ratio = model.length_m / model.draught_m
+    found = estimate(particulars, MASS_KEYS)
+    return {name: (ratio * number.value, ratio * number.standard_error) for name, number in found.items()}
+
+
+def _rounded(value: float, figures: int = 7) -> float:
+    return float(f"{value:.{figures}g}")

@@ -1,0 +1,348 @@
+"""One weighted regression of all steady captive tests on the MMG method, by the equations of the simulated ship.
+
+The readings of each condition (u, v, r, delta, n) are X, Y, N, T and F_N of :mod:`tank2sim.dynamics.mmg`; the points of
+the open-water curve are K_T = k_0 + k_1 J + k_2 J^2. All coefficients theta are found together:
+
+    minimise  sum_c sum_i (y_ci - f_c(theta))^2/sigma_c^2 + sum_k (theta_k - m_k)^2/s_k^2
+
+The error sigma_c of a channel is estimated from what is left, sigma_c^2 = RSS_c/(n_c - p_c), p_c the trace of its share
+of the projection (variance components: Förstner 1979). m_k and s_k are those of ordinary ships with one screw, wide
+enough that only what the tests leave open takes its value from there; such coefficients are marked. m_x' and m_y',
+which steady tests do not show, have those of a published estimate: its error is in those of Y_r' and X_vr'. The
+covariance is the inverse of the normal matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from tank2sim.arrays import Array
+from tank2sim.cards import parse_card
+from tank2sim.cards.card import MmgCard
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.identification.captive_mmg.card_text import estimated_masses, mmg_card_text
+from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, SteadyTests
+
+ORDINARY: dict[str, tuple[float, float]] = {
+    "t_P": (0.2, 0.1),
+    "w_P0": (0.35, 0.2),
+    "C_1": (2.0, 2.0),
+    "C_2_plus": (1.4, 0.5),
+    "C_2_minus": (1.2, 0.5),
+    "t_R": (0.35, 0.2),
+    "a_H": (0.3, 0.3),
+    "x_H": (-0.45, 0.2),
+    "eps": (1.1, 0.3),
+    "kappa": (0.5, 0.3),
+    "l_R": (-0.8, 0.4),
+    "gamma_R_plus": (0.5, 0.3),
+    "gamma_R_minus": (0.5, 0.3),
+}
+"""Mean and standard deviation among ordinary ships with one screw. Project choice: they enclose those of the KVLCC2
+(Yasukawa and Yoshimura 2015) within one deviation or about it."""
+_LIMITS: dict[str, tuple[float, float]] = {
+    "t_P": (-0.9, 0.9),
+    "w_P0": (-0.9, 0.9),
+    "C_1": (0.0, 50.0),
+    "C_2_plus": (0.0, 5.0),
+    "C_2_minus": (0.0, 5.0),
+    "eps": (0.2, 3.0),
+    "kappa": (0.0, 3.0),
+}
+"""Limits in which a coefficient is looked for. Project choice: beyond them it is not that of a ship; the regression
+would otherwise fit a normal force of the other sign by eps < 0."""
+OPEN = 0.7
+"""Standard error over that of ordinary ships from which a coefficient is called open. Project choice: the tests then
+halve the variance at best."""
+OFFSETS = ("Y0", "N0", "rudder_offset")
+"""Of a model that is not alike to both sides: force and moment straight ahead, and the angle of no rudder force."""
+KEPT_FROM = 3.0
+"""Standard errors from which an offset is kept. Project choice: by chance in three of a thousand."""
+_QUANTITIES = ("force.X", "force.Y", "force.N", "propeller.thrust", "rudder.normal_force")
+_MOTION = ("motion.u", "motion.v", "motion.r", "rudder.angle", "propeller.speed")
+_START_X0 = -0.02
+"""X_0' (prime II) with which the regression starts: the KVLCC2 has -0.022."""
+_START_SIGMA = 0.05
+"""Error of a channel over its standard deviation with which the regression starts (project choice, without effect on
+the result)."""
+_SETTLED = 1e-3
+"""Relative change of the errors of the channels at which they have converged (project choice)."""
+_ROUNDS = 12
+"""Rounds of the variance components; they converge in four to eight (project choice)."""
+_FEWEST = 12
+"""Conditions below which no regression is tried. Project choice: the method has some 25 coefficients, and five readings
+a condition."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MmgFit:
+    """Coefficients of the MMG method from steady tests.
+
+    Parameters
+    ----------
+    tests : SteadyTests
+    names : tuple of str, (k,)
+        Coefficients; those of the hull in prime II; ``rudder_offset`` in rad.
+    values : array, (k,)
+    covariance : array, (k, k)
+    sigmas : array, (6,)
+        Standard deviation of what is left of :data:`CHANNELS` (N, N m) and of K_T.
+    residuals : array, (conditions, 5)
+        Measured less computed, N and N m.
+    explained : array, (5,)
+        Share of the variance of each channel that is explained.
+    not_excited : tuple of str
+        Coefficients of the hull that no condition shows; zero.
+    """
+
+    tests: SteadyTests
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    sigmas: Array
+    residuals: Array
+    explained: Array
+    not_excited: tuple[str, ...]
+
+    @cached_property
+    def errors(self) -> Array:
+        """Standard errors, (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Coefficients that the tests leave open: they are those of ordinary ships."""
+        pairs = zip(self.names, self.errors, strict=True)
+        return tuple(name for name, error in pairs if name in ORDINARY and error > OPEN * ORDINARY[name][1])
+
+    def in_errors(self, name: str) -> float:
+        """Size of a coefficient over its standard error."""
+        return abs(self.value(name)) / float(self.errors[self.names.index(name)])
+
+    def value(self, name: str) -> float:
+        """A coefficient; 0 if it was not fitted."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    def yaw_arm(self) -> tuple[float, float]:
+        """x_R' + a_H x_H', which tests show better than x_H' itself, and its standard error."""
+        assert self.tests.form.rudder is not None
+        a_H, x_H = self.value("a_H"), self.value("x_H")
+        slopes = np.zeros(len(self.names))
+        slopes[self.names.index("a_H")], slopes[self.names.index("x_H")] = x_H, a_H
+        return self.tests.form.rudder.x_R + a_H * x_H, float(np.sqrt(slopes @ self.covariance @ slopes))
+
+
+def fit_mmg(tests: SteadyTests) -> MmgFit:
+    """Fit all coefficients that the tests show.
+
+    Raises
+    ------
+    InputError
+        There are too few conditions, or none with the rudder over, or none at drift: no hull or no rudder is found.
+    """
+    _refuse_poor(tests)
+    names, not_excited = _fitted_names(tests)
+    model = build(start_card(tests))
+    found = _Regression(tests, model, tuple(names)).fit(not_excited)
+    while weak := {name: t for name in OFFSETS if name in names and (t := found.in_errors(name)) < KEPT_FROM}:
+        names.remove(min(weak, key=lambda name: weak[name]))
+        found = _Regression(tests, model, tuple(names)).fit(not_excited)
+    return found
+
+
+def _refuse_poor(tests: SteadyTests) -> None:
+    count, remedy = len(tests.names), "test it, or reduce the others without --model mmg"
+    if count < _FEWEST:
+        raise InputError(tests.path, "averages", f"has {count} conditions", f"{_FEWEST} and more are needed")
+    for column, what in ((3, "rudder angle"), (1, "drift angle")):
+        if len(np.unique(np.round(tests.motion[:, column], 6))) < 3:
+            raise InputError(tests.path, "averages", f"has less than three values of the {what}", remedy)
+    for channel, readings in zip(CHANNELS, tests.readings.T, strict=True):
+        if not np.ptp(readings) > 0:
+            raise InputError(tests.path, "averages", f"{channel} is the same in all conditions", "the gauge is dead")
+
+
+def _fitted_names(tests: SteadyTests) -> tuple[list[str], tuple[str, ...]]:
+    """Names to fit, and terms of the hull that no condition excites."""
+    v, r = -tests.motion[:, 1] / tests.speed_mps, tests.yaw_rate_prime
+    hull, missing = [], []
+    columns: dict[str, list[Array]] = {force: [] for force in HULL_TERMS}
+    for force, terms in HULL_TERMS.items():
+        for name in terms:
+            powers = name[1:]
+            column = v ** powers.count("v") * r ** powers.count("r")
+            trial = np.column_stack([*columns[force], column])
+            scaled = trial / np.maximum(np.linalg.norm(trial, axis=0), 1e-12)
+            if np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-3:
+                missing.append(name)
+                continue
+            columns[force].append(column)
+            hull.append(name)
+    turning = ("l_R", "Xudot", "Yvdot")
+    others = [name for name in (*ORDINARY, "Xudot", "Yvdot") if name not in turning or np.any(r)]
+    return ["k_0", "k_1", "k_2", *others, *hull, "rudder_offset"], tuple(missing)
+
+
+def start_card(tests: SteadyTests) -> MmgCard:
+    """A card with the coefficients of ordinary ships and no hull but its resistance."""
+    J, K_T = tests.open_water.T
+    k = np.linalg.lstsq(np.vander(J, 3, increasing=True), K_T, rcond=None)[0]
+    values = {name: mean for name, (mean, _) in ORDINARY.items()}
+    values |= dict(zip(("k_0", "k_1", "k_2"), map(float, k), strict=True))
+    hull = {name: 0.0 for names in HULL_TERMS.values() for name in names}
+    text = mmg_card_text(tests, {**hull, **values, "X0": _START_X0}, {}, "start of the regression")
+    card = parse_card(text, str(tests.path))
+    assert isinstance(card, MmgCard)
+    return card
+
+
+def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Function:
+    """The readings and their slopes: (motion (5,), theta (k,)) to (readings (5,), slopes (5, k)).
+
+    Parameters
+    ----------
+    model : Model
+        Of an MMG card.
+    names : sequence of str, (k,)
+    units : array, (k,)
+        What one of a coefficient is in the model: L/d of those of the hull.
+    """
+    theta, motion = ca.SX.sym("theta", len(names)), ca.SX.sym("motion", len(_MOTION))
+    given = {name: motion[i] for i, name in enumerate(_MOTION)}
+    for i, name in enumerate(names):
+        given[_variable(name)] = units[i] * theta[i]
+    if "rudder_offset" in names:
+        given["rudder.angle"] = motion[3] + theta[names.index("rudder_offset")]
+    given["low_speed.bound"] = ca.SX(0)  # captive tests are steady: the polynomial holds at every speed of them
+    states = ca.vertcat(*(given.get(name, ca.SX(0)) for name in model.state_names))
+    inputs = ca.vertcat(
+        *(given.get(name, value) for name, value in zip(model.input_names, model.input_values(), strict=True))
+    )
+    stated = zip(model.parameter_names, model.parameter_values(), strict=True)
+    parameters = ca.vertcat(*(given.get(name, value) for name, value in stated))
+    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in _QUANTITIES)))
+    forces = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
+    return ca.Function("readings", [motion, theta], [forces, ca.jacobian(forces, theta)])
+
+
+def _variable(name: str) -> str:
+    """Name of a coefficient's parameter in the model."""
+    return f"derivatives.{name}" if name in MMG_TERMS else f"mmg.{name}"
+
+
+@dataclass(frozen=True, eq=False)
+class _Regression:
+    """The regression of one set of coefficients.
+
+    Parameters
+    ----------
+    tests : SteadyTests
+    model : Model
+    names : tuple of str
+    """
+
+    tests: SteadyTests
+    model: Model
+    names: tuple[str, ...]
+
+    @cached_property
+    def priors(self) -> dict[int, tuple[float, float]]:
+        """Place of a coefficient to mean and standard deviation."""
+        known = {**ORDINARY, **estimated_masses(self.tests)}
+        return {i: known[name] for i, name in enumerate(self.names) if name in known}
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Lowest and highest coefficients, (k,) each."""
+        pairs = np.array([_LIMITS.get(name, (-np.inf, np.inf)) for name in self.names])
+        return pairs[:, 0], pairs[:, 1]
+
+    @cached_property
+    def powers(self) -> Array:
+        """1, J, J^2 of the open-water points, (points, 3)."""
+        return np.vander(self.tests.open_water[:, 0], 3, increasing=True)
+
+    @cached_property
+    def channel(self) -> NDArray[np.int_]:
+        """Channel of each equation: five of the conditions, then the open-water points."""
+        count, points = len(self.tests.names), len(self.tests.open_water)
+        return np.concatenate([np.repeat(np.arange(len(CHANNELS)), count), np.full(points, len(CHANNELS))])
+
+    @cached_property
+    def _computed(self) -> ca.Function:
+        form = self.tests.form
+        assert form.model.draught_m is not None
+        ratio = form.model.draught_m / form.model.length_m
+        units = np.array([ratio if _variable(name).startswith("derivatives") else 1.0 for name in self.names])
+        return computed_readings(self.model, self.names, units).map(len(self.tests.names))
+
+    def misfit(self, theta: Array) -> Array:
+        """Measured less computed, (equations,), N, N m and K_T."""
+        forces, _ = self._computed(self.tests.motion.T, np.tile(theta[:, None], len(self.tests.names)))
+        curve = self.tests.open_water[:, 1] - self.powers @ theta[:3]
+        return np.concatenate([(self.tests.readings.T - np.array(forces)).ravel(), curve])
+
+    def slopes(self, theta: Array) -> Array:
+        """Of the misfit, (equations, k)."""
+        count = len(self.tests.names)
+        _, jacobian = self._computed(self.tests.motion.T, np.tile(theta[:, None], count))
+        by_condition = np.array(jacobian).reshape(len(CHANNELS), count, len(self.names))
+        curve = np.pad(self.powers, ((0, 0), (0, len(self.names) - 3)))
+        return -np.vstack([*by_condition, curve])
+
+    def start(self) -> Array:
+        """Means of ordinary ships, no hull but its resistance."""
+        theta = np.zeros(len(self.names))
+        for i, (mean, _) in self.priors.items():
+            theta[i] = mean
+        theta[:3] = np.linalg.lstsq(self.powers, self.tests.open_water[:, 1], rcond=None)[0]
+        theta[self.names.index("X0")] = _START_X0
+        return theta
+
+    def fit(self, not_excited: tuple[str, ...]) -> MmgFit:
+        """Least squares and variance components in turn until both stay."""
+        tests, channel = self.tests, self.channel
+        sizes = np.append(tests.readings.std(axis=0), tests.open_water[:, 1].std())
+        theta, sigmas = self.start(), _START_SIGMA * sizes
+        by_prior = np.array([np.eye(len(theta))[i] / spread for i, (_, spread) in self.priors.items()])
+        means = np.array([mean / spread for mean, spread in self.priors.values()])
+        for _ in range(_ROUNDS):
+            weights = 1 / sigmas[channel]
+
+            def weighted(theta: Array, weights: Array = weights) -> Array:
+                return np.concatenate([weights * self.misfit(theta), by_prior @ theta - means])
+
+            def weighted_slopes(theta: Array, weights: Array = weights) -> Array:
+                return np.vstack([weights[:, None] * self.slopes(theta), by_prior])
+
+            theta = least_squares(weighted, theta, jac=weighted_slopes, bounds=self.limits, x_scale="jac", xtol=1e-12).x
+            orthogonal, triangle = np.linalg.qr(weighted_slopes(theta))
+            free = 1 - np.sum(orthogonal[: len(channel)] ** 2, axis=1)
+            squares = np.bincount(channel, self.misfit(theta) ** 2)
+            before = sigmas
+            sigmas = np.maximum(np.sqrt(squares / np.maximum(np.bincount(channel, free), 1.0)), 1e-6 * sizes)
+            if np.all(np.abs(sigmas / before - 1) < _SETTLED):
+                break
+        inverse = np.linalg.inv(triangle)
+        count = len(tests.names)
+        residuals = self.misfit(theta)[: count * len(CHANNELS)].reshape(len(CHANNELS), count).T
+        return MmgFit(
+            tests=tests,
+            names=self.names,
+            values=theta,
+            covariance=inverse @ inverse.T,
+            sigmas=sigmas,
+            residuals=residuals,
+            explained=1 - residuals.var(axis=0) / tests.readings.var(axis=0),
+            not_excited=not_excited,
+        )

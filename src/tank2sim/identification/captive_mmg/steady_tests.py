@@ -1,0 +1,158 @@
+"""Steady captive tests (drift, rudder, turning, load variation) as the regression of the MMG method takes them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.reading import faults_of_toml
+from tank2sim.dynamics.rigid_body import inertial_forces
+from tank2sim.errors import InputError
+from tank2sim.files import read_text
+from tank2sim.records.averages import Condition, read_averages, read_columns
+from tank2sim.records.campaign_form import CampaignFile, campaign_file
+
+CHANNELS = ("X", "Y", "N", "T", "F_N")
+"""Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SteadyTests:
+    """Steady conditions of one campaign and the open-water curve of its propeller.
+
+    Parameters
+    ----------
+    path : Path
+        Of the campaign's file.
+    form : CampaignFile
+        What it states.
+    names : tuple of str, (conditions,)
+        File and line of each condition.
+    motion : array, (conditions, 5)
+        u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
+    readings : array, (conditions, 5)
+        :data:`CHANNELS`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
+    open_water : array, (points, 2)
+        J and K_T.
+    remarks : tuple of str
+        Of reading the files.
+    """
+
+    path: Path
+    form: CampaignFile
+    names: tuple[str, ...]
+    motion: Array
+    readings: Array
+    open_water: Array
+    remarks: tuple[str, ...]
+
+    @property
+    def speed_mps(self) -> Array:
+        """U, m/s, (conditions,)."""
+        return np.hypot(self.motion[:, 0], self.motion[:, 1])
+
+    @property
+    def yaw_rate_prime(self) -> Array:
+        """r L/U, (conditions,)."""
+        return self.motion[:, 2] * self.form.model.length_m / self.speed_mps
+
+
+def read_steady_tests(path: Path) -> SteadyTests:
+    """The conditions that ``[averages]`` of a campaign names, with thrust and normal force.
+
+    Raises
+    ------
+    InputError
+        The file or its table is at fault, or lacks what the MMG method needs: thrust, normal force, revolutions, the
+        open-water curve, and the sizes of model, propeller and rudder.
+    """
+    text = read_text(path)
+    with faults_of_toml(str(path)):
+        content = tomllib.loads(text)
+    form, factors = campaign_file(content, path)
+    _refuse_missing(form, path)
+    conditions, remarks = read_averages(form, factors, path)
+    return SteadyTests(
+        path=path,
+        form=form,
+        names=tuple(condition.name for condition in conditions),
+        motion=np.array([_motion(condition) for condition in conditions]),
+        readings=np.array([_readings(condition, form) for condition in conditions]),
+        open_water=_open_water(form, path),
+        remarks=tuple(remarks),
+    )
+
+
+def _refuse_missing(form: CampaignFile, path: Path) -> None:
+    """Raise InputError for the first thing that the MMG method needs and the campaign does not state."""
+    if form.averages is None:
+        remedy = "give one row a condition in a table, with [averages.columns]"
+        raise InputError(path, "averages", "is missing: MMG takes averages of steady tests", remedy)
+    columns = form.averages.columns
+    needed: Mapping[str, tuple[object, str]] = {
+        "averages.columns.thrust": (columns.thrust, "the wake follows from the thrust: name its column"),
+        "averages.columns.rudder_normal_force": (
+            columns.rudder_normal_force,
+            "it separates the rudder from the hull: name its column",
+        ),
+        "test.propeller_radps": (
+            columns.propeller_radps or form.test.propeller_radps,
+            "give propeller_rps, or a column propeller_rps",
+        ),
+        "open_water": (form.open_water, "give J and K_T of the propeller, or a file of them"),
+        "rudder": (form.rudder, "give height_m, and aspect_ratio or f_alpha"),
+        "model.beam_m": (form.model.beam_m, "the added masses are estimated from it: add it"),
+        "model.draught_m": (form.model.draught_m, "add it"),
+        "model.propeller_diameter_m": (form.model.propeller_diameter_m, "add it"),
+        "model.rudder_area_m2": (form.model.rudder_area_m2, "add the area of the rudder"),
+    }
+    for place, (value, remedy) in needed.items():
+        if value is None:
+            raise InputError(path, place, "is missing, and the MMG method needs it", remedy)
+    assert form.rudder is not None
+    if (form.rudder.aspect_ratio is None) == (form.rudder.f_alpha is None):
+        given = "both are given" if form.rudder.f_alpha else "neither is given"
+        raise InputError(path, "rudder.f_alpha", f"and aspect_ratio: {given}", "give one of the two")
+
+
+def _motion(condition: Condition) -> tuple[float, ...]:
+    u, v = condition.speed_mps * np.cos(condition.drift_rad), -condition.speed_mps * np.sin(condition.drift_rad)
+    assert condition.propeller_radps is not None
+    return u, v, condition.yaw_rate_radps, condition.rudder_rad, condition.propeller_radps
+
+
+def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
+    """Readings as the force of the model on its gauge, positive as the water pushes it."""
+    sense = -1.0 if form.test.force_convention == "on_model" else 1.0
+    forces = sense * np.array([condition.X_N, condition.Y_N, condition.N_Nm])
+    if form.test.force_convention == "hydrodynamic":
+        u, v, r, _, _ = _motion(condition)
+        forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)
+    assert condition.thrust_N is not None and condition.rudder_normal_force_N is not None
+    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N
+
+
+def _open_water(form: CampaignFile, path: Path) -> Array:
+    section = form.open_water
+    assert section is not None
+    if section.file is None:
+        if isinstance(section.J, str) or isinstance(section.K_T, str):
+            raise InputError(path, "open_water.J", "is missing", "give lists J and K_T, or a file of them")
+        values = {"J": section.J, "K_T": section.K_T}
+    else:
+        if not (isinstance(section.J, str) and isinstance(section.K_T, str)):
+            raise InputError(path, "open_water.J", "is a list, and a file is given", "give one of the two")
+        columns = read_columns(path.parent / section.file, {"J": section.J, "K_T": section.K_T})
+        values = {key: columns[key] for key in ("J", "K_T")}
+    if len(values["J"]) != len(values["K_T"]):
+        problem = f"has {len(values['K_T'])} values and J {len(values['J'])}"
+        raise InputError(path, "open_water.K_T", problem, "give a K_T for each J")
+    if len(set(values["J"])) < 4:
+        remedy = "a quadratic and its error need four"
+        raise InputError(path, "open_water.J", "has less than four different values", remedy)
+    return np.column_stack([values["J"], values["K_T"]])

@@ -1,0 +1,93 @@
+"""The page of a reduction to the MMG method: coefficients, and computed readings against measured ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import altair as alt
+
+from tank2sim.report.kit.chart_parts import NUMBER, data
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.page import Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+
+_CHANNELS = {
+    "X": "surge force",
+    "Y": "sway force",
+    "N": "yaw moment",
+    "T": "thrust",
+    "F_N": "normal force of the rudder",
+}
+
+
+def mmg_reduction_page(found: Json) -> Page:
+    """The page of a result of ``reduce --model mmg``."""
+    coefficients = found["coefficients"]
+    opened = [name for name, entry in coefficients.items() if entry["origin"] == "open"]
+    rows = [[name, entry["value"], entry["standard_error"], entry["origin"]] for name, entry in coefficients.items()]
+    rows.append(["x_R + a_H x_H", found["yaw_arm"]["value"], found["yaw_arm"]["standard_error"], "measured"])
+    heads = ("coefficient", "value", "standard error", "origin")
+    left = [
+        [_CHANNELS[name], entry["unit"], entry["standard_deviation"], 100 * entry["unexplained"]]
+        for name, entry in found["channels"].items()
+    ]
+    left_heads = ("", "unit", "standard deviation", "% of the rms")
+    return Page(
+        title=f"{found['model']}: coefficients of the MMG method",
+        subtitle=f"From {len(found['conditions'])} steady captive conditions",
+        figures=[
+            KeyFigure(label="Conditions", value=len(found["conditions"])),
+            KeyFigure(label="Coefficients measured", value=sum(row[-1] == "measured" for row in rows[:-1])),
+            KeyFigure(
+                label="Left open by the tests",
+                value=len(opened),
+                verdict=Verdict.CAUTION if opened else Verdict.NONE,
+                note=", ".join(opened) or "none",
+            ),
+        ],
+        sections=[
+            PageSection(
+                heading="Coefficients",
+                text="One weighted regression of all readings. The hull is in prime II, by 1/2 rho L d U².",
+                tables=[PageTable(caption="Coefficients", columns=[Column(title=head) for head in heads], rows=rows)],
+                notes=found["notices"],
+            ),
+            PageSection(
+                heading="Computed against measured",
+                text="Each point is a condition; on the line the method gives what the gauge showed.",
+                charts=[
+                    Illustration(chart=computed_chart(name, readings)) for name, readings in found["readings"].items()
+                ],
+                tables=[
+                    PageTable(caption="What is left", columns=[Column(title=head) for head in left_heads], rows=left)
+                ],
+            ),
+        ],
+    )
+
+
+def computed_chart(name: str, readings: Mapping[str, Json], *, size_px: int = 300) -> alt.LayerChart:
+    """Computed over measured readings of one channel, with the line on which both are the same.
+
+    Parameters
+    ----------
+    name : str
+        Of the channel.
+    readings : mapping
+        ``unit``, and ``measured`` and ``computed``, (conditions,).
+    size_px : int
+        Width and height.
+    """
+    points = [{"m": m, "c": c} for m, c in zip(readings["measured"], readings["computed"], strict=True)]
+    unit = readings["unit"].replace(".", " ")
+    x = alt.X("m:Q", title=f"{name} measured ({unit})")
+    y = alt.Y("c:Q", title=f"{name} computed ({unit})")
+    tooltip = [alt.Tooltip("m:Q", title="measured", format=NUMBER), alt.Tooltip("c:Q", title="computed", format=NUMBER)]
+    ends = [min(readings["measured"]), max(readings["measured"])]
+    line = alt.Chart(data([{"m": end, "c": end} for end in ends])).mark_line(opacity=0.5).encode(x=x, y=y)
+    dots = alt.Chart(data(points)).mark_circle(size=36, opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
+    return alt.layer(line, dots).properties(
+        title=_CHANNELS[name].capitalize(),
+        width=size_px,
+        height=size_px,
+        description=f"Computed and measured {_CHANNELS[name]}.",
+    )

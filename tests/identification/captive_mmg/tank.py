@@ -1,0 +1,137 @@
+"""A tank that tests a ship by the equations of Yasukawa and Yoshimura (2015), written here once more in plain numpy."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+RHO, L, B, D, MASS, X_G = 1000.0, 7.0, 1.27, 0.46, 3270.0, 0.25
+D_P, A_R, H_R, F_ALPHA, X_P, X_R = 0.216, 0.0539, 0.345, 2.747, -0.48, -0.5
+NOISE = {"X": 0.4, "Y": 1.0, "N": 2.5, "T": 0.25, "F": 0.4, "K": 0.002}
+KVLCC2 = {
+    "R0": 0.022, "Xvv": -0.040, "Xvr": 0.002, "Xrr": 0.011, "Xvvvv": 0.771,
+    "Yv": -0.315, "Yr": 0.083, "Yvvv": -1.607, "Yvvr": 0.379, "Yvrr": -0.391, "Yrrr": 0.008,
+    "Nv": -0.137, "Nr": -0.049, "Nvvv": -0.030, "Nvvr": -0.294, "Nvrr": 0.055, "Nrrr": -0.013,
+    "mx": 0.022, "my": 0.223,
+    "k_0": 0.2931, "k_1": -0.2753, "k_2": -0.1385, "t_P": 0.22, "w_P0": 0.40, "C_1": 2.0, "C_2_plus": 1.6,
+    "C_2_minus": 1.1, "t_R": 0.387, "a_H": 0.312, "x_H": -0.464, "eps": 1.09, "kappa": 0.50, "l_R": -0.710,
+    "gamma_R_plus": 0.640, "gamma_R_minus": 0.395,
+}  # fmt: skip
+
+
+def conditions() -> np.ndarray:
+    """U (m/s), beta (rad), r', delta (rad), n (1/s): load variation, rudder, drift, drift with rudder, turning."""
+    deg, U, n = np.radians, 1.179, 10.4
+    rows = [(U, 0, 0, 0, n * load) for load in (0.5, 0.7, 0.85, 1, 1.15, 1.3, 1.6)]
+    rows += [(U, 0, 0, deg(d), n * load) for load in (0.8, 1, 1.4) for d in range(-35, 36, 5) if d]
+    rows += [(U, deg(b), 0, 0, n) for b in (-20, -16, -12, -8, -4, 4, 8, 12, 16, 20)]
+    rows += [(U, deg(b), 0, deg(d), n) for b in (-16, -8, 8, 16) for d in (-30, -15, 15, 30)]
+    rows += [(U, deg(b), r, 0, n) for r in (-0.8, -0.5, -0.25, 0.25, 0.5, 0.8) for b in (-16, -8, 0, 8, 16)]
+    rows += [(U, deg(b), r, deg(d), n) for r in (-0.5, 0.5) for b in (-8, 8) for d in (-25, 25)]
+    return np.array(rows)
+
+
+def forces(p: dict[str, float], U, beta, r, delta, n) -> dict[str, np.ndarray]:
+    """Gauge readings X, Y (N), N (N m) of a model in steady motion, its thrust T and normal force F (N)."""
+    u, v = np.cos(beta), -np.sin(beta)  # prime
+    unit = 0.5 * RHO * L * D * U**2
+    beta_P = beta - X_P * r
+    C_2 = np.where(beta_P > 0, p["C_2_plus"], p["C_2_minus"])
+    kept = (1 - p["w_P0"]) * (1 + (1 - np.exp(-p["C_1"] * np.abs(beta_P))) * (C_2 - 1))
+    J = u * U * kept / (n * D_P)
+    K_T = p["k_0"] + p["k_1"] * J + p["k_2"] * J**2
+    T = RHO * n**2 * D_P**4 * K_T
+    eta = D_P / H_R
+    race = (1 + p["kappa"] * (np.sqrt(1 + 8 * K_T / (np.pi * J**2)) - 1)) ** 2
+    u_R = p["eps"] * u * U * kept * np.sqrt(eta * race + 1 - eta)
+    beta_R = beta - p["l_R"] * r
+    v_R = U * np.where(beta_R > 0, p["gamma_R_plus"], p["gamma_R_minus"]) * beta_R
+    F = 0.5 * RHO * A_R * F_ALPHA * (u_R**2 + v_R**2) * np.sin(delta - np.arctan2(v_R, u_R))
+    hull_X = -p["R0"] + p["Xvv"] * v**2 + p["Xvr"] * v * r + p["Xrr"] * r**2 + p["Xvvvv"] * v**4
+    hull_Y, hull_N = (
+        p[f"{f}v"] * v + p[f"{f}r"] * r + p[f"{f}vvv"] * v**3 + p[f"{f}vvr"] * v**2 * r
+        + p[f"{f}vrr"] * v * r**2 + p[f"{f}rrr"] * r**3
+        for f in "YN"
+    )  # fmt: skip
+    m, x_G = MASS / (0.5 * RHO * L**2 * D), X_G / L
+    return {
+        "X": unit * (hull_X + (m + p["my"]) * v * r + x_G * m * r**2)
+        + (1 - p["t_P"]) * T - (1 - p["t_R"]) * F * np.sin(delta),
+        "Y": unit * (hull_Y - (m + p["mx"]) * u * r) - (1 + p["a_H"]) * F * np.cos(delta),
+        "N": L * (unit * (hull_N - x_G * m * u * r) - (X_R + p["a_H"] * p["x_H"]) * F * np.cos(delta)),
+        "T": T,
+        "F": F,
+    }  # fmt: skip
+
+
+def write_campaign(
+    folder: Path, p: dict[str, float], seed: int = 0, *, noise: float = 1.0, rows=None, rudder_zero: float = 0.0
+) -> Path:
+    """``campaign.toml`` and its tables in a folder; random errors of standard deviation `noise` times :data:`NOISE`."""
+    random, at = np.random.default_rng(seed), conditions() if rows is None else rows
+    U, beta, r, delta, n = at.T
+    read = forces(p, U, beta, r, delta + rudder_zero, n)
+    J = np.linspace(0, 0.9, 19)
+    K_T = p["k_0"] + p["k_1"] * J + p["k_2"] * J**2 + noise * NOISE["K"] * random.standard_normal(len(J))
+    with (folder / "runs.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["U", "beta", "r", "delta", "rps", "X", "Y", "N", "T", "F"])
+        measured = [read[key] + noise * NOISE[key] * random.standard_normal(len(U)) for key in "XYNTF"]
+        table.writerows(np.column_stack([U, np.degrees(beta), r, np.degrees(delta), n, *measured]).tolist())
+    with (folder / "water.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([("J", "K_T"), *zip(J.tolist(), K_T.tolist(), strict=True)])
+    path = folder / "campaign.toml"
+    path.write_text(f"""
+[model]
+name = "Tank ship"
+length_m = {L}
+beam_m = {B}
+draught_m = {D}
+mass_kg = {MASS}
+x_G_m = {X_G}
+propeller_diameter_m = {D_P}
+rudder_area_m2 = {A_R}
+[test]
+speed_mps = 1.179
+force_convention = "on_gauge"
+[open_water]
+file = "water.csv"
+[propeller]
+x_P = {X_P}
+[rudder]
+height_m = {H_R}
+f_alpha = {F_ALPHA}
+x_R = {X_R}
+[averages]
+file = "runs.csv"
+scaling = "dimensional"
+[averages.columns]
+drift_deg = "beta"
+rudder_deg = "delta"
+speed_mps = "U"
+yaw_rate_prime = "r"
+propeller_rps = "rps"
+X = "X"
+Y = "Y"
+N = "N"
+thrust = "T"
+rudder_normal_force = "F"
+""")
+    return path
+
+
+def hmri_campaign(data: Path, folder: Path) -> Path:
+    """HMRI's campaign with its columns of thrust and normal force, and the sizes of the KVLCC2 at 1:46.426."""
+    source = data / "data" / "kvlcc2_captive_hmri"
+    text = (source / "campaign.toml").read_text(encoding="utf-8")
+    text = text.replace('"captive.csv"', f'"{source / "captive.csv"}"')
+    sizes = f"propeller_diameter_m = {9.86 / 46.426}\nrudder_area_m2 = {112.5 / 46.426**2}\n"
+    water = f'[open_water]\nfile = "{source / "open_water_characteristics_captive.csv"}"\nK_T = "Kt"\n'
+    rudder = f"[propeller]\nx_P = -0.48\n[rudder]\nheight_m = {15.8 / 46.426}\nf_alpha = 2.747\n"
+    text = text.replace("[test]", f"{sizes}{water}{rudder}[test]")
+    text = text.replace('rudder_sign = "port"', 'rudder_sign = "port"\nnormal_force_sign = "starboard"')
+    columns = 'propeller_rps = "rps"\nthrust = "TX\'"\nrudder_normal_force = "RY\'"\n'
+    (folder / "campaign.toml").write_text(f"{text.rstrip()}\n{columns}", encoding="utf-8")
+    return folder / "campaign.toml"

@@ -1,0 +1,176 @@
+"""The reduction to the MMG method against a tank that is written by itself (tank.py), and against a real one (HMRI)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.errors import InputError
+from tank2sim.identification.captive_mmg.card_text import estimated_masses
+from tank2sim.identification.captive_mmg.regression import ORDINARY, fit_mmg
+from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
+from tests.cli.command_line import refused, tank2sim
+from tests.identification.captive_mmg.tank import KVLCC2, conditions, hmri_campaign, write_campaign
+
+SEEDS = 20
+
+
+def of_the_estimate(folder: Path) -> dict[str, float]:
+    """The KVLCC2 with the added masses that the reduction estimates, so that nothing but the readings is in error."""
+    masses = estimated_masses(read_steady_tests(write_campaign(folder, KVLCC2)))
+    return KVLCC2 | {"mx": -masses["Xudot"][0], "my": -masses["Yvdot"][0]}
+
+
+def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5)).coefficients
+    for name, value in truth.items():
+        assert found[name].value == pytest.approx(value, rel=2e-3, abs=2e-4), name
+    assert {entry.origin for name, entry in found.items() if name not in ("mx", "my")} == {"measured"}
+    assert found["mx"].origin == found["my"].origin == "estimated"
+
+
+def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
+    inside = []
+    for seed in range(SEEDS):
+        random = np.random.default_rng(7000 + seed)
+        truth = {name: value * random.uniform(0.85, 1.15) for name, value in KVLCC2.items()}
+        for name, (value, error) in estimated_masses(read_steady_tests(write_campaign(tmp_path, truth))).items():
+            key = {"Xudot": "mx", "Yvdot": "my"}.get(name, "")
+            truth |= {key: -value + error * random.standard_normal()} if key else {}
+        found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed)).coefficients
+        inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+def test_the_card_steers_like_the_ship_that_was_tested(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-4))
+    result.card.save(tmp_path / "found.toml")
+    found = t2s.load(tmp_path / "found.toml")
+    bundled, _, _ = t2s.load("kvlcc2-l7-mmg").card.text.partition("[steering_gear]")
+    inertia = -estimated_masses(result.fit.tests)["Nrdot"][0]
+    for old, new in (("mx = 0.022", truth["mx"]), ("my = 0.223", truth["my"]), ("Jz = 0.011", inertia)):
+        assert old in bundled
+        bundled = bundled.replace(old, f"{old[:2]} = {new}")
+    (tmp_path / "truth.toml").write_text(bundled)
+    for figure in ("advance_m", "tactical_diameter_m"):
+        values = [ship.turn(35).figures[figure] for ship in (found, t2s.load(tmp_path / "truth.toml"))]
+        assert values[0] == pytest.approx(values[1], rel=2e-3), figure
+    spread = found.turn(35, duration_s=60.0, members=3)
+    assert spread.to_dict()["ensemble"]
+
+
+def test_conventions_of_the_file_give_one_ship(tmp_path) -> None:
+    """Port-positive rudder, starboard-positive normal force, force of the carriage on the model, prime II."""
+    path = write_campaign(tmp_path, KVLCC2)
+    first = fit_mmg(read_steady_tests(path))
+    rows = (tmp_path / "runs.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    unit = 0.5 * 1000.0 * 7.0 * 0.46 * table[:, 0] ** 2
+    table[:, 3] *= -1
+    table[:, 5:8] *= -1
+    table[:, 9] *= -1
+    table[:, 5:] /= unit[:, None]
+    table[:, 7] /= 7.0
+    lines = [rows[0], *(",".join(map(repr, row)) for row in table.tolist())]
+    (tmp_path / "runs.csv").write_text("\n".join(lines))
+    text = path.read_text().replace(
+        '"dimensional"', '"prime_ii"\nrudder_sign = "port"\nnormal_force_sign = "starboard"'
+    )
+    path.write_text(text.replace('"on_gauge"', '"on_model"'))
+    again = fit_mmg(read_steady_tests(path))
+    assert again.names == first.names
+    np.testing.assert_allclose(again.values, first.values, rtol=1e-4, atol=1e-6)
+
+
+def test_forces_of_the_water_alone_have_no_inertia_of_the_body(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    path = write_campaign(tmp_path, truth, noise=1e-5)
+    U, beta, r, *_ = conditions().T
+    rate = r * U / 7.0
+    rows = (tmp_path / "runs.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    table[:, 5] -= 3270.0 * (-U * np.sin(beta) * rate + 0.25 * rate**2)
+    table[:, 6] += 3270.0 * U * np.cos(beta) * rate
+    table[:, 7] += 3270.0 * 0.25 * U * np.cos(beta) * rate
+    (tmp_path / "runs.csv").write_text("\n".join([rows[0], *(",".join(map(repr, row)) for row in table.tolist())]))
+    path.write_text(path.read_text().replace('"on_gauge"', '"hydrodynamic"'))
+    found = t2s.reduce_to_mmg(path).coefficients
+    for name in ("Yr", "Nr", "Xvr", "Yv"):
+        assert found[name].value == pytest.approx(truth[name], rel=2e-3, abs=2e-4), name
+
+
+def test_a_zero_of_the_rudder_is_found_and_not_taken_for_a_force(tmp_path) -> None:
+    found = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, rudder_zero=np.radians(1.5)))
+    assert found.content()["rudder_angle_of_no_force_deg"] == pytest.approx(-1.5, abs=0.1)
+    assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).content()["rudder_angle_of_no_force_deg"] is None
+
+
+def test_what_no_condition_shows_is_open_or_zero_and_named(tmp_path) -> None:
+    rows = conditions()
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, rows=rows[rows[:, 2] == 0]))
+    assert {"Yr", "Nr", "Xvr", "Nrrr"} <= set(result.fit.not_excited)
+    assert result.coefficients["l_R"].origin == "open"
+    assert result.coefficients["l_R"].standard_error == ORDINARY["l_R"][1]
+    assert result.card.derivatives["Yr"] == 0.0
+    one_sided = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, rows=rows[(rows[:, 2] == 0) & (rows[:, 1] >= 0)]))
+    assert one_sided.coefficients["C_2_minus"].origin == one_sided.coefficients["gamma_R_minus"].origin == "open"
+    assert one_sided.coefficients["gamma_R_plus"].origin == "measured"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[open_water]", "normal_force_sign_of = 1\n[open_water]", "normal_force_sign_of"),
+        ('scaling = "dimensional"', 'scaling = "dimensional"\nnormal_force_sign = "starboard"', "F_N"),
+        ('thrust = "T"\n', "", "averages.columns.thrust"),
+        ('rudder_normal_force = "F"\n', "", "averages.columns.rudder_normal_force"),
+        ('thrust = "T"\n', 'thrust = "thrust"\n', "thrust"),
+        ("f_alpha = 2.747\n", "", "rudder.f_alpha"),
+        ("f_alpha = 2.747\n", "f_alpha = 2.747\naspect_ratio = 1.8\n", "rudder.f_alpha"),
+        ('[open_water]\nfile = "water.csv"\n', "", "open_water"),
+        ('file = "water.csv"', "J = [0, 0.4, 0.8]\nK_T = [0.3, 0.2, 0.1]", "open_water.J"),
+        ('file = "water.csv"', "J = [0, 0.2, 0.4, 0.8]\nK_T = [0.3, 0.2, 0.1]", "open_water.K_T"),
+        ("propeller_diameter_m = 0.216\n", "", "propeller_diameter_m"),
+        ('drift_deg = "beta"\n', "", "drift angle"),
+    ],
+)
+def test_a_campaign_that_lacks_what_the_method_needs_is_refused(tmp_path, old, new, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=words):
+        t2s.reduce_to_mmg(path)
+
+
+def test_turning_tests_are_not_silently_towed_straight(tmp_path) -> None:
+    """The polynomial reduction takes no steady turns: their rows are refused, with the way to reduce them."""
+    with pytest.raises(InputError, match="turns steadily"):
+        t2s.reduce(write_campaign(tmp_path, KVLCC2))
+
+
+def test_the_command_writes_card_page_and_json(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    options = ("--model", "mmg", "-o", "ship.toml", "--page", "p.html", "--json", "r.json")
+    assert tank2sim("reduce", str(path), *options, cwd=tmp_path).returncode == 0
+    assert t2s.load(tmp_path / "ship.toml").card.interaction("w_P0") == pytest.approx(0.40, abs=0.02)
+    assert {"p.html", "r.json", "ship.covariance.json"} <= {file.name for file in tmp_path.iterdir()}
+    refused(tank2sim("reduce", str(path), "--model", "mmg", "--fill", "clarke1983", cwd=tmp_path), "--fill")
+
+
+def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> None:
+    """Yasukawa and Yoshimura (2015) tested another model: what a second tank confirms is the structure."""
+    found = t2s.reduce_to_mmg(hmri_campaign(data, tmp_path)).coefficients
+    assert found["w_P0"].value == pytest.approx(0.387, abs=0.03)  # thrust identity at 1.17 m/s
+    assert found["C_2_plus"].value > found["C_2_minus"].value > 1.0
+    assert found["gamma_R_plus"].value == pytest.approx(0.640, abs=0.1)
+    assert found["gamma_R_minus"].value == pytest.approx(0.395, abs=0.1)
+    assert found["eps"].value == pytest.approx(1.09, abs=0.06)
+    assert found["kappa"].value == pytest.approx(0.5, abs=0.1)
+    assert found["Yv"].value == pytest.approx(-0.315, rel=0.1)
+    assert found["Nv"].value == pytest.approx(-0.137, rel=0.1)
