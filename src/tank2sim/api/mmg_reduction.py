@@ -192,6 +192,8 @@ class MmgReductionResult(PagedResult):
                 f"No condition shows {', '.join(missing)}: they are zero on the card, and a turn simulated "
                 "with it is as wrong as that."
             )
+        if fit.at_limit:
+            found.append(f"At a limit of what a ship has, so that its error does not hold: {', '.join(fit.at_limit)}.")
         for name, (mean, deviation) in ORDINARY.items():
             entry = self.coefficients[name]
             if abs(entry.value - mean) > _FAR * deviation:

@@ -8,7 +8,7 @@
 
 with the added masses (K_pdot, K_vdot, Y_pdot, K_rdot, N_pdot) on the left, about the origin midway between the
 perpendiculars; z is positive downwards, phi and K to starboard. X, Y, K, N take the terms of the card that have p or
-phi, in the prime system (p' = p L/U). In K are besides the rudder's -z_R Y_R and m_x l_x u r, the moment of the surge
+phi, in the prime system (p' = p L/U). K also has the rudder's -z_R Y_R and m_x l_x u r, the moment of the surge
 added mass.
 
 Son and Nomoto (1982), On the coupled motion of steering and rolling of a high speed container ship, Naval Architecture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,10 +75,7 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
             raise InputError(path, f"averages.columns.{key}", problem, f"its columns are {', '.join(heads)}")
         place = heads.index(heading)
         _refuse_other_unit(file, heading, key, units[place] if place < len(units) else "", factors.get(key, 1.0))
-        cells = [
-            _number(file, (line, heading), row[place] if place < len(row) else "")
-            for line, row in zip(lines[1:], rows, strict=True)
-        ]
+        cells = _column(file, heading, place, zip(lines[1:], rows, strict=True))
         values[key] = [cell * factors.get(key, 1.0) for cell in cells]
         if key in ("X", "Y", "N") and max(map(abs, cells)) < LEAST_FORCE:
             remedy = "give the readings of the gauge"
@@ -112,12 +109,13 @@ def read_columns(file: Path, headings: Mapping[str, str]) -> dict[str, list[floa
         if heading not in heads:
             problem = f"the table has no column {heading!r}"
             raise InputError(file, "header", problem, f"its columns are {', '.join(heads)}")
-        place = heads.index(heading)
-        found[key] = [
-            _number(file, (line, heading), row[place] if place < len(row) else "")
-            for line, row in zip(lines[1:], rows, strict=True)
-        ]
+        found[key] = _column(file, heading, heads.index(heading), zip(lines[1:], rows, strict=True))
     return found
+
+
+def _column(file: Path, heading: str, place: int, rows: Iterable[tuple[int, list[str]]]) -> list[float]:
+    """Numbers of one column of rows with their line numbers."""
+    return [_number(file, (line, heading), row[place] if place < len(row) else "") for line, row in rows]
 
 
 def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:

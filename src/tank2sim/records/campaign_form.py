@@ -101,6 +101,11 @@ class TankTest(CardSection):
     free_motions: list[str] | str | bool | None = None
     kinematic_viscosity_m2ps: TestViscosity | None = None
 
+    @property
+    def sense(self) -> float:
+        """By what recorded forces are multiplied to be positive as the water pushes the model: 1 or -1."""
+        return -1.0 if self.force_convention == "on_model" else 1.0
+
 
 class TankSection(CardSection):
     """``[tank]``: the basin."""

@@ -16,7 +16,6 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,7 +177,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
         reported.
     """
     path = Path(path)
-    form, factors = campaign_file(_parsed(path), path)
+    form, factors = read_campaign_file(path)
     runs: list[CaptiveRun] = []
     faults: list[InputError] = []
     remarks: list[str] = []
@@ -250,11 +249,12 @@ def together(faults: list[InputError]) -> InputError:
     )
 
 
-def _parsed(path: Path) -> dict[str, Any]:
+def read_campaign_file(path: Path) -> tuple[CampaignFile, dict[str, float]]:
+    """The checked form of ``campaign.toml`` and the factors of its columns of averages; raises as `campaign_file`."""
     text = read_text(path)
     with faults_of_toml(str(path)):
         content = tomllib.loads(text)
-    return content
+    return campaign_file(content, path)
 
 
 def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
@@ -273,7 +273,7 @@ def read_campaign_form(path: Path | str) -> CampaignFile:
         The file is missing or at fault.
     """
     path = Path(path)
-    return campaign_file(_parsed(path), path)[0]
+    return read_campaign_file(path)[0]
 
 
 def read_captive_run(
@@ -380,7 +380,7 @@ def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
         kind = "static_drift"
     elif condition.drift_rad == 0.0:
         kind = "static_rudder"
-    sense = -1.0 if form.test.force_convention == "on_model" else 1.0
+    sense = form.test.sense
     sheet = RunSheet(file=form.averages.file, type=kind, drift_rad=condition.drift_rad, rudder_rad=condition.rudder_rad)
     return CaptiveRun(
         name=condition.name,

@@ -148,6 +148,12 @@ def test_a_campaign_that_lacks_what_the_method_needs_is_refused(tmp_path, old, n
         t2s.reduce_to_mmg(path)
 
 
+def test_a_coefficient_that_is_not_that_of_a_ship_is_named(tmp_path) -> None:
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2 | {"C_2_plus": 6.0}))
+    assert result.fit.at_limit == ("C_2_plus",)
+    assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).fit.at_limit == ()
+
+
 def test_turning_tests_are_not_silently_towed_straight(tmp_path) -> None:
     """The polynomial reduction takes no steady turns: their rows are refused, with the way to reduce them."""
     with pytest.raises(InputError, match="turns steadily"):

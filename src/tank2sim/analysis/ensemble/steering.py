@@ -155,13 +155,13 @@ def steering_bands(
         messages.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
     width = found.figures["loop_width_deg"]
     loops = int(np.sum(width > 0))
-    herself = {name: row.astype(float) for name, row in zip(_CURVES, reference.histories, strict=True)}
+    unvaried = {name: row.astype(float) for name, row in zip(_CURVES, reference.histories, strict=True)}
     bands = {name: _band(found, row) for row, name in enumerate(_CURVES)}
     if not all(np.isfinite(bands[name].low).all() for name in (FROM_STARBOARD, FROM_PORT)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
         messages.append(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
     loop = figure_bands(found).get("loop_width_deg")
-    return SteeringBands(grid, found.usable, herself, bands, loop, loops, tuple(messages))
+    return SteeringBands(grid, found.usable, unvaried, bands, loop, loops, tuple(messages))
 
 
 def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:

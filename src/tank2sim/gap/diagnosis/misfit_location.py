@@ -35,7 +35,7 @@ choice), and slow noise has such intervals, too."""
 
 GROWING = 8.0
 """A difference grows if the mean square of its growth is this much beyond that of white noise: three standard errors
-(project choice). Neighbouring values of a growth share their readings, and the noise of positions is slow besides."""
+(project choice). Neighbouring values of a growth share their readings, and the noise of positions is slow."""
 
 USUAL = 0.5
 """A force is at work where its square is above this share of its mean square over all trials (project choice)."""

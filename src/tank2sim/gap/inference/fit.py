@@ -13,7 +13,7 @@ from tank2sim.gap.inference.kalman_filter import NoiseLevels
 
 @dataclass(frozen=True, eq=False)
 class NuisanceParameters:
-    """Parameters that may be in error besides the effects: the card's coefficients, the clock of the rudder's record.
+    """Parameters that may be in error next to the effects: the card's coefficients, the clock of the rudder's record.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import ESSENTIAL, Reduction, is_resistance
 from tank2sim.identification.captive.tank_conditions import FroudeScaling
 from tank2sim.identification.estimates import CLARKE, ESTIMATED, GYRATION, RELATIVE_ERROR, Particulars, estimate
-from tank2sim.records.campaign_form import FullScaleSection
+from tank2sim.records.campaign_form import FullScaleSection, ModelSection, TankTest
 from tank2sim.records.campaigns import Campaign
 
 FILLS: Mapping[str, str] = {"clarke1983": CLARKE}
@@ -77,7 +77,7 @@ def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
         }
         estimates |= _constant_thrust(reduction, found)
     entries = found | estimates
-    inertia, source = _yaw_inertia(campaign)
+    inertia, source = model_yaw_inertia(model)
     return Contents(
         entries={name: _in_card_figures(entries[name]) for name in ALL_TERMS if name in entries},
         estimated=tuple(estimates),
@@ -127,19 +127,25 @@ def _particulars(campaign: Campaign) -> Particulars:
     if model.beam_m is None or model.draught_m is None:
         key = "beam_m" if model.beam_m is None else "draught_m"
         raise InputError(campaign.path, f"model.{key}", "is missing, and estimates need it", "add it")
+    return model_particulars(model, campaign.test)
+
+
+def model_particulars(model: ModelSection, test: TankTest) -> Particulars:
+    """Main dimensions of a model whose beam and draught are stated, for estimates."""
+    assert model.beam_m is not None and model.draught_m is not None
     return Particulars(
         length_m=model.length_m,
         beam_m=model.beam_m,
         draught_m=model.draught_m,
-        density_kgpm3=campaign.test.water_density_kgpm3,
+        density_kgpm3=test.water_density_kgpm3,
         mass_kg=model.mass_kg,
         block_coefficient=model.block_coefficient,
         x_G_m=model.x_G_m,
     )
 
 
-def _yaw_inertia(campaign: Campaign) -> tuple[float, str]:
-    model = campaign.model
+def model_yaw_inertia(model: ModelSection) -> tuple[float, str]:
+    """J_z about midships (kg m2), as stated or by the usual radius of gyration, and where it is from."""
     if model.yaw_inertia_kgm2 is not None:
         return model.yaw_inertia_kgm2, "campaign"
     return model.mass_kg * ((0.25 * model.length_m) ** 2 + model.x_G_m**2), f"ESTIMATED: {GYRATION}"

@@ -9,8 +9,9 @@ import tomlkit
 from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS
 from tank2sim.cards.mmg import fujii
 from tank2sim.dynamics.mmg.hull import HULL_TERMS
+from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
 from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
-from tank2sim.identification.estimates import Particulars, estimate
+from tank2sim.identification.estimates import estimate
 
 MASS_KEYS = {"Xudot": "mx", "Yvdot": "my", "Nrdot": "Jz"}
 """Derivative to its name on an MMG card, of which it is the negative."""
@@ -31,7 +32,7 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
     model, rudder = form.model, form.rudder
     assert rudder is not None and model.draught_m is not None and model.beam_m is not None
     volume_unit = 0.5 * form.test.water_density_kgpm3 * model.length_m**2 * model.draught_m
-    inertia = model.yaw_inertia_kgm2 or model.mass_kg * ((0.25 * model.length_m) ** 2 + model.x_G_m**2)
+    inertia, inertia_source = model_yaw_inertia(model)
     document = tomlkit.document()
     document["format"] = "tank2sim-ship/1"
     document["ship"] = {
@@ -51,7 +52,7 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
     document["model"] = {"kind": "mmg", "speed_mps": form.test.speed_mps}
     document["rigid_body"] = {
         "mass": _rounded(model.mass_kg / volume_unit),
-        "yaw_inertia": _rounded(inertia / (volume_unit * model.length_m**2)),
+        "yaw_inertia": tomlkit.item(_rounded(inertia / (volume_unit * model.length_m**2))).comment(inertia_source),
         "x_G": _rounded(model.x_G_m / model.length_m),
     }
     derivatives, uncertainty = tomlkit.table(), tomlkit.table()
@@ -81,20 +82,10 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
 
 def estimated_masses(tests: SteadyTests) -> dict[str, tuple[float, float]]:
     """X_udot, Y_vdot, N_rdot (prime II) and their standard errors, from :mod:`tank2sim.identification.estimates`."""
-    form = tests.form
-    model = form.model
-    assert model.beam_m is not None and model.draught_m is not None
-    particulars = Particulars(
-        length_m=model.length_m,
-        beam_m=model.beam_m,
-        draught_m=model.draught_m,
-        density_kgpm3=form.test.water_density_kgpm3,
-        mass_kg=model.mass_kg,
-        block_coefficient=model.block_coefficient,
-        x_G_m=model.x_G_m,
-    )
+    model = tests.form.model
+    assert model.draught_m is not None
     ratio = model.length_m / model.draught_m
-    found = estimate(particulars, MASS_KEYS)
+    found = estimate(model_particulars(model, tests.form.test), MASS_KEYS)
     return {name: (ratio * number.value, ratio * number.standard_error) for name, number in found.items()}
 
 

@@ -26,6 +26,7 @@ from scipy.optimize import least_squares
 from tank2sim.arrays import Array
 from tank2sim.cards import parse_card
 from tank2sim.cards.card import MmgCard
+from tank2sim.cards.mmg import open_water_fit
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
 from tank2sim.dynamics.model import Model
@@ -125,6 +126,15 @@ class MmgFit:
         pairs = zip(self.names, self.errors, strict=True)
         return tuple(name for name, error in pairs if name in ORDINARY and error > OPEN * ORDINARY[name][1])
 
+    @property
+    def at_limit(self) -> tuple[str, ...]:
+        """Coefficients at a limit of what is looked for: their standard errors do not hold."""
+        return tuple(
+            name
+            for name, (low, high) in _LIMITS.items()
+            if name in self.names and not low + 1e-3 * (high - low) < self.value(name) < high - 1e-3 * (high - low)
+        )
+
     def in_errors(self, name: str) -> float:
         """Size of a coefficient over its standard error."""
         return abs(self.value(name)) / float(self.errors[self.names.index(name)])
@@ -195,15 +205,19 @@ def _fitted_names(tests: SteadyTests) -> tuple[list[str], tuple[str, ...]]:
 
 def start_card(tests: SteadyTests) -> MmgCard:
     """A card with the coefficients of ordinary ships and no hull but its resistance."""
-    J, K_T = tests.open_water.T
-    k = np.linalg.lstsq(np.vander(J, 3, increasing=True), K_T, rcond=None)[0]
     values = {name: mean for name, (mean, _) in ORDINARY.items()}
-    values |= dict(zip(("k_0", "k_1", "k_2"), map(float, k), strict=True))
+    values |= dict(zip(("k_0", "k_1", "k_2"), map(float, _open_water(tests)), strict=True))
     hull = {name: 0.0 for names in HULL_TERMS.values() for name in names}
     text = mmg_card_text(tests, {**hull, **values, "X0": _START_X0}, {}, "start of the regression")
     card = parse_card(text, str(tests.path))
     assert isinstance(card, MmgCard)
     return card
+
+
+def _open_water(tests: SteadyTests) -> Array:
+    """k_0, k_1, k_2 of the open-water points alone, with which the regression starts."""
+    J, K_T = tests.open_water.T.tolist()
+    return open_water_fit(J, K_T, str(tests.path)).coefficients
 
 
 def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Function:
@@ -305,7 +319,7 @@ class _Regression:
         theta = np.zeros(len(self.names))
         for i, (mean, _) in self.priors.items():
             theta[i] = mean
-        theta[:3] = np.linalg.lstsq(self.powers, self.tests.open_water[:, 1], rcond=None)[0]
+        theta[:3] = _open_water(self.tests)
         theta[self.names.index("X0")] = _START_X0
         return theta
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.reading import faults_of_toml
 from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
-from tank2sim.files import read_text
 from tank2sim.records.averages import Condition, read_averages, read_columns
-from tank2sim.records.campaign_form import CampaignFile, campaign_file
+from tank2sim.records.campaign_form import CampaignFile
+from tank2sim.records.campaigns import read_campaign_file
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
@@ -71,10 +69,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
         The file or its table is at fault, or lacks what the MMG method needs: thrust, normal force, revolutions, the
         open-water curve, and the sizes of model, propeller and rudder.
     """
-    text = read_text(path)
-    with faults_of_toml(str(path)):
-        content = tomllib.loads(text)
-    form, factors = campaign_file(content, path)
+    form, factors = read_campaign_file(path)
     _refuse_missing(form, path)
     conditions, remarks = read_averages(form, factors, path)
     return SteadyTests(
@@ -128,8 +123,7 @@ def _motion(condition: Condition) -> tuple[float, ...]:
 
 def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
     """Readings as the force of the model on its gauge, positive as the water pushes it."""
-    sense = -1.0 if form.test.force_convention == "on_model" else 1.0
-    forces = sense * np.array([condition.X_N, condition.Y_N, condition.N_Nm])
+    forces = form.test.sense * np.array([condition.X_N, condition.Y_N, condition.N_Nm])
     if form.test.force_convention == "hydrodynamic":
         u, v, r, _, _ = _motion(condition)
         forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)

@@ -249,8 +249,8 @@ def _agreement_panel(found: Json, name: str, trials: Json, *, named: bool) -> al
     band = NORMAL * or_nan(whole["standard_errors"].get(parameter, 0.0)) if whole else 0.0
     messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
     least = min((row["high"] - row["low"] for row in messages), default=0.0)
-    telling = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages
-    ends = [row[key] for row in telling for key in ("low", "high")]
+    informative = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages
+    ends = [row[key] for row in informative for key in ("low", "high")]
     ends += [] if middle is None else [middle - band, middle + band]
     low, high = extent(np.array(ends, dtype=float))
     margin = 0.05 * (high - low) or 1.0
