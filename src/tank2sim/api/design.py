@@ -1,0 +1,330 @@
+"""Design of the next captive campaign, as a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.api.conversion import convert
+from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.ship import Ship, as_ship
+from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.cards.card import MmgCard
+from tank2sim.cards.writing import TestedRange
+from tank2sim.design.captive_design import DRAWS, CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
+from tank2sim.design.figure_slopes import FIGURES_OPTION, figure_of_text, range_of_figures
+from tank2sim.design.plan_files import campaign_template, plan_csv, run_rows, runs_of_campaign
+from tank2sim.design.tank_form import TankFile, read_tank, with_changes
+from tank2sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
+"""Figures where none is given: those of IMO MSC.137(76) that have slopes."""
+
+_MOST_HOURS = 10_000.0
+_TABLE_ROWS = 12
+"""Coefficients in the printed table. Project choice: the page and JSON have all."""
+
+
+class CampaignDesignResult(PagedResult):
+    """A captive campaign that makes figures most certain, and the usual matrix in the same hours.
+
+    Parameters
+    ----------
+    ship : Ship
+        As it was given.
+    design : CaptiveDesign
+    notices : tuple of str
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> plan = t2s.design_campaign("esso-osaka", figures="overshoot1_deg@10/10", hours=8, draws=2)
+    >>> bool((plan.figures["design"] < plan.figures["usual"]).all())
+    True
+    """
+
+    command = "design"
+
+    def __init__(self, ship: Ship, design: CaptiveDesign, notices: tuple[str, ...]) -> None:
+        self.ship, self.design, self.notices = ship, design, notices
+
+    @cached_property
+    def _rows(self) -> list[dict[str, object]]:
+        return run_rows(self.design)
+
+    @property
+    def runs(self) -> pd.DataFrame:
+        """The runs in their order: type, speed, angles, frequency, amplitudes, length of the record, time in the
+        tank."""
+        import pandas as pd
+
+        return pd.DataFrame(self._rows).set_index("run")
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures by name: value of the card's ship, standard errors by the design and by the usual matrix in the same
+        hours."""
+        import pandas as pd
+
+        return pd.DataFrame.from_dict(self._figures(), orient="index").rename_axis("figure")
+
+    @property
+    def plan(self) -> str:
+        """The runs as CSV."""
+        return plan_csv(self._rows)
+
+    @property
+    def template(self) -> str:
+        """``campaign.toml`` for :func:`.reduce`, which lacks the files of the runs."""
+        return campaign_template(self.design, self._rows)
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        design = self.design
+        runs, gauges = design.tank_runs, design.planned.gauges
+        return {
+            "ship": self.ship.name,
+            "kind": "campaign",
+            "hours": design.hours,
+            "hours_used": design.hours_used,
+            "hours_for_usual_certainty": design.hours_needed,
+            "usual_matrix": {
+                "hours": design.usual_hours,
+                "runs": sum(map(len, design.usual)),
+                "repeats": design.hours / design.usual_hours,
+            },
+            "model": {"length_m": runs.length_m, "speed_mps": runs.speed_mps, "longest_record_s": runs.longest_s},
+            "range": {
+                "drift_deg": math.degrees(runs.drift_rad),
+                "rudder_deg": math.degrees(runs.rudder_rad),
+                "yaw_rate_prime": runs.largest.yaw_rate_prime,
+            },
+            "gauges": {
+                force: {"noise": gauge.noise, "zero": gauge.zero, "range": gauge.largest}
+                for force, gauge in gauges.items()
+            },
+            "figures": self._figures(),
+            "coefficients": design.coefficients,
+            "not_excited": list(design.not_excited),
+            "certainty": design.curve,
+            "runs": self._rows,
+            "notices": list(self.notices),
+        }
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """How many runs in how many hours, and in how many hours a plan is as good as the usual matrix."""
+        design = self.design
+        line = f"{self.ship.name}: {len(design.runs)} runs in {design.hours_used:.3g} h"
+        if design.hours_needed is None:
+            return line, "no plan was found that has every figure as certain as the usual matrix"
+        share = design.hours_needed / design.hours
+        return (
+            line,
+            f"as certain as the usual matrix in {design.hours:.3g} h: a plan of {design.hours_needed:.3g} h "
+            f"({100 * share:.0f} %)",
+        )
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Figures, kinds of runs, and the coefficients that matter."""
+        figures: list[list[object]] = [
+            [name, row["value"], row["design"], row["usual"], row["design"] / row["usual"]]
+            for name, row in self._figures().items()
+        ]
+        tests: list[list[object]] = []
+        for test in sorted(self.design.tests, key=lambda test: (test.check, test.runs[0].type)):
+            run = test.runs[0]
+            sides = "±" if len(test.runs) > 1 else ""
+            tests.append(
+                [
+                    test.repeats * len(test.runs),
+                    run.type,
+                    f"{sides}{math.degrees(run.drift_rad):.3g}" if run.drift_rad else "",
+                    f"{sides}{math.degrees(run.rudder_rad):.3g}" if run.rudder_rad else "",
+                    run.frequency_radps or None,
+                    run.velocity / run.speed_mps * (1.0 if run.type == "pure_sway" else self.design.tank_runs.length_m)
+                    if run.oscillates
+                    else None,
+                    run.cycles if run.oscillates else None,
+                    run.record_s,
+                    "check" if test.check else "",
+                ]
+            )
+        largest = sorted(
+            self.design.coefficients.items(), key=lambda item: -max(_shares(item[1]).values(), default=0.0)
+        )
+        coefficients: list[list[object]] = [
+            [name, row["value"], row["design"], row["usual"], 100 * max(_shares(row).values(), default=0.0)]
+            for name, row in largest[:_TABLE_ROWS]
+        ]
+        return (
+            ResultTable(
+                "Figures and their standard errors from the campaign alone",
+                ("figure", "value", "design", "usual", "ratio"),
+                figures,
+            ),
+            ResultTable(
+                "Runs (v' or r': amplitude of v/U or r L/U)",
+                ("runs", "type", "drift (deg)", "rudder (deg)", "rad/s", "v' or r'", "cycles", "record (s)", ""),
+                tests,
+            ),
+            ResultTable(
+                "Coefficients that matter (prime)",
+                ("", "value", "design", "usual", "largest share of a variance (%)"),
+                coefficients,
+            ),
+        )
+
+    def _figures(self) -> dict[str, dict[str, float]]:
+        design = self.design
+        return {
+            figure.text: {
+                "value": float(design.slopes.values[row]),
+                "design": float(design.standard_errors[row]),
+                "usual": float(design.usual_standard_errors[row]),
+                "variance_ratio": float(design.ratios[row]),
+            }
+            for row, figure in enumerate(design.slopes.figures)
+        }
+
+
+def _shares(row: Mapping[str, object]) -> Mapping[str, float]:
+    found = row["share_of_variance"]
+    assert isinstance(found, dict)
+    return found
+
+
+def design_campaign(
+    card: Ship | Card | str | Path,
+    *,
+    figures: str | Sequence[str] = DESIGN_FIGURES,
+    hours: float | None = None,
+    tank: str | Path | TankFile | None = None,
+    carriage_length_m: float | None = None,
+    model_length_m: float | None = None,
+    usual: str | Path | None = None,
+    largest: tuple[float, float, float] | None = None,
+    check_runs: bool = True,
+    one_side: bool = False,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> CampaignDesignResult:
+    """Design the next captive campaign of a ship: the runs that make its figures most certain.
+
+    Among static drift and rudder, both, pure sway, pure yaw and yaw with drift, at the levels, frequencies and lengths
+    that the tank allows, those are chosen, with repeats, that make the worst variance of the figures smallest, measured
+    by what the usual matrix leaves in the same hours: a c-optimal design for several figures. The information of a run
+    is that of the regression of :func:`.reduce` with the stated errors of the gauges.
+
+    Parameters
+    ----------
+    card : Ship, Card, str or path
+        Its coefficients are the prior mean, their errors the spread of ships for which the plan is to be good. An MMG
+        ship is converted to a polynomial.
+    figures : str or sequence of str
+        As of :meth:`.Ship.influence`; units may be left out (``advance@35``).
+    hours : float, optional
+        Time in the tank; by default that of the usual matrix once.
+    tank : path or TankFile, optional
+        ``tank.toml``.
+    carriage_length_m, model_length_m : float, optional
+        In place of those of the tank's file, m.
+    usual : path, optional
+        A ``campaign.toml`` whose runs are compared, in place of the usual matrix.
+    largest : tuple, optional
+        Largest drift (deg), rudder (deg) and r'; by default those of the manoeuvres of the figures.
+    check_runs : bool
+        Whether the plan has runs that could contradict the polynomial.
+    one_side : bool
+        Figures to the side of the given rudder, in place of the mean over both sides, as trials are reported: a single
+        side depends on Y0 and N0, of which every run shows as much as any other.
+    draws, seed : int
+        Ships drawn from the errors of the card.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, a figure does not exist or is not shown by the ship, or the tank cannot make the runs.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> plan = t2s.design_campaign("esso-osaka", figures="overshoot1_deg@10/10", hours=8, draws=2)
+    >>> float(plan.runs["tank_min"].sum()) < 8 * 60
+    True
+    """
+    if hours is not None and not 0 < hours <= _MOST_HOURS:
+        raise InputError("--hours", f"{hours:g}", "is out of bounds", f"give hours up to {_MOST_HOURS:g}")
+    if not 0 <= draws <= 1000:
+        raise InputError("--draws", f"{draws}", "is out of bounds", "give 0 to 1000")
+    ship = as_ship(card)
+    polynomial, converted = _polynomial(ship)
+    texts = [figures] if isinstance(figures, str) else list(figures)
+    asked = [figure_of_text(text) for given in texts for text in given.split(",") if text.strip()]
+    if not asked:
+        raise InputError(FIGURES_OPTION, "", "has no figure", "give at least one, as advance_m@35")
+    asked = list(dict.fromkeys(asked))
+    limits = tank if isinstance(tank, TankFile) else read_tank(tank) if tank is not None else TankFile()
+    limits = with_changes(limits, "carriage", length_m=carriage_length_m)
+    limits = with_changes(limits, "model", length_m=model_length_m)
+    reach = range_of_figures(polynomial, asked) if largest is None else _tested_range(largest)
+    own = None if usual is None else runs_of_campaign(Path(usual), tank_runs(polynomial, limits, reach))
+    settings = CaptiveDesignSettings(
+        hours=hours,
+        usual=own,
+        largest=reach,
+        check_runs=check_runs,
+        one_side=one_side,
+        draws=draws,
+        seed=seed,
+    )
+    design = CaptiveDesigner(polynomial, limits, asked, settings).design()
+    return CampaignDesignResult(ship, design, (*_notices(design, limits), *converted))
+
+
+def _tested_range(largest: tuple[float, float, float]) -> TestedRange:
+    drift, rudder, rate = largest
+    if not (0 < drift < 90 and 0 < rudder < 90 and 0 < rate < 10):
+        remedy = "give drift and rudder between 0 and 90 deg, and r' between 0 and 10"
+        raise InputError("--largest", "/".join(f"{value:g}" for value in largest), "is out of bounds", remedy)
+    return TestedRange(math.radians(drift), math.radians(rudder), rate)
+
+
+def _polynomial(ship: Ship) -> tuple[ManoeuvringCard, tuple[str, ...]]:
+    card = ship.manoeuvring()
+    if not isinstance(card, MmgCard):
+        return card, ()
+    made = convert(ship)
+    return made.converted.manoeuvring(), (
+        "the card is of the MMG method: the plan is for the polynomial that is fitted to it",
+        *made.notices,
+    )
+
+
+def _notices(design: CaptiveDesign, tank: TankFile) -> tuple[str, ...]:
+    notices = list(design.slopes.notices)
+    if design.not_excited:
+        notices.append(
+            f"no run of this tank shows {', '.join(design.not_excited)}: their errors are not in the standard errors"
+        )
+    if design.too_strong:
+        notices.append(f"{design.too_strong} candidate runs were left out: a force exceeds the range of its gauge")
+    stated = tank.gauges.model_fields_set
+    if not stated & {"X_noise_N", "Y_noise_N", "N_noise_Nm", "noise_share", "zero_share", "X_zero_N", "Y_zero_N"}:
+        gauges = tank.gauges
+        notices.append(
+            f"the errors of the gauges are assumed: noise {100 * gauges.noise_share:g} %, zero "
+            f"{100 * gauges.zero_share:g} % of the range, gain {100 * gauges.gain_relative:g} %; give them in [gauges]"
+        )
+    body = design.tank_runs.tank.mechanism.model_dump()
+    missing = [key for key in ("sway_amplitude_m", "heading_amplitude_rad", "drift_rad") if body[key] is None]
+    if missing:
+        notices.append(f"not limited, for the tank does not state it: {', '.join(missing)} of [mechanism]")
+    return tuple(dict.fromkeys(notices))
