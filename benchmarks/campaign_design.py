@@ -23,7 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tank2sim.analysis.influence.study import Study
-from tank2sim.api.design import CampaignDesignResult, design_campaign
+from tank2sim.api.design import design_campaign
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.design.captive_runs import PlannedRun
 from tank2sim.design.figure_slopes import both_sides, figure_of_text
@@ -43,7 +43,7 @@ PRIOR_ERROR = 0.15
 def main() -> int:
     wanted = int(sys.argv[1]) if len(sys.argv) > 1 else 3
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 8
-    shares, generator_shares, design_ratios, usual_ratios, measured = [], [], [], [], []
+    shares, generator_shares, design_ratios, usual_ratios, measured, before = [], [], [], [], [], []
     seed = FIRST_SEED
     while len(shares) < wanted and seed < FIRST_SEED + 60:
         found = _one_ship(seed, seeds)
@@ -55,18 +55,20 @@ def main() -> int:
         generator_shares.append(generator_share)
         design_ratios.append(by_design[0] / by_design[1])
         usual_ratios.append(by_usual[0] / by_usual[1])
-        measured.append(by_design[0] / by_usual[0])
-    design, usual, both = (
-        np.sqrt(np.mean(np.square(each))) for each in (design_ratios, usual_ratios, measured)
+        measured.append(by_design[0] / by_usual[1])
+        before.append(by_design[1] / by_usual[1])
+    design, usual, both, predicted = (
+        np.sqrt(np.mean(np.square(each))) for each in (design_ratios, usual_ratios, measured, before)
     )
     print(
-        f"{len(shares)} ships: the plan needs {100 * np.median(shares):.0f} % of the hours of the usual matrix (median; "
-        f"{100 * min(shares):.0f} to {100 * max(shares):.0f} %), {100 * np.median(generator_shares):.0f} % of the "
-        f"generator's full matrix ({100 * min(generator_shares):.0f} to {100 * max(generator_shares):.0f} %)"
+        f"{len(shares)} ships: the plan needs {100 * np.median(shares):.0f} % of the hours of the usual matrix "
+        f"(median; {100 * min(shares):.0f} to {100 * max(shares):.0f} %), {100 * np.median(generator_shares):.0f} % of "
+        f"the generator's full matrix ({100 * min(generator_shares):.0f} to {100 * max(generator_shares):.0f} %)"
     )
     print(
         f"errors of figures after reduce over those predicted, rms of {seeds * len(FIGURES)} each: plan {design:.2f}, "
-        f"usual matrix {usual:.2f}; errors by the plan over those by the usual matrix: {both:.2f}"
+        f"usual matrix {usual:.2f}; errors by the plan over those by the usual matrix: {both / usual:.2f} "
+        f"(predicted {predicted:.2f})"
     )
     return 0
 

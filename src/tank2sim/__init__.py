@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tank2sim.api.convention import ConventionResult, convention
     from tank2sim.api.conversion import ConversionResult, convert
     from tank2sim.api.demo import DemoResult, run_demo
+    from tank2sim.api.design import CampaignDesignResult, design_campaign
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
     from tank2sim.api.gap import GapResult, find_gap
     from tank2sim.api.glide import GlideResult
@@ -47,6 +48,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "AuditResult": "api.audit",
     "AutopilotResult": "api.autopilot",
+    "CampaignDesignResult": "api.design",
     "CaptiveRunResult": "api.captive_run",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
@@ -86,6 +88,7 @@ _HOMES = {
     "compare": "api.comparison",
     "convention": "api.convention",
     "convert": "api.conversion",
+    "design_campaign": "api.design",
     "find_gap": "api.gap",
     "guess": "api.guess",
     "identify": "api.identification",
@@ -110,6 +113,7 @@ _HOMES = {
 __all__ = [
     "AuditResult",
     "AutopilotResult",
+    "CampaignDesignResult",
     "CaptiveRunResult",
     "CheckResult",
     "ComparisonResult",
@@ -149,6 +153,7 @@ __all__ = [
     "compare",
     "convention",
     "convert",
+    "design_campaign",
     "find_gap",
     "guess",
     "identify",

@@ -19,6 +19,7 @@ from tank2sim.design.figure_slopes import FIGURES_OPTION, figure_of_text, range_
 from tank2sim.design.plan_files import campaign_template, plan_csv, run_rows, runs_of_campaign
 from tank2sim.design.tank_form import TankFile, read_tank, with_changes
 from tank2sim.errors import InputError
+from tank2sim.marks import ASSUMED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
 """Figures where none is given: those of IMO MSC.137(76) that have slopes."""
 
+_GAUGE_KEYS = ("noise", "zero")
 _MOST_HOURS = 10_000.0
 _TABLE_ROWS = 12
 """Coefficients in the printed table. Project choice: the page and JSON have all."""
@@ -142,12 +144,13 @@ class CampaignDesignResult(PagedResult):
         for test in sorted(self.design.tests, key=lambda test: (test.check, test.runs[0].type)):
             run = test.runs[0]
             sides = "±" if len(test.runs) > 1 else ""
+            opposite = {"±": "∓", "": "-"}[sides] if run.rudder_rad < 0 else sides
             tests.append(
                 [
                     test.repeats * len(test.runs),
-                    run.type,
+                    run.type.replace("_", " "),
                     f"{sides}{math.degrees(run.drift_rad):.3g}" if run.drift_rad else "",
-                    f"{sides}{math.degrees(run.rudder_rad):.3g}" if run.rudder_rad else "",
+                    f"{opposite}{math.degrees(abs(run.rudder_rad)):.3g}" if run.rudder_rad else "",
                     run.frequency_radps or None,
                     run.velocity / run.speed_mps * (1.0 if run.type == "pure_sway" else self.design.tank_runs.length_m)
                     if run.oscillates
@@ -316,12 +319,13 @@ def _notices(design: CaptiveDesign, tank: TankFile) -> tuple[str, ...]:
         )
     if design.too_strong:
         notices.append(f"{design.too_strong} candidate runs were left out: a force exceeds the range of its gauge")
-    stated = tank.gauges.model_fields_set
-    if not stated & {"X_noise_N", "Y_noise_N", "N_noise_Nm", "noise_share", "zero_share", "X_zero_N", "Y_zero_N"}:
+    errors = {"noise_share", "zero_share"} | {f"{force}_{kind}" for force in ("X", "Y", "N") for kind in _GAUGE_KEYS}
+    if not any(key.removesuffix("_N").removesuffix("_Nm") in errors for key in tank.gauges.model_fields_set):
         gauges = tank.gauges
-        notices.append(
-            f"the errors of the gauges are assumed: noise {100 * gauges.noise_share:g} %, zero "
-            f"{100 * gauges.zero_share:g} % of the range, gain {100 * gauges.gain_relative:g} %; give them in [gauges]"
+        notices.insert(
+            0,
+            f"{ASSUMED} of the gauges, for [gauges] of the tank states none: noise {100 * gauges.noise_share:g} %, "
+            f"zero {100 * gauges.zero_share:g} % of the range, gain {100 * gauges.gain_relative:g} %",
         )
     body = design.tank_runs.tank.mechanism.model_dump()
     missing = [key for key in ("sway_amplitude_m", "heading_amplitude_rad", "drift_rad") if body[key] is None]

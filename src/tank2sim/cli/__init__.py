@@ -26,6 +26,7 @@ from tank2sim.plugins import PluginWarning
 
 GROUPS = {
     "Measure": {
+        "design": "the next captive campaign: the runs that make chosen figures most certain",
         "log": "a vessel's own log, cut into trials",
         "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
         "reduce": "captive tests to derivatives",

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 
 _ROUNDS = 400
-_GAP = 2e-3
-"""Relative gap to the optimum at which the multiplicative algorithm ends (project choice: below any error of the
-noise that a tank states)."""
+_GAP = 1e-2
+"""Relative gap to the optimum at which the multiplicative algorithm ends (project choice: 1 % of a variance,
+less than whole numbers of runs cost)."""
 _LEVELLING = 25
 """Rounds in which the weights of the targets are levelled."""
 _EXCHANGES = 60
@@ -91,9 +91,7 @@ class Allocation:
 
     def with_fixed(self, counts: Array) -> Allocation:
         """The same with `counts` (n,) of the tests done before."""
-        blocks = [
-            InformationBlock(block.information(counts), block.tests, block.targets) for block in self.blocks
-        ]
+        blocks = [InformationBlock(block.information(counts), block.tests, block.targets) for block in self.blocks]
         return Allocation(tuple(blocks), self.cost)
 
     def relaxed(self, budget: float, start: Array | None = None) -> tuple[Array, Array]:
@@ -142,7 +140,7 @@ class Allocation:
             if better is None:
                 break
             whole = better
-        return whole
+        return self._filled(whole, budget, np.arange(len(self.cost)))
 
     def _worst(self, whole: NDArray[np.int64], likely: NDArray[np.int64]) -> Array:
         """The worst target's variance with one more of each of the `likely` tests, (len(likely),)."""
@@ -150,7 +148,8 @@ class Allocation:
         for block in self.blocks:
             covariances = _inverse(block.information(whole.astype(float)) + block.tests[likely])
             total += np.einsum("mij,nji->nm", block.targets, covariances)
-        return total.max(axis=1)
+        worst: Array = total.max(axis=1)
+        return worst
 
     def _filled(self, whole: NDArray[np.int64], budget: float, likely: NDArray[np.int64]) -> NDArray[np.int64]:
         whole = whole.copy()

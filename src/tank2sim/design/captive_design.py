@@ -432,8 +432,7 @@ class CaptiveDesigner:
 
 
 def tank_runs(card: ManoeuvringCard, tank: TankFile, largest: TestedRange) -> TankRuns:
-    """The runs of a ship's model in a tank: at the length and the speed that the tank states, or at the Froude number of
-    the card.
+    """The runs of a ship's model in a tank, at the stated length and speed, or at the card's Froude number.
 
     Raises
     ------

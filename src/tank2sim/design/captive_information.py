@@ -120,7 +120,8 @@ class PlannedCampaign:
         for force in FORCE_COLUMNS:
             total = -inertial[force]
             for term in candidate_terms(force):
-                if value := self.derivatives.get(term.name, 0.0):
+                value = self.derivatives.get(term.name, 0.0)
+                if value and term.acceleration != "u":  # no run of a carriage at constant speed has du/dt
                     total = total + value * term_history(campaign, still.motion, term.name)
             found[force] = total
         return found
@@ -129,7 +130,9 @@ class PlannedCampaign:
         count = _READINGS * run.cycles if run.oscillates else _READINGS
         time = np.arange(count) * run.record_s / count
         phase, ones = run.frequency_radps * time, np.ones(count)
-        sway = run.velocity * np.cos(phase) if run.type == "pure_sway" else -run.speed_mps * math.sin(run.drift_rad) * ones
+        sway = (
+            run.velocity * np.cos(phase) if run.type == "pure_sway" else -run.speed_mps * math.sin(run.drift_rad) * ones
+        )
         yaws = run.oscillates and run.type != "pure_sway"
         made = forces or dict.fromkeys(FORCE_COLUMNS, 0.0 * ones)
         return CaptiveRun(
@@ -148,7 +151,7 @@ class PlannedCampaign:
 
     def _with_noise(self, reduced: ReducedRun) -> ReducedRun:
         """The run with the covariance of its harmonics by the stated noise: as many independent readings as it has."""
-        inverse = np.linalg.inv(reduced.basis.T @ reduced.basis)
+        inverse = np.asarray(np.linalg.inv(reduced.basis.T @ reduced.basis), dtype=np.float64)
         step = float(reduced.run.time_s[1] - reduced.run.time_s[0])
         thinning = 1.0 / (step * self.rate_hz)
         fits = {

@@ -21,8 +21,8 @@ from tank2sim.identification.captive.tank_conditions import (
 from tank2sim.records.campaign_form import OSCILLATING, RunType
 
 BELOW_LIMIT = 0.95
-"""Share of the limit of omega U/g that candidates reach: `reduce` leaves out runs at it. Project choice: an error of the
-frequency and of the speed of some percent."""
+"""Share of the limit of omega U/g that candidates reach: `reduce` leaves out runs at it. Project choice: frequency and
+speed err by some percent."""
 
 _FREQUENCIES, _FREQUENCY_RATIO = 5, 4.0
 """Frequencies of candidates, and the ratio of the highest to the lowest. Project choice: finer steps change the

@@ -128,11 +128,11 @@ def runs_of_campaign(path: Path, runs: TankRuns) -> tuple[RunGroup, ...]:
             lacking = "frequency_radps" if sheet.frequency_radps is None else key
             raise InputError(path, f"runs.{number}.{lacking}", "is missing", "add it: the sheet is all that is read")
         frequency = sheet.frequency_radps * speeds / scale
-        velocity = amplitude * sheet.frequency_radps * speeds if sheet.type == "pure_sway" else amplitude * speeds / scale
+        velocity = (
+            amplitude * sheet.frequency_radps * speeds if sheet.type == "pure_sway" else amplitude * speeds / scale
+        )
         period = 2 * math.pi / frequency
         cycles = max(math.floor(runs.longest_s / period + 1e-9), 1)
-        run: PlannedRun = runs.run(
-            sheet.type, cycles * period, drift=drift, frequency=frequency, velocity=velocity
-        )
+        run: PlannedRun = runs.run(sheet.type, cycles * period, drift=drift, frequency=frequency, velocity=velocity)
         found.append((run,))
     return tuple(found)

@@ -160,7 +160,6 @@ def read_tank(path: Path | str) -> TankFile:
         key: section_in_si(section, key, path, spelt) if isinstance(section, dict) else section
         for key, section in content.items()
     }
-    # Whole numbers of TOML are numbers of any kind here.
     try:
         return TankFile.model_validate(content)
     except ValidationError as error:
@@ -178,8 +177,8 @@ def with_changes(tank: TankFile, section: str, **values: float | None) -> TankFi
     changed = {key: value for key, value in values.items() if value is not None}
     if not changed:
         return tank
-    content = tank.model_dump()
-    content[section] |= changed
+    content = tank.model_dump(exclude_unset=True)
+    content[section] = {**content.get(section, {}), **changed}
     try:
         return TankFile.model_validate(content)
     except ValidationError as error:

@@ -1,0 +1,110 @@
+"""``tank2sim design``: the next captive campaign, or the next sea trial."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tank2sim.api.design import DESIGN_FIGURES, design_campaign
+from tank2sim.api.ship import load
+from tank2sim.cli.console import json_option, screen, show_result, write_result
+from tank2sim.cli.options import page_option, plot_option, set_option
+from tank2sim.cli.trials import TakesSeveral
+from tank2sim.design.captive_design import DRAWS
+
+
+@click.command("design", cls=TakesSeveral, several=("--figures",))
+@click.argument("card")
+@click.option(
+    "--figures",
+    multiple=True,
+    metavar="F ...",
+    help="Figures to be certain of, with blanks or commas between, as of tank2sim influence; units may be left out: "
+    f"advance@35,overshoot_1_deg@10/10.  [default: {', '.join(DESIGN_FIGURES)}]",
+)
+@click.option("--hours", type=float, metavar="H", help="Time in the tank; by default that of the usual matrix once.")
+@click.option(
+    "--tank",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="TANK.toml",
+    help="Carriage, mechanism and gauges of the tank, and the model.",
+)
+@click.option("--carriage-length", type=float, metavar="M", help="Way of the carriage, m, in place of the file's.")
+@click.option("--model-length", type=float, metavar="M", help="Length of the model, m; by default 4.")
+@click.option(
+    "--usual",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="CAMPAIGN.toml",
+    help="Compare with the runs of this campaign, in place of the usual matrix.",
+)
+@click.option("--one-side", is_flag=True, help="Figures to the side of the given rudder, not the mean of both sides.")
+@click.option("--no-checks", is_flag=True, help="No runs that show whether the polynomial holds.")
+@click.option(
+    "--draws",
+    type=click.IntRange(0, 1000),
+    default=DRAWS,
+    show_default=True,
+    help="Ships drawn from the card's errors, for which the plan is to be good as well.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the drawn ships.")
+@set_option
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="PLAN.csv", help="Write the plan.")
+@click.option(
+    "--campaign",
+    "template",
+    type=click.Path(path_type=Path),
+    metavar="CAMPAIGN.toml",
+    help="Write the campaign's file for tank2sim reduce, which then lacks only the files of the runs.",
+)
+@page_option()
+@plot_option
+@json_option
+def command(
+    card: str,
+    figures: tuple[str, ...],
+    hours: float | None,
+    tank: Path | None,
+    carriage_length: float | None,
+    model_length: float | None,
+    usual: Path | None,
+    one_side: bool,
+    no_checks: bool,
+    draws: int,
+    seed: int,
+    values: dict[str, object],
+    output: Path | None,
+    template: Path | None,
+    page: Path | None,
+    plot: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Design the next captive campaign of CARD (a file, or a bundled ship).
+
+    Of all runs that the tank can make, those with repeats that make the figures most certain in the hours, shown next
+    to the usual matrix: standard errors of the figures by both, and the hours in which a plan is as certain.
+    """
+    ship = load(card, values)
+    result = design_campaign(
+        ship,
+        figures=figures or DESIGN_FIGURES,
+        hours=hours,
+        tank=tank,
+        carriage_length_m=carriage_length,
+        model_length_m=model_length,
+        usual=usual,
+        check_runs=not no_checks,
+        one_side=one_side,
+        draws=draws,
+        seed=seed,
+    )
+    files: dict[Path, str | bytes] = {}
+    if output:
+        files[output] = result.plan
+    if template:
+        files[template] = result.template
+    inputs: list[str | Path] = [ship.card.source, *(path for path in (tank, usual) if path)]
+    write_result(result, inputs, json_file=json_file, page=page, plot=plot, files=files)
+    show_result(result)
+    for path in files:
+        screen.print(f"{path}: {len(result.design.runs)} runs", soft_wrap=True, markup=False)
