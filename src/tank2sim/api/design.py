@@ -1,4 +1,4 @@
-"""Design of the next captive campaign, as a result."""
+"""Design of the next captive campaign, and of the next sea trial, as results."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.analysis.influence.figures import InfluenceFigure
 from tank2sim.api.conversion import convert
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship, as_ship
@@ -18,8 +19,11 @@ from tank2sim.design.captive_design import DRAWS, CaptiveDesign, CaptiveDesigner
 from tank2sim.design.figure_slopes import FIGURES_OPTION, figure_of_text, range_of_figures
 from tank2sim.design.plan_files import campaign_template, plan_csv, run_rows, runs_of_campaign
 from tank2sim.design.tank_form import TankFile, read_tank, with_changes
+from tank2sim.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.marks import ASSUMED
+from tank2sim.units import from_si, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -269,11 +273,7 @@ def design_campaign(
         raise InputError("--draws", f"{draws}", "is out of bounds", "give 0 to 1000")
     ship = as_ship(card)
     polynomial, converted = _polynomial(ship)
-    texts = [figures] if isinstance(figures, str) else list(figures)
-    asked = [figure_of_text(text) for given in texts for text in given.split(",") if text.strip()]
-    if not asked:
-        raise InputError(FIGURES_OPTION, "", "has no figure", "give at least one, as advance_m@35")
-    asked = list(dict.fromkeys(asked))
+    asked = _figures_of(figures)
     limits = tank if isinstance(tank, TankFile) else read_tank(tank) if tank is not None else TankFile()
     limits = with_changes(limits, "carriage", length_m=carriage_length_m)
     limits = with_changes(limits, "model", length_m=model_length_m)
@@ -290,6 +290,232 @@ def design_campaign(
     )
     design = CaptiveDesigner(polynomial, limits, asked, settings).design()
     return CampaignDesignResult(ship, design, (*_notices(design, limits), *converted))
+
+
+class TrialDesignResult(PagedResult):
+    """A sea trial that makes figures most certain, and the usual set of manoeuvres in the same time.
+
+    Parameters
+    ----------
+    ship : Ship
+    design : TrialDesign
+    notices : tuple of str
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> trial = t2s.design_trial("esso-osaka", figures="advance_m@35")
+    >>> bool((trial.figures["design"] < trial.figures["before"]).all())
+    True
+    """
+
+    command = "design"
+
+    def __init__(self, ship: Ship, design: TrialDesign, notices: tuple[str, ...]) -> None:
+        self.ship, self.design, self.notices = ship, design, notices
+
+    @property
+    def manoeuvres(self) -> pd.DataFrame:
+        """The manoeuvres in their order: repeats, length (s), time with approach (min), file of the orders."""
+        import pandas as pd
+
+        return pd.DataFrame(self._rows()).set_index("manoeuvre")
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures by name: value of the card's ship, standard errors before, by the design and by the usual set."""
+        import pandas as pd
+
+        return pd.DataFrame.from_dict(self._figures(), orient="index").rename_axis("figure")
+
+    @property
+    def plan(self) -> str:
+        """The manoeuvres as CSV."""
+        rows = self._rows()
+        lines = [",".join(rows[0]), *(",".join(f"{value}" for value in row.values()) for row in rows)]
+        return "\n".join(lines) + "\n"
+
+    @property
+    def orders(self) -> dict[str, str]:
+        """Name of a file to the orders of a manoeuvre, for ``simulate --manoeuvre file:``; zigzags are switched at the
+        headings of the card's ship."""
+        pairs = zip(self._rows(), self.design.manoeuvres, strict=True)
+        return {str(row["orders"]): manoeuvre.orders for row, (manoeuvre, _) in pairs}
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        design = self.design
+        return {
+            "ship": self.ship.name,
+            "kind": "trial",
+            "minutes": design.minutes,
+            "minutes_used": design.minutes_used,
+            "minutes_for_usual_certainty": design.minutes_needed,
+            "usual_set": {
+                "minutes": design.usual_minutes,
+                "manoeuvres": [each.name for each in design.usual],
+                "repeats": design.minutes / design.usual_minutes,
+            },
+            "sensors": _by_column(design.sensors),
+            "figures": self._figures(),
+            "coefficients": design.coefficients,
+            "certainty": design.curve,
+            "manoeuvres": self._rows(),
+            "notices": list(self.notices),
+        }
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """How many manoeuvres in what time, and in what time a plan is as good as the usual set."""
+        design = self.design
+        count = sum(repeats for _, repeats in design.manoeuvres)
+        line = f"{self.ship.name}: {count} manoeuvres in {design.minutes_used:.3g} min"
+        if design.minutes_needed is None:
+            return line, "no plan was found that has every figure as certain as the usual set in the same time"
+        return (
+            line,
+            f"as certain as the usual set in {design.minutes:.3g} min: a plan of {design.minutes_needed:.3g} min "
+            f"({100 * design.minutes_needed / design.minutes:.0f} %)",
+        )
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Figures, manoeuvres, and the coefficients that become known."""
+        largest = sorted(self.design.coefficients.items(), key=lambda item: item[1]["design"])
+        return (
+            ResultTable(
+                "Figures and their standard errors: before, by the plan, by the usual set",
+                ("figure", "value", "before", "design", "usual", "ratio"),
+                [
+                    [name, row["value"], row["before"], row["design"], row["usual"], row["design"] / row["usual"]]
+                    for name, row in self._figures().items()
+                ],
+            ),
+            ResultTable(
+                "Manoeuvres",
+                ("manoeuvre", "repeats", "length (s)", "with approach (min)", "orders"),
+                [list(row.values()) for row in self._rows()],
+            ),
+            ResultTable(
+                "Coefficients: standard error over that before",
+                ("", "before (prime)", "design", "usual"),
+                [[name, *row.values()] for name, row in largest[:_TABLE_ROWS]],
+            ),
+        )
+
+    def _rows(self) -> list[dict[str, object]]:
+        return [
+            {
+                "manoeuvre": each.name,
+                "repeats": repeats,
+                "duration_s": float(f"{each.duration_s:.6g}"),
+                "total_min": float(f"{each.total_s / 60:.4g}"),
+                "orders": f"orders_{number:02d}.csv",
+            }
+            for number, (each, repeats) in enumerate(self.design.manoeuvres, start=1)
+        ]
+
+    def _figures(self) -> dict[str, dict[str, float]]:
+        design = self.design
+        return {
+            figure.text: {
+                "value": float(design.slopes.values[row]),
+                "before": float(design.prior_errors[row]),
+                "design": float(design.standard_errors[row]),
+                "usual": float(design.usual_standard_errors[row]),
+            }
+            for row, figure in enumerate(design.slopes.figures)
+        }
+
+
+def design_trial(
+    card: Ship | Card | str | Path,
+    *,
+    figures: str | Sequence[str] = DESIGN_FIGURES,
+    minutes: float | None = None,
+    sensors: Mapping[str, float] | None = None,
+    one_side: bool = False,
+) -> TrialDesignResult:
+    """Design the next sea trial of a ship: the manoeuvres that make its figures most certain.
+
+    Among turns, zigzags, pull-outs, straight runs, random steps and changes of revolutions of several lengths, those
+    are chosen, with repeats, that make the worst variance of the figures smallest, measured by what the usual set
+    (turns with 35 deg to both sides, zigzags 10/10 and 20/20) leaves in the same time.
+
+    Parameters
+    ----------
+    card : Ship, Card, str or path
+        Its errors are the prior, as of :func:`.identify`. An MMG ship is converted to a polynomial.
+    figures : str or sequence of str
+        As of :func:`design_campaign`.
+    minutes : float, optional
+        Time of the trial with all approaches; by default that of the usual set.
+    sensors : mapping, optional
+        Column of a trial to the standard deviation of one reading a second: ``{"r_degps": 0.02, "x_m": 1.0}``; what is
+        not listed is not measured.
+    one_side : bool
+        Figures to the side of the given rudder, in place of the mean over both sides.
+
+    Raises
+    ------
+    InputError
+        A figure does not exist or is not shown by the ship, or the time is too short.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> trial = t2s.design_trial("esso-osaka", figures="advance_m@35", minutes=15)
+    >>> trial.design.minutes_used <= 15
+    True
+    """
+    if minutes is not None and not 0 < minutes <= 60 * _MOST_HOURS:
+        raise InputError("--minutes", f"{minutes:g}", "is out of bounds", f"give minutes up to {60 * _MOST_HOURS:g}")
+    ship = as_ship(card)
+    polynomial, converted = _polynomial(ship)
+    found = SENSORS if sensors is None else _sensors(sensors)
+    asked = _figures_of(figures)
+    design = design_of_trial(polynomial, asked, minutes=minutes, sensors=found, one_side=one_side)
+    notices = list(design.slopes.notices)
+    if sensors is None:
+        notices.insert(
+            0,
+            f"{ASSUMED} of the sensors, for none are stated: "
+            + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items()),
+        )
+    return TrialDesignResult(ship, design, tuple(dict.fromkeys([*notices, *converted])))
+
+
+_SENSOR_COLUMNS = ("u_mps", "v_mps", "r_degps", "psi_deg", "x_m", "y_m")
+
+
+def _by_column(sensors: Mapping[str, float]) -> dict[str, float]:
+    """Column of a trial to the standard deviation of a reading, in the unit of its name."""
+    keys = {to_si(column, 1.0)[0]: column for column in _SENSOR_COLUMNS}
+    signals = {variable: keys.get(signal, signal) for signal, variable in OBSERVED_SIGNALS.items()}
+    return {signals[name]: float(f"{from_si(signals[name], size):.6g}") for name, size in sensors.items()}
+
+
+def _sensors(given: Mapping[str, float]) -> dict[str, float]:
+    """Variable to standard deviation, SI, from columns of a trial."""
+    found = {}
+    for column, size in given.items():
+        signal, value = to_si(column, size)
+        if signal not in OBSERVED_SIGNALS:
+            raise InputError("--sensors", column, "is not measured", f"there are: {', '.join(_SENSOR_COLUMNS)}")
+        if not (math.isfinite(value) and value > 0):
+            raise InputError("--sensors", f"{column}={size:g}", "is not a standard deviation", "give a number above 0")
+        found[OBSERVED_SIGNALS[signal]] = value
+    if not found:
+        raise InputError("--sensors", "", "has no sensor", "give at least one, as r_degps=0.02")
+    return found
+
+
+def _figures_of(figures: str | Sequence[str]) -> list[InfluenceFigure]:
+    texts = [figures] if isinstance(figures, str) else list(figures)
+    asked = [figure_of_text(text) for given in texts for text in given.split(",") if text.strip()]
+    if not asked:
+        raise InputError(FIGURES_OPTION, "", "has no figure", "give at least one, as advance_m@35")
+    return list(dict.fromkeys(asked))
 
 
 def _tested_range(largest: tuple[float, float, float]) -> TestedRange:

@@ -909,6 +909,59 @@ class CampaignDesignKeys(_Keys):
     notices: list[str]
 
 
+class TrialFigureKeys(_Part):
+    """A figure and its standard errors before a trial, by a design and by the usual set."""
+
+    value: float
+    before: float
+    design: float
+    usual: float
+
+
+class TrialCertaintyKeys(_Part):
+    """Standard errors of each figure over the time of a trial."""
+
+    minutes: list[float]
+    usual_minutes: list[float]
+    design: dict[str, list[Number]]
+    usual: dict[str, list[Number]]
+
+
+class UsualSetKeys(_Part):
+    """The usual set of manoeuvres: its time once, its manoeuvres, how often the time has room for it."""
+
+    minutes: float
+    manoeuvres: list[str]
+    repeats: float
+
+
+class TrialManoeuvreKeys(_Part):
+    """A manoeuvre of a designed trial."""
+
+    manoeuvre: str
+    repeats: int
+    duration_s: float
+    total_min: float
+    orders: str
+
+
+class TrialDesignKeys(_Keys):
+    """A designed sea trial next to the usual set of manoeuvres."""
+
+    ship: str
+    kind: str
+    minutes: float
+    minutes_used: float
+    minutes_for_usual_certainty: Number
+    usual_set: UsualSetKeys
+    sensors: dict[str, float]
+    figures: dict[str, TrialFigureKeys]
+    coefficients: dict[str, dict[str, float]]
+    certainty: TrialCertaintyKeys
+    manoeuvres: list[TrialManoeuvreKeys]
+    notices: list[str]
+
+
 class QuantileKeys(_Part):
     """Quantiles of 5, 50 and 95 %."""
 
@@ -958,7 +1011,7 @@ KEYS: dict[str, Any] = {
     "convention": ConventionKeys,
     "convert": ConvertKeys,
     "demo": DemoKeys,
-    "design": CampaignDesignKeys,
+    "design": CampaignDesignKeys | TrialDesignKeys,
     "export": ExportKeys,
     "gap": GapKeys,
     "glide": GlideKeys,

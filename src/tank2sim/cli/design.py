@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
 
-from tank2sim.api.design import DESIGN_FIGURES, design_campaign
+from tank2sim.api.design import DESIGN_FIGURES, CampaignDesignResult, TrialDesignResult, design_campaign, design_trial
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import page_option, plot_option, set_option
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.design.captive_design import DRAWS
+from tank2sim.errors import InputError
+from tank2sim.files import writable_folder
 
 
-@click.command("design", cls=TakesSeveral, several=("--figures",))
+@click.command("design", cls=TakesSeveral, several=("--figures", "--sensors"))
 @click.argument("card")
 @click.option(
     "--figures",
@@ -37,6 +40,20 @@ from tank2sim.design.captive_design import DRAWS
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="CAMPAIGN.toml",
     help="Compare with the runs of this campaign, in place of the usual matrix.",
+)
+@click.option("--trial", is_flag=True, help="Design a sea trial in place of a campaign.")
+@click.option("--minutes", type=float, metavar="M", help="Time of the trial; by default that of the usual set.")
+@click.option(
+    "--sensors",
+    multiple=True,
+    metavar="COLUMN=SD ...",
+    help="Of a trial: standard deviation of a reading a second, by column: u_mps=0.05 r_degps=0.02 x_m=1.",
+)
+@click.option(
+    "--orders",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Of a trial: write the orders of each manoeuvre, for simulate --manoeuvre file:.",
 )
 @click.option("--one-side", is_flag=True, help="Figures to the side of the given rudder, not the mean of both sides.")
 @click.option("--no-checks", is_flag=True, help="No runs that show whether the polynomial holds.")
@@ -68,6 +85,10 @@ def command(
     carriage_length: float | None,
     model_length: float | None,
     usual: Path | None,
+    trial: bool,
+    minutes: float | None,
+    sensors: tuple[str, ...],
+    orders: Path | None,
     one_side: bool,
     no_checks: bool,
     draws: int,
@@ -79,32 +100,69 @@ def command(
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Design the next captive campaign of CARD (a file, or a bundled ship).
+    """Design the next captive campaign of CARD (a file, or a bundled ship), or with --trial the next sea trial.
 
     Of all runs that the tank can make, those with repeats that make the figures most certain in the hours, shown next
     to the usual matrix: standard errors of the figures by both, and the hours in which a plan is as certain.
     """
     ship = load(card, values)
-    result = design_campaign(
-        ship,
-        figures=figures or DESIGN_FIGURES,
-        hours=hours,
-        tank=tank,
-        carriage_length_m=carriage_length,
-        model_length_m=model_length,
-        usual=usual,
-        check_runs=not no_checks,
-        one_side=one_side,
-        draws=draws,
-        seed=seed,
-    )
+    tank_options = {"--hours": hours, "--tank": tank, "--carriage-length": carriage_length}
+    tank_options |= {"--model-length": model_length, "--usual": usual, "--campaign": template}
+    trial_options = {"--minutes": minutes, "--sensors": sensors, "--orders": orders}
+    result: CampaignDesignResult | TrialDesignResult
     files: dict[Path, str | bytes] = {}
+    if trial:
+        _refuse_options(
+            tank_options | {"--no-checks": no_checks or None}, "is of a campaign", "leave out --trial, or it"
+        )
+        result = design_trial(
+            ship,
+            figures=figures or DESIGN_FIGURES,
+            minutes=minutes,
+            sensors=_parsed_sensors(sensors) if sensors else None,
+            one_side=one_side,
+        )
+        if orders:
+            writable_folder(orders)
+            files |= {orders / name: text for name, text in result.orders.items()}
+    else:
+        _refuse_options(trial_options, "is of a sea trial", "add --trial, or leave it out")
+        result = design_campaign(
+            ship,
+            figures=figures or DESIGN_FIGURES,
+            hours=hours,
+            tank=tank,
+            carriage_length_m=carriage_length,
+            model_length_m=model_length,
+            usual=usual,
+            check_runs=not no_checks,
+            one_side=one_side,
+            draws=draws,
+            seed=seed,
+        )
+        if template:
+            files[template] = result.template
     if output:
         files[output] = result.plan
-    if template:
-        files[template] = result.template
     inputs: list[str | Path] = [ship.card.source, *(path for path in (tank, usual) if path)]
     write_result(result, inputs, json_file=json_file, page=page, plot=plot, files=files)
     show_result(result)
     for path in files:
-        screen.print(f"{path}: {len(result.design.runs)} runs", soft_wrap=True, markup=False)
+        screen.print(f"{path} written", soft_wrap=True, markup=False)
+
+
+def _refuse_options(options: Mapping[str, object], problem: str, remedy: str) -> None:
+    for option, value in options.items():
+        if value not in (None, ()):
+            raise InputError(option, "", problem, remedy)
+
+
+def _parsed_sensors(given: Sequence[str]) -> dict[str, float]:
+    found = {}
+    for text in (part for each in given for part in each.split(",") if part.strip()):
+        column, _, number = text.partition("=")
+        try:
+            found[column.strip()] = float(number)
+        except ValueError:
+            raise InputError("--sensors", text, "cannot be read", "give COLUMN=SD, as r_degps=0.02") from None
+    return found

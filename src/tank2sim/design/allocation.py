@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ less than whole numbers of runs cost)."""
 _LEVELLING = 25
 """Rounds in which the weights of the targets are levelled."""
 _EXCHANGES = 60
+_SMALL_PLAN = 15
+"""Tests in a plan up to which two at a time are exchanged. Project choice: with more, one at a time is as good."""
 _LIKELY = 0.01
 """Least count of a test, over the largest, with which it takes part in exchanges. Project choice: others are not
 in the plan with whole numbers."""
@@ -165,11 +168,24 @@ class Allocation:
     def _exchanged(
         self, whole: NDArray[np.int64], budget: float, likely: NDArray[np.int64]
     ) -> NDArray[np.int64] | None:
-        """The best plan with one test exchanged for others; None if none is better."""
+        """The best plan with a test exchanged for others, in a small plan also two; None if none is better."""
         best, least = None, float(self.variances(whole.astype(float)).max()) * (1 - 1e-4)
-        for place in np.flatnonzero(whole):
+        used = np.flatnonzero(whole).tolist()
+        removed: list[tuple[int, ...]] = [(place,) for place in used]
+        if whole.sum() <= _SMALL_PLAN:
+            removed += [
+                pair for pair in combinations_with_replacement(used, 2) if whole[pair[0]] > (pair[0] == pair[1])
+            ]
+            likely = np.arange(len(self.cost))
+        for places in removed:
             fewer = whole.copy()
-            fewer[place] -= 1
+            for place in places:
+                fewer[place] -= 1
+            if len(places) > 1:
+                other = self._filled(fewer, budget, likely)
+                if (worst_of_two := float(self.variances(other.astype(float)).max())) < least:
+                    best, least = other, worst_of_two
+                continue
             fitting = likely[self.cost[likely] <= budget - float(fewer @ self.cost)]
             worst = self._worst(fewer, fitting)
             if len(fitting) and worst.min() < least:

@@ -131,3 +131,83 @@ def _runs(found: Json) -> PageTable:
     ]
     columns = [Column(title=title, unit=unit, digits=3) for title, unit in heads.values()]
     return PageTable(caption="Runs in their order", columns=columns, rows=rows)
+
+
+_TRIAL = (
+    "Standard errors of the figures before the trial, after the plan, and after the usual set in the same time, as far "
+    "as the errors of the card and of the sensors go. Windows of the records have an unknown first state and unknown "
+    "constant disturbances, as wind and waves make."
+)
+
+
+def trial_design_page(found: Json) -> Page:
+    """The page, from the JSON of ``tank2sim design --trial``."""
+    needed, minutes = found["minutes_for_usual_certainty"], found["minutes"]
+    cards = [
+        KeyFigure(
+            label="Manoeuvres",
+            value=sum(row["repeats"] for row in found["manoeuvres"]),
+            note=f"in {found['minutes_used']:.3g} min",
+        ),
+        KeyFigure(
+            label="Time for the certainty of the usual set",
+            value="none found" if needed is None else 100 * needed / minutes,
+            unit="" if needed is None else "%",
+            note="" if needed is None else f"{needed:.3g} min in place of {minutes:.3g} min",
+        ),
+    ]
+    cards += [_key_figure(name, row) for name, row in found["figures"].items()]
+    figures: list[list[Cell]] = [
+        [name, row["value"], row["before"], row["design"], row["usual"], row["design"] / row["usual"]]
+        for name, row in found["figures"].items()
+    ]
+    heads = ("figure", "value", "before", "design", "usual", "ratio")
+    manoeuvres: list[list[Cell]] = [list(row.values()) for row in found["manoeuvres"]]
+    coefficients: list[list[Cell]] = [
+        [name, row["standard_error"], row["design"], row["usual"]] for name, row in found["coefficients"].items()
+    ]
+    sections = [
+        *notices_section(found["notices"]),
+        PageSection(
+            heading="Certainty of the figures",
+            text=_TRIAL,
+            charts=[Illustration(chart=chart) for chart in certainty_charts(found, "minutes", "min")],
+            tables=[
+                PageTable(
+                    caption="Figures and their standard errors",
+                    columns=[Column(title=head, digits=3) for head in heads],
+                    rows=figures,
+                )
+            ],
+        ),
+        PageSection(
+            heading="The plan",
+            tables=[
+                PageTable(
+                    caption="Manoeuvres",
+                    columns=[
+                        Column(title="manoeuvre"),
+                        Column(title="repeats"),
+                        Column(title="length", unit="s"),
+                        Column(title="with approach", unit="min", digits=3),
+                        Column(title="orders"),
+                    ],
+                    rows=manoeuvres,
+                )
+            ],
+        ),
+        PageSection(
+            heading="Coefficients",
+            text="Standard errors before the trial (prime), and after it over those before.",
+            tables=[
+                PageTable(
+                    caption="Coefficients",
+                    columns=[Column(title=head, digits=3) for head in ("", "before", "design", "usual")],
+                    rows=coefficients,
+                )
+            ],
+        ),
+    ]
+    usual = found["usual_set"]
+    subtitle = f"usual set: {', '.join(usual['manoeuvres'])}, {usual['minutes']:.3g} min"
+    return Page(title=f"{found['ship']}: the next sea trial", subtitle=subtitle, figures=cards, sections=sections)

@@ -57,6 +57,9 @@ RESULT_TYPES = (
     ResultType(
         "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)
     ),
+    ResultType(
+        "Sea trial, designed", "design", ("usual_set", "certainty", "manoeuvres"), ("minutes_for_usual_certainty",)
+    ),
     ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
         "Captive tests to MMG",

@@ -10,7 +10,7 @@ from tank2sim.report.captive.mmg_page import mmg_reduction_page
 from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
-from tank2sim.report.design.page import campaign_design_page
+from tank2sim.report.design.page import campaign_design_page, trial_design_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.glide.page import glide_page
@@ -123,6 +123,11 @@ _PAGES: Mapping[str, _Page] = {
     "Captive campaign, designed": _Page(
         campaign_design_page,
         {"figures": dict, "coefficients": dict, "certainty": dict, "runs": list, "model": dict, "range": dict}
+        | {"notices": list},
+    ),
+    "Sea trial, designed": _Page(
+        trial_design_page,
+        {"figures": dict, "coefficients": dict, "certainty": dict, "manoeuvres": list, "usual_set": dict}
         | {"notices": list},
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
