@@ -34,6 +34,7 @@ from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import DENSITY, GRAVITY, NOISE_SHARE, Campaign, Run, Ship, ship, write
 
 FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
+BUNDLED = ("mariner", "kvlcc2-captive", "kvlcc2", "esso-osaka", "container")
 FIRST_SEED = 401
 RATE_HZ = 5.0
 GAIN = 0.002
@@ -70,7 +71,19 @@ def main() -> int:
         f"usual matrix {usual:.2f}; errors by the plan over those by the usual matrix: {both / usual:.2f} "
         f"(predicted {predicted:.2f})"
     )
+    _bundled()
     return 0
+
+
+def _bundled() -> None:
+    """Predicted shares of the hours for bundled ships, with the assumed errors of the gauges."""
+    for name in BUNDLED:
+        both, one = (design_campaign(name, figures=FIGURES, one_side=one_side).design for one_side in (False, True))
+        shares = [
+            f"{100 * found.hours_needed / found.hours:.0f} %" if found.hours_needed else "no shorter plan"
+            for found in (both, one)
+        ]
+        print(f"{name}: {shares[0]} of the hours of the usual matrix; for figures to one side alone {shares[1]}")
 
 
 def _one_ship(seed: int, seeds: int) -> tuple[float, float, Sequence[np.ndarray], Sequence[np.ndarray]] | None:

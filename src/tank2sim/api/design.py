@@ -15,10 +15,10 @@ from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
 from tank2sim.cards.writing import TestedRange
-from tank2sim.design.captive_design import DRAWS, CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
+from tank2sim.design.captive_design import DRAWN_SHIPS, CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
 from tank2sim.design.figure_slopes import FIGURES_OPTION, figure_of_text, range_of_figures
 from tank2sim.design.plan_files import campaign_template, plan_csv, run_rows, runs_of_campaign
-from tank2sim.design.tank_form import TankFile, read_tank, with_changes
+from tank2sim.design.tank_form import TankFile, read_tank, with_tank_values
 from tank2sim.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
@@ -32,7 +32,7 @@ DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/1
 """Figures where none is given: those of IMO MSC.137(76) that have slopes."""
 
 _GAUGE_KEYS = ("noise", "zero")
-_MOST_HOURS = 10_000.0
+_MOST_HOURS = 1000.0
 _TABLE_ROWS = 12
 """Coefficients in the printed table. Project choice: the page and JSON have all."""
 
@@ -220,7 +220,7 @@ def design_campaign(
     largest: tuple[float, float, float] | None = None,
     check_runs: bool = True,
     one_side: bool = False,
-    draws: int = DRAWS,
+    draws: int = DRAWN_SHIPS,
     seed: int = 0,
 ) -> CampaignDesignResult:
     """Design the next captive campaign of a ship: the runs that make its figures most certain.
@@ -275,8 +275,8 @@ def design_campaign(
     polynomial, converted = _polynomial(ship)
     asked = _figures_of(figures)
     limits = tank if isinstance(tank, TankFile) else read_tank(tank) if tank is not None else TankFile()
-    limits = with_changes(limits, "carriage", length_m=carriage_length_m)
-    limits = with_changes(limits, "model", length_m=model_length_m)
+    limits = with_tank_values(limits, "carriage", length_m=carriage_length_m)
+    limits = with_tank_values(limits, "model", length_m=model_length_m)
     reach = range_of_figures(polynomial, asked) if largest is None else _tested_range(largest)
     own = None if usual is None else runs_of_campaign(Path(usual), tank_runs(polynomial, limits, reach))
     settings = CaptiveDesignSettings(

@@ -12,7 +12,7 @@ from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import page_option, plot_option, set_option
 from tank2sim.cli.trials import TakesSeveral
-from tank2sim.design.captive_design import DRAWS
+from tank2sim.design.captive_design import DRAWN_SHIPS
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder
 
@@ -60,7 +60,7 @@ from tank2sim.files import writable_folder
 @click.option(
     "--draws",
     type=click.IntRange(0, 1000),
-    default=DRAWS,
+    default=DRAWN_SHIPS,
     show_default=True,
     help="Ships drawn from the card's errors, for which the plan is to be good as well.",
 )

@@ -24,7 +24,7 @@ from tank2sim.identification.captive.tank_conditions import SHORTEST_MODEL_M
 from tank2sim.records.campaign_form import ModelSection
 from tank2sim.records.campaigns import FORCE_COLUMNS
 
-DRAWS = 12
+DRAWN_SHIPS = 12
 """Ships drawn from the errors of the card. Project choice: the plan is then as good for them on average; with 50 it is
 the same within its rounding."""
 
@@ -146,7 +146,7 @@ class CaptiveDesignSettings:
     largest: TestedRange | None = None
     check_runs: bool = True
     one_side: bool = False
-    draws: int = DRAWS
+    draws: int = DRAWN_SHIPS
     seed: int = 0
 
 

@@ -31,8 +31,9 @@ from tank2sim.identification.captive.regression import Spread, scatters
 from tank2sim.records.campaign_form import ModelSection, RunSheet, TankSection, TankTest, UncertaintySection
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
 
-_READINGS = 24
-"""Readings a period of made-up runs; the noise is scaled to those of the tank."""
+_READINGS, _CYCLES = 24, 6
+"""Readings a period of made-up runs, and their periods at most; the noise is scaled to readings and length of the run:
+over whole periods information grows with their number."""
 
 _UNKNOWN = 10.0
 """Standard deviation of coefficients of which nothing is known, over the largest linear one of the ship. Project
@@ -127,8 +128,10 @@ class PlannedCampaign:
         return found
 
     def _record(self, run: PlannedRun, forces: Mapping[str, Array] | None) -> CaptiveRun:
-        count = _READINGS * run.cycles if run.oscillates else _READINGS
-        time = np.arange(count) * run.record_s / count
+        cycles = min(run.cycles, _CYCLES) if run.oscillates else 1
+        length = cycles * 2 * math.pi / run.frequency_radps if run.oscillates else run.record_s
+        count = _READINGS * cycles
+        time = np.arange(count) * length / count
         phase, ones = run.frequency_radps * time, np.ones(count)
         sway = (
             run.velocity * np.cos(phase) if run.type == "pure_sway" else -run.speed_mps * math.sin(run.drift_rad) * ones
@@ -149,11 +152,10 @@ class PlannedCampaign:
             N_Nm=made["N"],
         )
 
-    def _with_noise(self, reduced: ReducedRun) -> ReducedRun:
+    def _with_noise(self, reduced: ReducedRun, run: PlannedRun) -> ReducedRun:
         """The run with the covariance of its harmonics by the stated noise: as many independent readings as it has."""
         inverse = np.asarray(np.linalg.inv(reduced.basis.T @ reduced.basis), dtype=np.float64)
-        step = float(reduced.run.time_s[1] - reduced.run.time_s[0])
-        thinning = 1.0 / (step * self.rate_hz)
+        thinning = len(reduced.run.time_s) / (run.record_s * self.rate_hz)
         fits = {
             force: replace(fit, covariance=inverse * self.gauges[force].noise ** 2 * thinning)
             for force, fit in reduced.fits.items()
@@ -168,7 +170,7 @@ class PlannedCampaign:
     def information(self, groups: Sequence[RunGroup]) -> dict[str, tuple[tuple[str, ...], Array]]:
         """Force to the names (k,) of the terms that the runs excite, and the information (n, k, k) of each group."""
         runs = [run for group in groups for run in group]
-        reduced = [self._with_noise(self.made_up(run)) for run in runs]
+        reduced = [self._with_noise(self.made_up(run), run) for run in runs]
         group_of_run = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
         found = {}
         for force in FORCE_COLUMNS:

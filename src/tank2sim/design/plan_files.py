@@ -52,13 +52,26 @@ def _rounded(value: object) -> object:
 
 
 def plan_csv(rows: list[dict[str, object]]) -> str:
-    """The plan as CSV, a row for each run; empty where a column has no meaning for it."""
+    """The plan as CSV, a row for each run; empty where a column has no meaning for it.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Of :func:`run_rows`.
+    """
     cells = [["" if value is None else f"{value}" for value in row.values()] for row in rows]
     return "\n".join([_HEADS, *(",".join(row) for row in cells)]) + "\n"
 
 
 def campaign_template(design: CaptiveDesign, rows: list[dict[str, object]]) -> str:
-    """``campaign.toml`` of the planned runs: it lacks only their files, and what the tank alone knows."""
+    """``campaign.toml`` of the planned runs: it lacks only their files, and what the tank alone knows.
+
+    Parameters
+    ----------
+    design : CaptiveDesign
+    rows : list of dict
+        Of :func:`run_rows`.
+    """
     runs, ship, planned = design.tank_runs, design.card.ship, design.planned
     scale = runs.length_m / ship.length_m
     document = tomlkit.document()

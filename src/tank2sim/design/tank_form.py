@@ -18,7 +18,6 @@ from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.records.campaign_form import (
     Angle,
-    NotNegative,
     TankSection,
     TestGravity,
     TestWaterDensity,
@@ -26,6 +25,10 @@ from tank2sim.records.campaign_form import (
 )
 
 _Share = Annotated[float, Field(ge=0, lt=1)]
+_Seconds = Annotated[float, Field(ge=0, le=1e5)]
+_Speed = Annotated[float, Field(ge=0.01, le=100)]
+_Metres = Annotated[float, Field(gt=0, le=5000)]
+"""Project choice, each far beyond any tank: refuses wrong units."""
 
 
 class CarriageSection(CardSection):
@@ -47,12 +50,12 @@ class CarriageSection(CardSection):
         Highest speed.
     """
 
-    length_m: Positive = 240.0
-    acceleration_mps2: Positive = 0.3
-    settling_lengths: NotNegative = 2.0
-    waiting_s: NotNegative = 600.0
-    return_speed_mps: Positive = 2.0
-    speed_mps: Positive | None = None
+    length_m: _Metres = 240.0
+    acceleration_mps2: Annotated[float, Field(ge=1e-3, le=10)] = 0.3
+    settling_lengths: Annotated[float, Field(ge=0, le=100)] = 2.0
+    waiting_s: _Seconds = 600.0
+    return_speed_mps: _Speed = 2.0
+    speed_mps: _Speed | None = None
 
 
 class MechanismSection(CardSection):
@@ -112,7 +115,7 @@ class GaugesSection(CardSection):
     Y_zero_N: Positive | None = None
     N_zero_Nm: Positive | None = None
     gain_relative: _Share = 0.003
-    rate_hz: Annotated[float, Field(gt=0, le=1e5)] = 20.0
+    rate_hz: Annotated[float, Field(ge=0.01, le=1e5)] = 20.0
 
 
 class TestedModelSection(CardSection):
@@ -127,7 +130,7 @@ class TestedModelSection(CardSection):
     """
 
     length_m: Annotated[float, Field(gt=0.1, le=100)] | None = None
-    speed_mps: Positive | None = None
+    speed_mps: _Speed | None = None
     water_density_kgpm3: TestWaterDensity = 1000.0
     gravity_mps2: TestGravity = 9.80665
 
@@ -166,7 +169,7 @@ def read_tank(path: Path | str) -> TankFile:
         raise form_fault(error, path, spelt, form=TankFile, what="a tank") from None
 
 
-def with_changes(tank: TankFile, section: str, **values: float | None) -> TankFile:
+def with_tank_values(tank: TankFile, section: str, **values: float | None) -> TankFile:
     """The tank with other values in one section; None leaves a value as it is.
 
     Raises

@@ -35,11 +35,11 @@ SENSORS: Mapping[str, float] = {
 """Standard deviation of a reading a second where none is stated, SI. Project choice: a satellite receiver with its
 Doppler velocities, and a gyro compass."""
 
-LENGTHS = (9.0, 12.0, 18.0, 24.0)
+TRIAL_LENGTHS = (9.0, 12.0, 18.0, 24.0)
 """Lengths of candidates, L/u0: from half a turning circle and an execute or two of a zigzag to one and a half turns and
 four executes (:data:`tank2sim.gap.outcome.next_test.LENGTH`). Project choice."""
 
-APPROACH = 6.0
+TRIAL_APPROACH = 6.0
 """Time before each manoeuvre until the ship is steady on course and speed, L/u0. Project choice: a fast ship has its
 speed again after some six lengths; a tanker needs more."""
 
@@ -198,7 +198,7 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
     """Candidates of all lengths, the longest last, with their information; without those out of bounds."""
     found: list[TrialManoeuvre] = []
     information = []
-    for length in LENGTHS:
+    for length in TRIAL_LENGTHS:
         of: Sequence[Candidate] = candidate_manoeuvres(card, length)
         orders, each = ship.information(of, length)
         duration = next(iter(orders.values())).shape[1] * ship.step_s
@@ -207,7 +207,7 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
                 continue
             own = {name: values[place] for name, values in orders.items()}
             text = orders_csv(ship.step_s, own, f"{candidate.name} of {card.ship.name}, by its card")
-            total = duration + APPROACH * ship.ship_time
+            total = duration + TRIAL_APPROACH * ship.ship_time
             found.append(
                 TrialManoeuvre(
                     name=candidate.name,
