@@ -46,7 +46,6 @@ def _noise(card: ManoeuvringCard) -> dict[str, float]:
 
 def main() -> int:
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 4
-    plans, usuals = [], []
     for name in SHIPS:
         began = time.perf_counter()
         card = parse_card(not_referring(read_card(name).text), name)  # without its covariance
@@ -90,11 +89,11 @@ def main() -> int:
                 f"  {figure:24s} before {plan.design.prior_errors[row]:.3g}; predicted {predicted['plan'][row]:.3g} "
                 f"and {predicted['usual'][row]:.3g}; rms error {rms['plan'][row]:.3g} and {rms['usual'][row]:.3g}"
             )
-        plans.append(np.square(np.array(errors["plan"]) / predicted["plan"]))
-        usuals.append(np.square(np.array(errors["usual"]) / predicted["usual"]))
+        plan_ratio, usual_ratio = (
+            np.sqrt(np.mean(np.square(np.array(errors[kind]) / predicted[kind]))) for kind in ("plan", "usual")
+        )
+        print(f"  errors over those predicted, rms: plan {plan_ratio:.2g}, usual set {usual_ratio:.2g}")
         print(f"  {time.perf_counter() - began:.0f} s", flush=True)
-    plan_ratio, usual_ratio = (np.sqrt(np.mean(np.concatenate(each))) for each in (plans, usuals))
-    print(f"errors of figures over those predicted, rms: plan {plan_ratio:.2f}, usual set {usual_ratio:.2f}")
     return 0
 
 

@@ -34,6 +34,7 @@ def test_the_plan_keeps_the_hours_and_makes_every_figure_more_certain_than_the_u
     assert 0 < found.design.hours_needed < 8.0
 
 
+@pytest.mark.slow
 def test_the_usual_matrix_in_twice_the_hours_has_half_the_variance():
     short, long = plan(), plan(hours=16.0)
     ratio = (short.figures["usual"] / long.figures["usual"]) ** 2
@@ -63,6 +64,7 @@ def test_runs_and_template_are_the_same_plan(tmp_path):
     assert len(found.plan.splitlines()) == len(rows) + 1
 
 
+@pytest.mark.slow
 def test_a_campaign_of_ones_own_is_compared_in_place_of_the_usual_matrix(tmp_path):
     gauges = {f"{force}_zero_{unit}": 0.02 for force, unit in (("X", "N"), ("Y", "N"), ("N", "Nm"))}
     gauges |= {key.replace("zero", "noise"): 0.1 for key in gauges}
@@ -159,6 +161,7 @@ def test_an_unknown_key_of_the_tank_is_refused_with_its_place(tmp_path):
     assert caught.value.place == "gauges.Y_range"
 
 
+@pytest.mark.slow
 def test_drawn_ships_count_as_much_as_the_one_of_the_card():
     found = plan(draws=3)
     assert len(found.design.slopes.drawn) > 1

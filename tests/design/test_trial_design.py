@@ -33,6 +33,7 @@ def test_the_plan_keeps_the_time_and_is_as_good_as_the_usual_set():
     assert found.design.usual_minutes == pytest.approx(found.design.minutes)
 
 
+@pytest.mark.slow
 def test_more_time_and_better_sensors_make_figures_more_certain():
     assert (trial(minutes=40.0).figures["design"] < trial().figures["design"]).all()
     ratio = trial(factor=2.0).figures["usual"] / trial().figures["usual"]
@@ -64,6 +65,13 @@ def test_the_information_of_a_manoeuvre_is_that_of_the_differences_of_its_readin
         J = slopes[place].reshape(-1, 2)
         assert np.linalg.eigvalsh(each).min() > 0
         assert np.linalg.eigvalsh(J.T @ J - each).min() > -1e-9 * np.trace(J.T @ J)
+
+
+def test_a_ship_that_is_unstable_on_a_straight_course_is_marked():
+    """The KVLCC2 is (C' < 0), the Mariner is not."""
+    unstable = design_trial("kvlcc2-captive", figures="steady_radius_m@20", sensors=SENSORS)
+    assert any("LINEARISED" in notice for notice in unstable.marks) and unstable.design.unstable
+    assert not design_trial("mariner", figures="steady_radius_m@20", minutes=8.0, sensors=SENSORS).design.unstable
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from tank2sim.design.tank_form import TankFile, read_tank, with_tank_values
 from tank2sim.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
-from tank2sim.marks import ASSUMED
+from tank2sim.marks import ASSUMED, LINEARISED
 from tank2sim.units import from_si, to_si
 
 if TYPE_CHECKING:
@@ -481,6 +481,12 @@ def design_trial(
             0,
             f"{ASSUMED} of the sensors, for none are stated: "
             + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items()),
+        )
+    if design.unstable:
+        notices.insert(
+            0,
+            f"{LINEARISED} of {ship.name}, which is unstable on a straight course: its manoeuvres are not linear in "
+            "the coefficients, and errors after a fit may be many times those predicted here",
         )
     return TrialDesignResult(ship, design, tuple(dict.fromkeys([*notices, *converted])))
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.analysis.influence.figures import InfluenceFigure
+from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
+from tank2sim.analysis.influence.study import Study
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.design.allocation import Allocation, InformationBlock, target_matrices
@@ -86,6 +87,8 @@ class TrialDesign:
         Of each figure before the trial, after it, and after the usual set in the same time.
     curve : mapping
         ``minutes``, ``usual_minutes``, ``design`` and ``usual``: standard errors of each figure over the time.
+    unstable : bool
+        The card's ship is unstable on a straight course: its figures are not linear in the coefficients.
     minutes_needed : float or None
         Least time of a plan with every figure as certain as by the usual set in `minutes`.
     coefficients : mapping
@@ -103,6 +106,7 @@ class TrialDesign:
     standard_errors: Array
     usual_standard_errors: Array
     curve: Mapping[str, object]
+    unstable: bool
     minutes_needed: float | None
     coefficients: Mapping[str, Mapping[str, float]]
     sensors: Mapping[str, float]
@@ -110,12 +114,12 @@ class TrialDesign:
     @property
     def minutes_used(self) -> float:
         """Time of the plan, min."""
-        return sum(each.total_s * repeats for each, repeats in self.manoeuvres) / 60
+        return float(sum(each.total_s * repeats for each, repeats in self.manoeuvres)) / 60
 
     @property
     def usual_minutes(self) -> float:
         """Time of the usual set once, min."""
-        return sum(each.total_s for each in self.usual) / 60
+        return float(sum(each.total_s for each in self.usual)) / 60
 
 
 def design_of_trial(
@@ -183,6 +187,7 @@ def design_of_trial(
         standard_errors=np.sqrt(every.variances(counts)),
         usual_standard_errors=np.sqrt(by_usual),
         curve=_curve(slopes, every, plans, usual / usual_s, budget),
+        unstable=bool(Study(card, [parse_figure("criterion_C")]).base[0] <= 0),
         minutes_needed=_least(targets, budget, plans),
         coefficients=_coefficients(ship.axes, block, counts, usual * budget / usual_s, free, errors.covariance),
         sensors=dict(sensors),
