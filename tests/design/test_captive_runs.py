@@ -76,7 +76,7 @@ def test_amplitudes_stay_within_the_mechanism():
     for run in swinging:
         side = run.velocity / run.frequency_radps
         path = side if run.type == "pure_sway" else 1.2 * run.velocity / run.frequency_radps**2
-        assert path <= 0.5 + 1e-12
+        assert run.sway_amplitude_m == pytest.approx(path) and path <= 0.5 + 1e-12
         assert run.type == "pure_sway" or side <= 0.15 + 1e-12
     assert {run.type for run in swinging} == {"pure_sway", "pure_yaw", "yaw_with_drift"}
 
