@@ -42,7 +42,7 @@ PRIOR_ERROR = 0.15
 
 
 def main() -> int:
-    wanted = int(sys.argv[1]) if len(sys.argv) > 1 else 3
+    wanted = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 8
     shares, generator_shares, design_ratios, usual_ratios, measured, before = [], [], [], [], [], []
     seed = FIRST_SEED
