@@ -2,8 +2,8 @@
 
 Tests i of cost t_i have Fisher information M_i about coefficients; a plan with n_i of each leaves the covariance
 C = (P + sum n_i M_i)^-1, P the prior. A target is a positive matrix L, and tr(L C) its expected variance: an L-optimal
-design (Fedorov 1972, Theory of Optimal Experiments; Atkinson, Donev and Tobias 2007, Optimum Experimental Designs,
-sections 10.5 and 13). With shares of the time in place of whole numbers it is convex, and solved by the multiplicative
+design (Fedorov 1972, Theory of Optimal Experiments; Atkinson, Donev and Tobias 2007, Optimum Experimental
+Designs). With shares of the time in place of whole numbers it is convex, and solved by the multiplicative
 algorithm (Yu 2010, Annals of Statistics 38); whole numbers follow by rounding down and exchange (Fedorov). The worst
 target counts: its weight is raised until no other is worse.
 """
