@@ -12,7 +12,19 @@ FAST = ("--figures", "steady_radius_m@20", "--draws", "0")
 
 def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     result = tank2sim(
-        *("design", "esso-osaka", *FAST, "--hours", "4", "-o", "plan.csv", "--campaign", "campaign.toml"),
+        *(
+            "design",
+            "esso-osaka",
+            *FAST,
+            "--hours",
+            "4",
+            "--largest",
+            "12/25/0.6",
+            "-o",
+            "plan.csv",
+            "--campaign",
+            "campaign.toml",
+        ),
         *("--page", "p.html", "--json", "d.json"),
         cwd=tmp_path,
     )
@@ -23,6 +35,8 @@ def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     assert [float(row["drift_deg"]) for row in rows] == [run["drift_deg"] for run in found["runs"]]
     assert result.stdout.startswith("ASSUMED")
     assert "<html" in (tmp_path / "p.html").read_text(encoding="utf-8")
+    assert found["range"] == pytest.approx({"drift_deg": 12.0, "rudder_deg": 25.0, "yaw_rate_prime": 0.6})
+    assert max(abs(run["drift_deg"]) for run in found["runs"]) <= 12.0 + 1e-6
     again = tank2sim("report", "d.json", "-o", "again.html", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     missing = tank2sim("reduce", "campaign.toml", cwd=tmp_path)
@@ -50,6 +64,8 @@ def test_a_trial_is_written_with_its_orders(tmp_path):
         (("--minutes", "3"), ("--minutes", "trial")),
         (("--trial", "--sensors", "r_degps=x"), ("--sensors", "r_degps=x")),
         (("--tank", "none.toml"), ("none.toml",)),
+        (("--largest", "12/35"), ("--largest", "12/35")),
+        (("--largest", "12/35/nan"), ("--largest",)),
         (("--carriage-length", "nan"), ("--carriage-length",)),
     ],
 )

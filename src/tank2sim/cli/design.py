@@ -41,6 +41,11 @@ from tank2sim.files import writable_folder
     metavar="CAMPAIGN.toml",
     help="Compare with the runs of this campaign, in place of the usual matrix.",
 )
+@click.option(
+    "--largest",
+    metavar="DRIFT/RUDDER/RATE",
+    help="Largest drift and rudder, deg, and r' of the tests: 12/35/0.6; by default those of the figures' manoeuvres.",
+)
 @click.option("--trial", is_flag=True, help="Design a sea trial in place of a campaign.")
 @click.option("--minutes", type=float, metavar="M", help="Time of the trial; by default that of the usual set.")
 @click.option(
@@ -85,6 +90,7 @@ def command(
     carriage_length: float | None,
     model_length: float | None,
     usual: Path | None,
+    largest: str | None,
     trial: bool,
     minutes: float | None,
     sensors: tuple[str, ...],
@@ -106,8 +112,9 @@ def command(
     to the usual matrix: standard errors of the figures by both, and the hours in which a plan is as certain.
     """
     ship = load(card, values)
-    tank_options = {"--hours": hours, "--tank": tank, "--carriage-length": carriage_length}
+    tank_options: dict[str, object] = {"--hours": hours, "--tank": tank, "--carriage-length": carriage_length}
     tank_options |= {"--model-length": model_length, "--usual": usual, "--campaign": template}
+    tank_options |= {"--largest": largest}
     trial_options = {"--minutes": minutes, "--sensors": sensors, "--orders": orders}
     result: CampaignDesignResult | TrialDesignResult
     files: dict[Path, str | bytes] = {}
@@ -135,6 +142,7 @@ def command(
             carriage_length_m=carriage_length,
             model_length_m=model_length,
             usual=usual,
+            largest=_parsed_range(largest) if largest else None,
             check_runs=not no_checks,
             one_side=one_side,
             draws=draws,
@@ -155,6 +163,14 @@ def _refuse_options(options: Mapping[str, object], problem: str, remedy: str) ->
     for option, value in options.items():
         if value not in (None, ()):
             raise InputError(option, "", problem, remedy)
+
+
+def _parsed_range(text: str) -> tuple[float, float, float]:
+    try:
+        drift, rudder, rate = map(float, text.split("/"))
+    except ValueError:
+        raise InputError("--largest", text, "cannot be read", "give DRIFT/RUDDER/RATE, as 12/35/0.6") from None
+    return drift, rudder, rate
 
 
 def _parsed_sensors(given: Sequence[str]) -> dict[str, float]:
