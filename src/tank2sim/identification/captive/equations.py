@@ -140,7 +140,7 @@ def campaign_equations(
     unit = scales.force * (scales.length if force == "N" else 1.0)
     blocks, values, zeros, gauges, roots, places = [], [], [], [], [], []
     for place, run in enumerate(runs):
-        histories = np.column_stack([*(_history(campaign, run.motion, name) for name in names)]) / unit
+        histories = np.column_stack([*(term_history(campaign, run.motion, name) for name in names)]) / unit
         inertial = rigid_body_force(campaign, run.motion)[force] / unit
         projected = run.projected(np.column_stack([histories, inertial]))
         fit, count = run.fits[force], run.regressed
@@ -196,7 +196,7 @@ def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, 
     }
 
 
-def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
+def term_history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
     """Force of a term whose prime value is 1, (rows,), N or N m."""
     spelt, _, trend = name.partition(" ")
     term = parse_term(spelt)
