@@ -236,8 +236,8 @@ def _smaller(
 ) -> tuple[Gap, tuple[Measured, Measured]] | None:
     """The result without an effect of the first search that those of the second make superfluous; None without one.
 
-    The first search saw the best one or two effects where others were missing too, and one may have stood in for
-    another. The others, fitted together to the card as given, must then follow the fitted trials as closely as all.
+    The first search seeks one or two effects where more may be missing, and can name one in place of another. The
+    others, fitted together to the card as given, must then follow the fitted trials as closely as all.
 
     Parameters
     ----------
