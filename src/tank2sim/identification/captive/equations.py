@@ -6,7 +6,7 @@ the exact equations for any motion, without a small-amplitude expansion.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -140,9 +140,7 @@ def campaign_equations(
     unit = scales.force * (scales.length if force == "N" else 1.0)
     blocks, values, zeros, gauges, roots, places = [], [], [], [], [], []
     for place, run in enumerate(runs):
-        histories = np.column_stack([*(_history(campaign, run.motion, name) for name in names)]) / unit
-        inertial = rigid_body_force(campaign, run.motion)[force] / unit
-        projected = run.projected(np.column_stack([histories, inertial]))
+        projected = _projected_terms(campaign, run, force, names) / unit
         fit, count = run.fits[force], run.regressed
         covariance = fit.covariance[:count, :count] / unit**2
         root = np.linalg.cholesky(covariance)
@@ -196,24 +194,49 @@ def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, 
     }
 
 
+def _projected_terms(campaign: Campaign, run: ReducedRun, force: str, names: Sequence[str]) -> Array:
+    """Mean and harmonics of each term whose prime value is 1, and of :func:`rigid_body_force`; N or N m.
+
+    They are (regressed, names + 1). A term of N has those of Y with a lever of L; what is known of the motion already
+    is not projected again.
+    """
+    model, test = campaign.model, campaign.test
+    ship = (test.water_density_kgpm3, model.length_m, test.speed_mps)
+    body = (model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2, test.inertia_speed, campaign.inertia_removed)
+    known = run.motion.projections
+    keys: list[Hashable] = [(*ship, *name[1:].partition(" ")) for name in names]
+    histories = {
+        key: _history(campaign, run.motion, name) for key, name in zip(keys, names, strict=True) if key not in known
+    }
+    inertial: Hashable = (*body, force)
+    if inertial not in known:
+        histories |= {(*body, of): history for of, history in rigid_body_force(campaign, run.motion).items()}
+    if histories:
+        known |= dict(zip(histories, run.projected(np.array([*histories.values()]).T).T, strict=True))
+    lever = model.length_m if force == "N" else 1.0
+    return np.column_stack([*(lever * known[key] for key in keys), known[inertial]])
+
+
 def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
-    """Force of a term whose prime value is 1, (rows,), N or N m."""
+    """Force of a term of X or Y whose prime value is 1, (rows,), N; of one of N, over L."""
     spelt, _, trend = name.partition(" ")
     term = parse_term(spelt)
     assert term is not None
     model, u0 = campaign.model, campaign.test.speed_mps
-    scale = Scales(campaign.test.water_density_kgpm3, model.length_m, motion.speed_mps).derivative(term)
+    density, length = campaign.test.water_density_kgpm3, model.length_m
     if term.acceleration:
+        scale = Scales(density, length, u0).derivative(replace(term, force="Y"))
         history = scale * (motion.vdot_mps2 if term.acceleration == "v" else motion.rdot_radps2)
     else:
-        change = axial_speed(motion) - u0 if term.u else 0.0
-        history = (
-            scale * motion.v_mps**term.v * motion.r_radps**term.r * motion.delta_rad**term.d * change**term.u
-        ) * np.ones(len(motion.time_s))
+        powers = [motion.v_mps] * term.v + [motion.r_radps] * term.r + [motion.delta_rad] * term.d
+        if term.u:
+            powers += [axial_speed(motion) - u0] * term.u
+        history = np.asarray(Scales(density, length, motion.speed_mps).derivative(replace(term, force="Y")))
+        for factor in powers:
+            history = history * factor
     if trend:
-        history = history * (motion.frequency_radps * model.length_m / u0) ** 2
-    result: Array = history
-    return result
+        history = history * (motion.frequency_radps * length / u0) ** 2
+    return np.broadcast_to(history, len(motion.time_s))
 
 
 def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:

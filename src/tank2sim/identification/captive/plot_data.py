@@ -204,7 +204,7 @@ def _loop(reduction: Reduction, run: ReducedRun) -> Plot:
     kept, velocity = run.motion.kept, _velocity(run)
     one_period = slice(0, len(run.motion.time_s) // run.motion.periods + 1)
     measured = {force: run.run.force(force)[kept] + inertia[force] for force in "YN"}
-    fitted = {force: (run.basis @ run.fits[force].coefficients + inertia[force])[one_period] for force in "YN"}
+    fitted = {force: (run.fitted(force) + inertia[force])[one_period] for force in "YN"}
     return {
         "label": run.run.name,
         "measured": drawn_columns({"motion": velocity, **measured}, _LOOP_SAMPLES),

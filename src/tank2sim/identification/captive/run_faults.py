@@ -223,13 +223,13 @@ def _step(run: ReducedRun, force: str) -> tuple[float, float, float] | None:
 
     A step must be significant with and without a fitted linear drift of the zero: slow noise seldom is in both.
     """
-    count = len(run.basis)
+    count = len(run.motion.time_s)
     if count < 40:
         return None
     steady = [place for place, label in enumerate(run.labels) if label != "trend"]
-    record = run.run.force(force)[run.motion.kept]
-    place, size, ratio = _largest_step(record, run.basis)
-    if ratio < _STEP_WITH_DRIFT or _largest_step(record, run.basis[:, steady])[2] < _STEP_RATIO:
+    record, basis = run.run.force(force)[run.motion.kept], run.basis
+    place, size, ratio = _largest_step(record, basis)
+    if ratio < _STEP_WITH_DRIFT or _largest_step(record, basis[:, steady])[2] < _STEP_RATIO:
         return None
     return float(run.run.time_s[run.motion.kept][place]), size, ratio
 
