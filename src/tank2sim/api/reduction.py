@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.result import Result, ResultTable
-from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.errors import InputError
@@ -36,6 +35,8 @@ from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
 if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
+
+    from tank2sim.api.ship import Ship
 
 
 class ReductionResult(Result):
@@ -79,6 +80,8 @@ class ReductionResult(Result):
     @property
     def ship(self) -> Ship:
         """The ship of the card found."""
+        from tank2sim.api.ship import Ship
+
         return Ship(self.card)
 
     @property

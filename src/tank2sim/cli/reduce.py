@@ -6,7 +6,6 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.mmg_reduction import reduce_to_mmg
 from tank2sim.api.reduction import reduce
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import page_option, plot_folder_option
@@ -94,6 +93,8 @@ def command(
 def _reduce_to_mmg(
     campaign: Path, output: Path | None, page: Path | None, plots: Path | None, json_file: Path | None
 ) -> None:
+    from tank2sim.api.mmg_reduction import reduce_to_mmg  # not for the polynomial, which needs no model
+
     result = reduce_to_mmg(campaign)
     form = result.fit.tests.form
     tables = [section.file for section in (form.averages, form.open_water) if section and section.file]

@@ -79,8 +79,8 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
 
 def _is_plain(path: Path) -> bool:
     """True for the CSV that needs no map; also for a file that :func:`read_table` explains best."""
-    lines = path.read_bytes().decode("utf-8-sig", errors="replace").splitlines()
-    head = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
     names = [name.strip() for name in head.split(",")]
     return not head or (("t_s" in names or "t_ms" in names) and "\t" not in head and ";" not in head)
 

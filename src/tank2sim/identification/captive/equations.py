@@ -138,29 +138,32 @@ def campaign_equations(
     """
     scales = campaign.scales
     unit = scales.force * (scales.length if force == "N" else 1.0)
-    blocks, values, zeros, gauges, roots, places = [], [], [], [], [], []
-    for place, run in enumerate(runs):
-        projected = _projected_terms(campaign, run, force, names) / unit
-        fit, count = run.fits[force], run.regressed
-        covariance = fit.covariance[:count, :count] / unit**2
-        root = np.linalg.cholesky(covariance)
-        gauge = fit.coefficients[:count] / unit
-        right = [gauge + projected[:, -1], np.eye(count)[:, 0], gauge]
-        weighted = np.linalg.solve(root, np.column_stack([projected[:, :-1], *right]))
-        blocks.append(weighted[:, :-3])
-        values.append(weighted[:, -3])
-        zeros.append(weighted[:, -2])
-        gauges.append(weighted[:, -1])
-        roots.append(root)
-        places += [place] * count
+    keys = _known_by(campaign, names)
+    sizes = np.array([run.regressed for run in runs])
+    ends = np.cumsum(sizes)
+    system = np.empty((ends[-1], len(names) + 3))
+    roots: list[Array] = [np.empty(0)] * len(runs)
+    for size in np.unique(sizes).tolist():  # runs of as many coefficients together
+        alike = np.flatnonzero(sizes == size)
+        fits = [runs[place].fits[force] for place in alike]
+        covariances = np.array([fit.covariance[:size, :size] for fit in fits]) / unit**2
+        gauges = np.array([fit.coefficients[:size] for fit in fits]) / unit
+        projected = np.array([_projected_terms(campaign, runs[place], force, names, keys) for place in alike]) / unit
+        zeros = np.broadcast_to(np.eye(size)[:, 0], gauges.shape)
+        right = np.stack([gauges + projected[..., -1], zeros, gauges], axis=-1)
+        root = np.linalg.cholesky(covariances)
+        weighted = np.linalg.solve(root, np.concatenate([projected[..., :-1], right], axis=-1))
+        for place, block, its_root in zip(alike.tolist(), weighted, root, strict=True):
+            system[ends[place] - size : ends[place]] = block
+            roots[place] = its_root
     return CampaignEquations(
         force=force,
         names=tuple(names),
-        design=np.vstack(blocks),
-        values=np.concatenate(values),
-        zero=np.concatenate(zeros),
-        gauge=np.concatenate(gauges),
-        run_of_row=np.array(places, dtype=np.int64),
+        design=system[:, :-3].copy(),
+        values=system[:, -3].copy(),
+        zero=system[:, -2].copy(),
+        gauge=system[:, -1].copy(),
+        run_of_row=np.repeat(np.arange(len(runs), dtype=np.int64), sizes),
         runs=tuple(runs),
         unit=unit,
         roots=tuple(roots),
@@ -194,27 +197,37 @@ def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, 
     }
 
 
-def _projected_terms(campaign: Campaign, run: ReducedRun, force: str, names: Sequence[str]) -> Array:
+def _known_by(campaign: Campaign, names: Sequence[str]) -> list[Hashable]:
+    """By what projections of terms are kept: all that they depend on but the motion; last the inertia of the body."""
+    model, test = campaign.model, campaign.test
+    ship = (test.water_density_kgpm3, model.length_m, test.speed_mps)
+    body = (model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2, test.inertia_speed, campaign.inertia_removed)
+    return [*((ship, name[1:]) for name in names), body]
+
+
+def _projected_terms(
+    campaign: Campaign, run: ReducedRun, force: str, names: Sequence[str], keys: Sequence[Hashable]
+) -> Array:
     """Mean and harmonics of each term whose prime value is 1, and of :func:`rigid_body_force`; N or N m.
 
     They are (regressed, names + 1). A term of N has those of Y with a lever of L; what is known of the motion already
     is not projected again.
     """
-    model, test = campaign.model, campaign.test
-    ship = (test.water_density_kgpm3, model.length_m, test.speed_mps)
-    body = (model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2, test.inertia_speed, campaign.inertia_removed)
     known = run.motion.projections
-    keys: list[Hashable] = [(*ship, *name[1:].partition(" ")) for name in names]
+    *of_terms, body = keys
     histories = {
-        key: _history(campaign, run.motion, name) for key, name in zip(keys, names, strict=True) if key not in known
+        key: _history(campaign, run.motion, name)
+        for key, name in zip(of_terms, names, strict=True)
+        if key not in known
     }
-    inertial: Hashable = (*body, force)
-    if inertial not in known:
-        histories |= {(*body, of): history for of, history in rigid_body_force(campaign, run.motion).items()}
+    if (body, force) not in known:
+        histories |= {(body, of): history for of, history in rigid_body_force(campaign, run.motion).items()}
     if histories:
         known |= dict(zip(histories, run.projected(np.array([*histories.values()]).T).T, strict=True))
-    lever = model.length_m if force == "N" else 1.0
-    return np.column_stack([*(lever * known[key] for key in keys), known[inertial]])
+    found = np.array([*(known[key] for key in of_terms), known[body, force]]).T
+    if force == "N":
+        found[:, :-1] *= campaign.model.length_m
+    return found
 
 
 def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:

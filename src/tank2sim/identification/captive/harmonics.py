@@ -94,6 +94,9 @@ class ReducedRun:
 
     def projected(self, histories: Array) -> Array:
         """Coefficients (regressed, n) of the given histories (rows, n); exactly linear."""
+        if not self.run.oscillates:
+            means: Array = histories.mean(axis=0)[None]  # to which the trend is orthogonal
+            return means
         basis = self.basis
         coefficients = np.linalg.solve(basis.T @ basis, basis.T @ histories)[: self.regressed]
         return np.asarray(coefficients, dtype=np.float64)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -48,6 +48,8 @@ class CaptiveMotion:
     projections : dict
         What :mod:`tank2sim.identification.captive.equations` has projected on the harmonics of this motion, kept
         because a campaign's equations are set up several times.
+    erring : dict
+        The same of this motion with an error, by its kind and size.
     """
 
     kept: slice
@@ -61,6 +63,7 @@ class CaptiveMotion:
     vdot_mps2: Array
     rdot_radps2: Array
     projections: dict[Hashable, Array] = field(init=False, repr=False, default_factory=dict)
+    erring: dict[tuple[str, float], dict[Hashable, Array]] = field(init=False, repr=False, default_factory=dict)
 
     @cached_property
     def mean_speed_mps(self) -> float:
@@ -77,6 +80,13 @@ class CaptiveMotion:
     def accelerates(self) -> tuple[bool, bool]:
         """True for a sway velocity, and for a yaw rate, that changes."""
         return bool(np.any(self.vdot_mps2)), bool(np.any(self.rdot_radps2))
+
+    def with_error(self, source: str, size: float, **histories: Array) -> CaptiveMotion:
+        """The motion with other histories, by an error of a kind and size; what is projected of it is kept here."""
+        changed = replace(self, **histories)
+        kept = self.erring.setdefault((source, size), changed.projections)
+        object.__setattr__(changed, "projections", kept)
+        return changed
 
     def amplitude(self, values: Array) -> float:
         """Half the range of a history."""

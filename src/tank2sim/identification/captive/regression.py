@@ -69,6 +69,8 @@ class Spread:
 
     def zeros(self, equations: CampaignEquations) -> Array:
         """Variance of the zero error of each run, (runs,)."""
+        if not self.by_type:
+            return np.full(len(equations.runs), self.zero_variance)
         return np.array([self.by_type.get(run.run.type, self.zero_variance) for run in equations.runs])
 
     def weighted(self, equations: CampaignEquations, columns: Array) -> Array:

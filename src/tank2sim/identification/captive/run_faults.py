@@ -55,8 +55,9 @@ def reduced_faults(run: ReducedRun) -> Iterator[InputError]:
         return
     yield from _angles(run)
     yield from _rates(run)
+    basis = run.basis
     for force in FORCE_COLUMNS:
-        found = _step(run, force)
+        found = _step(run, force, basis)
         if found is not None:
             when, size, ratio = found
             unit = "N m" if force == "N" else "N"
@@ -218,16 +219,17 @@ def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
             return
 
 
-def _step(run: ReducedRun, force: str) -> tuple[float, float, float] | None:
+def _step(run: ReducedRun, force: str, basis: Array) -> tuple[float, float, float] | None:
     """Time, size and ratio to its standard error of a step in the mean of a residual; None if there is none.
+
+    `basis` is that of the fit of the forces.
 
     A step must be significant with and without a fitted linear drift of the zero: slow noise seldom is in both.
     """
-    count = len(run.motion.time_s)
-    if count < 40:
+    if len(basis) < 40:
         return None
     steady = [place for place, label in enumerate(run.labels) if label != "trend"]
-    record, basis = run.run.force(force)[run.motion.kept], run.basis
+    record = run.run.force(force)[run.motion.kept]
     place, size, ratio = _largest_step(record, basis)
     if ratio < _STEP_WITH_DRIFT or _largest_step(record, basis[:, steady])[2] < _STEP_RATIO:
         return None
