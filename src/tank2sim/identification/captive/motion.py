@@ -24,6 +24,8 @@ _WHOLE = 0.02
 """Share of a period by which a record may fall short of a whole number of them: rounding of its ends."""
 _FEWEST_PER_PERIOD = 16
 _ITERATIONS = 8
+_SETTLED = 1e-8
+"""Relative step of the frequency that is the last: the next would be smaller by as much again (project choice)."""
 _FEW_PERIODS = 2.5
 
 
@@ -205,7 +207,7 @@ def measured_frequency(run: CaptiveRun) -> float:
         step = _frequency_step(centred, signals, frequency)
         step = float(np.clip(step, -0.5 * bin_width, 0.5 * bin_width))
         frequency = max(frequency + step, 0.1 * bin_width)
-        if abs(step) < 1e-12 * frequency:
+        if abs(step) < _SETTLED * frequency:
             break
     return float(frequency)
 

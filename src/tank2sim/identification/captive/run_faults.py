@@ -198,6 +198,9 @@ def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
     A gauge with a few levels only is coarse, and its outermost level may be the usual one.
     """
     values = run.force(force)
+    fewest = max(6, 0.01 * len(values))
+    if all(np.count_nonzero(values == extreme) < fewest for extreme in (values.max(), values.min())):
+        return
     unique_levels, counts = np.unique(values, return_counts=True)
     if len(unique_levels) < _FEWEST_LEVELS:
         return
@@ -213,7 +216,7 @@ def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
         natural = max(usual, float(lengths[levels == next_level].max()))
         longest, count = int(lengths[levels == extreme].max()), int(np.count_nonzero(values == extreme))
         plateau = longest >= _PLATEAU * natural and count >= _PLATEAU * inner
-        if plateau and count >= max(6, 0.01 * len(values)):
+        if plateau and count >= fewest:
             problem = f"is constant at its {end}, {extreme:.4g}, for {longest} readings: the gauge is saturated"
             yield InputError(run.name, f"gauge {force}", problem, "repeat the run with a larger range")
             return
