@@ -16,11 +16,14 @@ from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
 from tank2sim.units import to_si
 
-RunType = Literal["static_drift", "static_rudder", "drift_and_rudder", "pure_sway", "pure_yaw", "yaw_with_drift"]
+RunType = Literal[
+    "static_drift", "static_rudder", "drift_and_rudder", "steady_turn", "pure_sway", "pure_yaw", "yaw_with_drift"
+]
 RUN_TYPES: tuple[RunType, ...] = (
     "static_drift",
     "static_rudder",
     "drift_and_rudder",
+    "steady_turn",
     "pure_sway",
     "pure_yaw",
     "yaw_with_drift",
@@ -83,7 +86,8 @@ class TankTest(CardSection):
         To which side a positive rudder angle turns the ship, in the run files and ``[[runs]]``.
     inertia_speed
         The u with which the rigid body's m u r and m x_G u r are computed: ``test``, u = U as the paper has it
-        (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone.
+        (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone; steady turns
+        always have u = U cos(beta).
     force_delay_s
         By how much the recorded forces lag the recorded motion, s (filters, clocks); it is taken out.
     free_motions
@@ -208,7 +212,13 @@ class FilesSection(CardSection):
 
 
 class RunSheet(CardSection):
-    """One of ``[[runs]]``: what the test sheet says of a run; its file holds what was measured."""
+    """One of ``[[runs]]``: what the test sheet says of a run; its file holds what was measured.
+
+    Parameters
+    ----------
+    yaw_rate_radps
+        Of a steady turn on a rotating arm or in circular motion, positive to starboard.
+    """
 
     file: Text
     type: RunType
@@ -216,6 +226,7 @@ class RunSheet(CardSection):
     rudder_rad: Angle | None = None
     frequency_radps: Positive | None = None
     amplitude_m: Positive | None = None
+    yaw_rate_radps: float | None = None
     yaw_rate_amplitude_radps: Positive | None = None
     propeller_radps: NotNegative | None = None
     notes: str | None = None

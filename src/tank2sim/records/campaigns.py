@@ -315,8 +315,11 @@ def read_captive_run(
         speed = np.full(len(time), test.speed_mps)
     y, psi = _optional(table, "y_m"), _optional(table, "psi_rad")
     rate = _optional(table, "r_radps")
-    if rate is None:
-        rate = np.zeros(len(time)) if sheet.type not in ("pure_yaw", "yaw_with_drift") else _rate_of(table, psi, time)
+    if rate is None and sheet.type == "steady_turn" and sheet.yaw_rate_radps is not None:
+        rate = np.full(len(time), sheet.yaw_rate_radps)
+    elif rate is None:
+        turns = sheet.type in ("pure_yaw", "yaw_with_drift", "steady_turn")
+        rate = _rate_of(table, psi, time) if turns else np.zeros(len(time))
     return CaptiveRun(
         name=sheet.file,
         type=sheet.type,
@@ -357,7 +360,8 @@ def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array 
             raise InputError(table.path, "header", "there is neither v_mps nor y_m", "add one of them")
         velocity: Array = np.gradient(y, time)
         return velocity
-    if sheet.drift_rad is None and sheet.type in ("static_drift", "drift_and_rudder", "yaw_with_drift"):
+    drifts = ("static_drift", "drift_and_rudder", "steady_turn", "yaw_with_drift")
+    if sheet.drift_rad is None and sheet.type in drifts:
         raise InputError(table.path, "header", "there is no v_mps, and the campaign gives no drift", "give one of them")
     steady: Array = -speed * np.sin(sheet.drift_rad or 0.0)
     return steady
@@ -372,11 +376,10 @@ def _rate_of(table: CsvTable, psi: Array | None, time: Array) -> Array:
 
 def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
     assert form.averages is not None
-    if condition.yaw_rate_radps:
-        remedy = "reduce --model mmg takes turning tests; or leave such rows out"
-        raise InputError(form.averages.file, condition.name.rpartition(".csv ")[2], "turns steadily", remedy)
     kind: RunType = "drift_and_rudder"
-    if condition.rudder_rad == 0.0:
+    if condition.yaw_rate_radps:
+        kind = "steady_turn"
+    elif condition.rudder_rad == 0.0:
         kind = "static_drift"
     elif condition.drift_rad == 0.0:
         kind = "static_rudder"
@@ -388,7 +391,7 @@ def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
         sheet=sheet,
         time_s=np.zeros(1),
         v_mps=np.array([-condition.speed_mps * np.sin(condition.drift_rad)]),
-        r_radps=np.zeros(1),
+        r_radps=np.array([condition.yaw_rate_radps]),
         speed_mps=np.array([condition.speed_mps]),
         delta_rad=np.array([condition.rudder_rad]),
         X_N=sense * np.array([condition.X_N]),

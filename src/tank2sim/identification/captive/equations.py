@@ -187,8 +187,9 @@ def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, 
         remedy = "add the yaw inertia about midships of the body that the gauges carry"
         raise InputError(campaign.path, "model.yaw_inertia_kgm2", "is missing, and there are yaw tests", remedy)
     body = inertia(model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2 or 0.0, dict.fromkeys(ACCELERATION_TERMS, 0.0))
-    # Paper 2 has u = U in its tests (2.2, 2.3).
-    u = motion.speed_mps if campaign.test.inertia_speed == "test" else axial_speed(motion)
+    # Paper 2 has u = U in its oscillations (2.2, 2.3).
+    by_paper = campaign.test.inertia_speed == "test" and motion.periods
+    u = motion.speed_mps if by_paper else axial_speed(motion)
     surge, sway, yaw = inertial_forces(model.mass_kg, model.x_G_m, u, motion.v_mps, motion.r_radps)
     return {
         "X": -surge,

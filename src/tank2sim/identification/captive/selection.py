@@ -190,7 +190,10 @@ def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -
 def _conditions(full: CampaignEquations) -> int:
     """Number of distinct conditions: an oscillating run counts once for each of its coefficients."""
     steady = {
-        tuple(np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist())
+        (
+            *np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist(),
+            round(float(m.r_radps[0] / m.speed_mps[0]), 4),
+        )
         for m in (run.motion for run in full.runs if not run.run.oscillates)
     }
     return len(steady) + sum(run.regressed for run in full.runs if run.run.oscillates)

@@ -24,8 +24,12 @@ _STEPS: tuple[tuple[RunType, str], ...] = (
     ("pure_yaw", "r"),
     ("yaw_with_drift", "vr"),
     ("drift_and_rudder", "vd"),
+    ("steady_turn", "vrd"),
 )
 """Type of run, and the motions whose terms it gives, in the order of the steps."""
+
+_ALONE = (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"))
+"""Types of run in one motion alone."""
 
 _LEAST_SPREAD = 0.5
 """Least standard error of a difference, relative to that of the regression: smaller differences do not matter."""
@@ -112,7 +116,7 @@ def scatter_within_tests(equations: CampaignEquations) -> Spread:
     """
     columns, names = [equations.design], list(equations.names)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
-    for kind, letter in (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"), ("drift_and_rudder", "v")):
+    for kind, letter in (*_ALONE, ("drift_and_rudder", "v"), ("steady_turn", "r")):
         name = equations.force + letter
         if name not in equations.names or not np.any(kinds == kind):
             continue
