@@ -1,4 +1,4 @@
-"""What ``tank2sim reduce`` costs next to plain numpy that does the same least squares, and its memory for 5 million rows.
+"""What ``tank2sim reduce`` costs next to plain numpy doing the same least squares; its memory for 5 million rows.
 
 Prints, for a campaign of 78 runs and 113 000 rows, the processor time of reading and reduction in a running
 interpreter and of whole processes, each the best of several that alternate, and the ratios; and the largest memory of
@@ -67,7 +67,7 @@ def frequency_of(time_s: np.ndarray, signal: np.ndarray) -> float:
     return float(found)
 
 
-def plain(path: Path) -> dict[str, float]:
+def plain(path: Path) -> dict[str, float]:  # noqa: PLR0915
     """Derivatives (prime) by numpy alone."""
     form = tomllib.loads(path.read_text())
     model, test = form["model"], form["test"]

@@ -99,6 +99,7 @@ def _reduce_to_mmg(
     form = result.fit.tests.form
     tables = [section.file for section in (form.averages, form.open_water) if section and section.file]
     files = result.card.files(output) if output else {}
+    tables += [run.file for run in form.runs if form.averages is None]
     inputs = [campaign, *(campaign.parent / table for table in tables)]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)

@@ -70,7 +70,9 @@ class CaptiveRun:
     X_N, Y_N, N_Nm : array, (rows,)
         Forces and moment in the hydrodynamic sense (see the module), about midships.
     propeller_radps : float or None
-        Revolutions.
+        Revolutions: the mean of the record, or those of the sheet.
+    thrust_N, rudder_normal_force_N : array, (rows,), or None
+        Of the propeller, positive forward; of the water on the rudder, positive to port.
     force_delay_s : float
         By how much the forces lag the motion.
     """
@@ -89,6 +91,8 @@ class CaptiveRun:
     y_m: Array | None = None
     psi_rad: Array | None = None
     propeller_radps: float | None = None
+    thrust_N: Array | None = None
+    rudder_normal_force_N: Array | None = None
     force_delay_s: float = 0.0
 
     @property
@@ -320,6 +324,10 @@ def read_captive_run(
     elif rate is None:
         turns = sheet.type in ("pure_yaw", "yaw_with_drift", "steady_turn")
         rate = _rate_of(table, psi, time) if turns else np.zeros(len(time))
+    revolutions = sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps
+    recorded = _optional(table, "propeller_radps")
+    if recorded is not None:
+        revolutions = float(np.mean(recorded))
     return CaptiveRun(
         name=sheet.file,
         type=sheet.type,
@@ -332,7 +340,9 @@ def read_captive_run(
         **{column: sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
         y_m=y,
         psi_rad=psi,
-        propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps,
+        propeller_radps=revolutions,
+        thrust_N=_optional(table, "thrust_N"),
+        rudder_normal_force_N=_optional(table, "rudder_normal_force_N"),
         force_delay_s=test.force_delay_s,
     )
 

@@ -30,8 +30,12 @@ RUN_QUANTITIES = {
     "X": "N",
     "Y": "N",
     "N": "Nm",
+    "thrust": "N",
+    "rudder_normal_force": "N",
+    "propeller": "radps",
 }
-"""Quantities of a captive run, and the SI unit of each as the names of columns end with it."""
+"""Quantities of a captive run, and the SI unit of each as the names of columns end with it; ``propeller`` is the
+revolutions."""
 
 _SEPARATORS = {"tab": "\t", "blanks": WHITESPACE}
 
@@ -231,9 +235,10 @@ def _quantity(name: str) -> tuple[str, float | None]:
     """Quantity and factor of ``Y_kN`` (1000), ``Y_N`` (1) or ``Y`` (None); an empty name if it is none."""
     if name in RUN_QUANTITIES:
         return name, None
-    stem, _, suffix = name.partition("_")
-    if stem not in RUN_QUANTITIES:
+    stem = next((known for known in RUN_QUANTITIES if name.startswith(f"{known}_")), "")
+    if not stem:
         return "", None
+    suffix = name.removeprefix(f"{stem}_")
     renamed, angle = to_si(name, 1.0)
     if renamed == _si_name(stem):
         return stem, angle

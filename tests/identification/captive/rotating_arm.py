@@ -51,7 +51,9 @@ def gauges(truth: dict[str, float], U, beta, r, delta) -> dict[str, np.ndarray]:
     }
 
 
-def write_arm(folder: Path, truth: dict[str, float], seed: int = 0, *, noise: float = 1.0, column: str = "prime") -> Path:
+def write_arm(
+    folder: Path, truth: dict[str, float], seed: int = 0, *, noise: float = 1.0, column: str = "prime"
+) -> Path:
     """``campaign.toml`` and its table; random errors of `noise` times :data:`NOISE`; yaw rate prime or in deg/s."""
     random = np.random.default_rng(seed)
     U, beta, r, delta = conditions().T

@@ -135,3 +135,31 @@ def hmri_campaign(data: Path, folder: Path) -> Path:
     columns = 'propeller_rps = "rps"\nthrust = "TX\'"\nrudder_normal_force = "RY\'"\n'
     (folder / "campaign.toml").write_text(f"{text.rstrip()}\n{columns}", encoding="utf-8")
     return folder / "campaign.toml"
+
+
+def as_runs(folder: Path, seed: int = 0, *, readings: int = 40) -> Path:
+    """The campaign of :func:`write_campaign` in `folder` with a file for each condition, of noisy readings about it."""
+    random = np.random.default_rng([seed, 9])
+    sheet = (folder / "campaign.toml").read_text().partition("[averages]")[0]
+    with (folder / "runs.csv").open() as file:
+        rows = [{key: float(cell) for key, cell in row.items()} for row in csv.DictReader(file)]
+    for place, row in enumerate(rows):
+        beta, delta = np.radians(row["beta"]), np.radians(row["delta"])
+        kind = "static_drift" if not delta else "drift_and_rudder" if beta else "static_rudder"
+        kind = "steady_turn" if row["r"] else kind
+        sheet += (
+            f'[[runs]]\nfile = "{place}.csv"\ntype = "{kind}"\ndrift_deg = {row["beta"]}\nrudder_deg = {row["delta"]}\n'
+        )
+        names = {"X": "X_N", "Y": "Y_N", "N": "N_Nm", "T": "thrust_N", "F": "rudder_normal_force_N"}
+        columns = {"t_s": 0.5 * np.arange(readings), "speed_mps": np.full(readings, row["U"])}
+        columns |= {
+            "r_radps": np.full(readings, row["r"] * row["U"] / L),
+            "propeller_rps": np.full(readings, row["rps"]),
+        }
+        for key, name in names.items():
+            noise = random.standard_normal(readings)
+            columns[name] = row[key] + 3 * NOISE[key] * (noise - noise.mean())
+        with (folder / f"{place}.csv").open("w", newline="") as file:
+            csv.writer(file).writerows([list(columns), *np.column_stack(list(columns.values())).tolist()])
+    (folder / "campaign.toml").write_text(sheet)
+    return folder / "campaign.toml"

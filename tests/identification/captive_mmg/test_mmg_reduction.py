@@ -13,7 +13,7 @@ from tank2sim.identification.captive_mmg.card_text import estimated_masses
 from tank2sim.identification.captive_mmg.regression import ORDINARY, fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tests.cli.command_line import refused, tank2sim
-from tests.identification.captive_mmg.tank import KVLCC2, conditions, hmri_campaign, write_campaign
+from tests.identification.captive_mmg.tank import KVLCC2, as_runs, conditions, forces, hmri_campaign, write_campaign
 
 SEEDS = 20
 
@@ -154,10 +154,15 @@ def test_a_coefficient_that_is_not_that_of_a_ship_is_named(tmp_path) -> None:
     assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).fit.at_limit == ()
 
 
-def test_turning_tests_are_not_silently_towed_straight(tmp_path) -> None:
-    """The polynomial reduction takes no steady turns: their rows are refused, with the way to reduce them."""
-    with pytest.raises(InputError, match="turns steadily"):
-        t2s.reduce(write_campaign(tmp_path, KVLCC2))
+def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(tmp_path) -> None:
+    found = t2s.reduce(write_campaign(tmp_path, KVLCC2)).reduction
+    loaded = sum(abs(n / 10.4 - 1) > 0.03 for n in conditions()[:, 4])
+    assert sum("rpm" in reason for reason in found.not_used.values()) == loaded > 0
+    assert {"steady_turn"} <= {run.run.type for run in found.runs}
+    U, step = np.full(2, 1.179), np.array([-0.05, 0.05])
+    read = forces(KVLCC2, U, 0 * step, step, 0 * step, np.full(2, 10.4))
+    slope = np.diff(read["N"] + 3270.0 * 0.25 * step * U**2 / 7.0)[0] / (0.1 * 0.5 * 1000.0 * 7.0**3 * 1.179**2)
+    assert found.derivatives["Nr"].value == pytest.approx(slope, rel=0.15)
 
 
 def test_the_command_writes_card_page_and_json(tmp_path) -> None:
@@ -180,3 +185,38 @@ def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> No
     assert found["kappa"].value == pytest.approx(0.5, abs=0.1)
     assert found["Yv"].value == pytest.approx(-0.315, rel=0.1)
     assert found["Nv"].value == pytest.approx(-0.137, rel=0.1)
+
+
+def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2, seed=4)
+    by_rows = fit_mmg(read_steady_tests(path))
+    by_runs = fit_mmg(read_steady_tests(as_runs(tmp_path)))
+    assert by_runs.names == by_rows.names
+    np.testing.assert_allclose(by_runs.values, by_rows.values, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(by_runs.errors, by_rows.errors, rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("old", "words"), [("thrust_N", "thrust_N"), ("rudder_normal_force_N", "normal"), ("propeller_rps", "revol")]
+)
+def test_a_run_without_what_the_method_needs_is_refused_by_its_name(tmp_path, old, words) -> None:
+    write_campaign(tmp_path, KVLCC2)
+    path = as_runs(tmp_path)
+    (tmp_path / "7.csv").write_text((tmp_path / "7.csv").read_text().replace(old, "temperature"))
+    with pytest.raises(InputError, match=words) as fault:
+        read_steady_tests(path)
+    assert fault.value.source == "7.csv"
+
+
+def test_oscillating_runs_are_left_out_and_named(tmp_path) -> None:
+    write_campaign(tmp_path, KVLCC2)
+    path = as_runs(tmp_path)
+    time = np.arange(0.0, 60.0, 0.2)
+    rate = 0.05 * np.cos(0.4 * time)
+    rows = np.column_stack([time, np.full_like(time, 1.179), rate, 0 * time - 9, -300 * rate, -4000 * rate])
+    np.savetxt(tmp_path / "yaw.csv", rows, delimiter=",", header="t_s,speed_mps,r_radps,X_N,Y_N,N_Nm", comments="")
+    steady = read_steady_tests(path)
+    path.write_text(path.read_text() + '[[runs]]\nfile = "yaw.csv"\ntype = "pure_yaw"\n')
+    both = read_steady_tests(path)
+    assert both.names == steady.names
+    assert any("yaw.csv" in remark for remark in both.remarks)

@@ -144,7 +144,7 @@ def campaign_equations(
     system = np.empty((ends[-1], len(names) + 3))
     roots: list[Array] = [np.empty(0)] * len(runs)
     for size in np.unique(sizes).tolist():  # runs of as many coefficients together
-        alike = np.flatnonzero(sizes == size)
+        alike: list[int] = np.flatnonzero(sizes == size).tolist()
         fits = [runs[place].fits[force] for place in alike]
         covariances = np.array([fit.covariance[:size, :size] for fit in fits]) / unit**2
         gauges = np.array([fit.coefficients[:size] for fit in fits]) / unit
@@ -153,7 +153,7 @@ def campaign_equations(
         right = np.stack([gauges + projected[..., -1], zeros, gauges], axis=-1)
         root = np.linalg.cholesky(covariances)
         weighted = np.linalg.solve(root, np.concatenate([projected[..., :-1], right], axis=-1))
-        for place, block, its_root in zip(alike.tolist(), weighted, root, strict=True):
+        for place, block, its_root in zip(alike, weighted, root, strict=True):
             system[ends[place] - size : ends[place]] = block
             roots[place] = its_root
     return CampaignEquations(
@@ -217,9 +217,7 @@ def _projected_terms(
     known = run.motion.projections
     *of_terms, body = keys
     histories = {
-        key: _history(campaign, run.motion, name)
-        for key, name in zip(of_terms, names, strict=True)
-        if key not in known
+        key: _history(campaign, run.motion, name) for key, name in zip(of_terms, names, strict=True) if key not in known
     }
     if (body, force) not in known:
         histories |= {(body, of): history for of, history in rigid_body_force(campaign, run.motion).items()}

@@ -111,7 +111,9 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
     place = result.equations.runs.index(run)
     root = result.spread.run_root(result.equations, place) * result.equations.unit
     inertia = rigid_body_force(reduction.campaign, run.motion)[force]
-    return (float(run.fits[force].coefficients[0]) + float(np.mean(inertia))) / unit, float(np.linalg.norm(root[0])) / unit
+    return (float(run.fits[force].coefficients[0]) + float(np.mean(inertia))) / unit, float(
+        np.linalg.norm(root[0])
+    ) / unit
 
 
 def _unit(reduction: Reduction, force: str, run: ReducedRun) -> float:

@@ -311,7 +311,8 @@ class _ZeroLikelihood:
         rest = columns - equations.zero[:, None] * (along / np.sqrt(sizes)[:, None])[equations.run_of_row]
         prior = equations.prior_rows
         prior = np.column_stack([prior, np.zeros(len(prior))])
-        return cls(along, np.linalg.qr(rest, mode="r"), prior, sizes, len(columns) - len(sizes))
+        across = np.asarray(np.linalg.qr(rest, mode="r"), dtype=np.float64)
+        return cls(along, across, prior, sizes, len(columns) - len(sizes))
 
     def __call__(self, noise: float, zeros: Array) -> tuple[float, float, Array]:
         """Value, slope by the noise, and slopes by the zero variance of each run, (runs,)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +11,11 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.harmonics import reduced_run
+from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.records.averages import Condition, read_averages, read_columns
 from tank2sim.records.campaign_form import CampaignFile
-from tank2sim.records.campaigns import read_campaign_file
+from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_file, together
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
@@ -30,7 +32,7 @@ class SteadyTests:
     form : CampaignFile
         What it states.
     names : tuple of str, (conditions,)
-        File and line of each condition.
+        File of each condition, and line in a table of averages.
     motion : array, (conditions, 5)
         u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
     readings : array, (conditions, 5)
@@ -61,17 +63,17 @@ class SteadyTests:
 
 
 def read_steady_tests(path: Path) -> SteadyTests:
-    """The conditions that ``[averages]`` of a campaign names, with thrust and normal force.
+    """The conditions of a campaign with thrust and normal force: rows of ``[averages]``, or means of steady runs.
 
     Raises
     ------
     InputError
-        The file or its table is at fault, or lacks what the MMG method needs: thrust, normal force, revolutions, the
+        A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force, revolutions, the
         open-water curve, and the sizes of model, propeller and rudder.
     """
     form, factors = read_campaign_file(path)
     _refuse_missing(form, path)
-    conditions, remarks = read_averages(form, factors, path)
+    conditions, remarks = read_averages(form, factors, path) if form.averages else _averaged_runs(form, path)
     return SteadyTests(
         path=path,
         form=form,
@@ -85,20 +87,24 @@ def read_steady_tests(path: Path) -> SteadyTests:
 
 def _refuse_missing(form: CampaignFile, path: Path) -> None:
     """Raise InputError for the first thing that the MMG method needs and the campaign does not state."""
-    if form.averages is None:
-        remedy = "give one row a condition in a table, with [averages.columns]"
+    needed: dict[str, tuple[object, str]] = {}
+    if form.averages is not None:
+        columns = form.averages.columns
+        needed |= {
+            "averages.columns.thrust": (columns.thrust, "the wake follows from the thrust: name its column"),
+            "averages.columns.rudder_normal_force": (
+                columns.rudder_normal_force,
+                "it separates the rudder from the hull: name its column",
+            ),
+            "test.propeller_radps": (
+                columns.propeller_radps or form.test.propeller_radps,
+                "give propeller_rps, or a column propeller_rps",
+            ),
+        }
+    elif not form.runs:
+        remedy = "give one row a condition in a table, with [averages.columns], or a file a condition in [[runs]]"
         raise InputError(path, "averages", "is missing: MMG takes averages of steady tests", remedy)
-    columns = form.averages.columns
-    needed: Mapping[str, tuple[object, str]] = {
-        "averages.columns.thrust": (columns.thrust, "the wake follows from the thrust: name its column"),
-        "averages.columns.rudder_normal_force": (
-            columns.rudder_normal_force,
-            "it separates the rudder from the hull: name its column",
-        ),
-        "test.propeller_radps": (
-            columns.propeller_radps or form.test.propeller_radps,
-            "give propeller_rps, or a column propeller_rps",
-        ),
+    needed |= {
         "open_water": (form.open_water, "give J and K_T of the propeller, or a file of them"),
         "rudder": (form.rudder, "give height_m, and aspect_ratio or f_alpha"),
         "model.beam_m": (form.model.beam_m, "the added masses are estimated from it: add it"),
@@ -113,6 +119,62 @@ def _refuse_missing(form: CampaignFile, path: Path) -> None:
     if (form.rudder.aspect_ratio is None) == (form.rudder.f_alpha is None):
         given = "both are given" if form.rudder.f_alpha else "neither is given"
         raise InputError(path, "rudder.f_alpha", f"and aspect_ratio: {given}", "give one of the two")
+
+
+def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[str]]:
+    """The means of the steady runs of a campaign; runs that oscillate are left out, and named.
+
+    Raises
+    ------
+    InputError
+        Runs have faults, or lack thrust, normal force or revolutions; all such runs are reported.
+    """
+    campaign = read_campaign(path)
+    steady = [run for run in campaign.runs if not run.oscillates]
+    faults = []
+    for run in steady:
+        found = [*_lacking(run), *record_faults(campaign, run)]
+        faults += (found or [*reduced_faults(reduced_run(run))])[:1]
+    if faults:
+        raise together(faults)
+    oscillating = [run.name for run in campaign.runs if run.oscillates]
+    remarks = []
+    if oscillating:
+        remarks = [
+            f"Left out, because MMG takes steady tests: {len(oscillating)} oscillating runs, {oscillating[0]} first."
+        ]
+    return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
+
+
+def _lacking(run: CaptiveRun) -> Iterator[InputError]:
+    """What a steady run must have for the MMG method and does not."""
+    remedy = "record it, or name its column in [columns]"
+    needed = {"thrust_N": run.thrust_N, "rudder_normal_force_N": run.rudder_normal_force_N}
+    for column, values in needed.items():
+        if values is None:
+            yield InputError(run.name, "header", f"there is no column {column}, which the MMG method needs", remedy)
+    if not run.propeller_radps:
+        remedy = "give a column propeller_rps, or propeller_rps of the run or [test]"
+        yield InputError(run.name, "header", "there are no revolutions, which the MMG method needs", remedy)
+
+
+def _condition(run: CaptiveRun, form: CampaignFile) -> Condition:
+    """Means of a steady run; forces in the sense of the file again, as those of a table."""
+    assert run.thrust_N is not None and run.rudder_normal_force_N is not None
+    speed, sense = float(np.mean(run.speed_mps)), form.test.sense
+    return Condition(
+        name=run.name,
+        drift_rad=float(-np.arcsin(np.clip(np.mean(run.v_mps) / speed, -1.0, 1.0))),
+        rudder_rad=float(np.mean(run.delta_rad)),
+        speed_mps=speed,
+        X_N=sense * float(np.mean(run.X_N)),
+        Y_N=sense * float(np.mean(run.Y_N)),
+        N_Nm=sense * float(np.mean(run.N_Nm)),
+        propeller_radps=run.propeller_radps,
+        yaw_rate_radps=float(np.mean(run.r_radps)),
+        thrust_N=float(np.mean(run.thrust_N)),
+        rudder_normal_force_N=float(np.mean(run.rudder_normal_force_N)),
+    )
 
 
 def _motion(condition: Condition) -> tuple[float, ...]:
