@@ -40,6 +40,10 @@ class MmgCoefficient:
     ----------
     value, standard_error : float
         Of the hull by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them.
+    type_a : float
+        Standard error by the scatter of the tests alone.
+    type_b : mapping
+        Key of ``[uncertainty]`` to the standard error by it.
     origin : str
         ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open``: that of ordinary ships.
     """
@@ -47,6 +51,8 @@ class MmgCoefficient:
     value: float
     standard_error: float
     origin: str
+    type_a: float
+    type_b: Mapping[str, float]
 
 
 class MmgReductionResult(PagedResult):
@@ -83,15 +89,17 @@ class MmgReductionResult(PagedResult):
     def coefficients(self) -> Mapping[str, MmgCoefficient]:
         """Coefficients by the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot."""
         fit, found = self.fit, {}
-        for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
+        for place, name in enumerate(fit.names):
             if name == "rudder_offset":
                 continue
             key, sign = _card_key(name)
             origin = "estimated" if name in MASS_KEYS else "open" if name in fit.open else "measured"
-            found[key] = MmgCoefficient(sign * float(value), float(error), origin)
+            value, error, random = sign * fit.values[place], fit.errors[place], fit.random[place]
+            common = {source: float(errors[place]) for source, errors in fit.common.items()}
+            found[key] = MmgCoefficient(float(value), float(error), origin, float(random), common)
         for name, (mean, deviation) in ORDINARY.items():
             if name not in found:
-                found[name] = MmgCoefficient(mean, deviation, "open")
+                found[name] = MmgCoefficient(mean, deviation, "open", deviation, {})
         return found
 
     @cached_property
@@ -125,7 +133,10 @@ class MmgReductionResult(PagedResult):
         """Coefficients by name: value, standard error, origin; hull in prime II."""
         import pandas as pd
 
-        rows = {name: asdict(coefficient) for name, coefficient in self.coefficients.items()}
+        rows = {
+            name: {key: value for key, value in asdict(coefficient).items() if not key.startswith("type")}
+            for name, coefficient in self.coefficients.items()
+        }
         return pd.DataFrame.from_dict(rows, orient="index")
 
     def content(self) -> Mapping[str, object]:
@@ -204,8 +215,11 @@ class MmgReductionResult(PagedResult):
                 f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of "
                 "the propeller or the zero of the gear; the card does not have it."
             )
-        if fit.tests.form.uncertainty.model_fields_set:
-            found.append("[uncertainty] of the campaign is not in these standard errors, which are of the scatter.")
+        if not fit.common:
+            found.append(
+                "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to "
+                "all conditions, are in them where [uncertainty] of the campaign states them."
+            )
         found.append("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated.")
         return tuple(found)
 

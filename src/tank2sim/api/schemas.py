@@ -322,6 +322,8 @@ class MmgCoefficientKeys(_Part):
     value: float
     standard_error: float
     origin: str
+    type_a: float
+    type_b: dict[str, float]
 
 
 class ReduceMmgKeys(_Keys):

@@ -24,6 +24,16 @@ def of_the_estimate(folder: Path) -> dict[str, float]:
     return KVLCC2 | {"mx": -masses["Xudot"][0], "my": -masses["Yvdot"][0]}
 
 
+def another_ship(folder: Path, seed: int) -> dict[str, float]:
+    """A ship like the KVLCC2, its added masses off their estimate by chance."""
+    random = np.random.default_rng(seed)
+    truth = {name: value * random.uniform(0.85, 1.15) for name, value in KVLCC2.items()}
+    masses = estimated_masses(read_steady_tests(write_campaign(folder, truth)))
+    for name, key in (("Xudot", "mx"), ("Yvdot", "my")):
+        truth[key] = -masses[name][0] + masses[name][1] * random.standard_normal()
+    return truth
+
+
 def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
     truth = of_the_estimate(tmp_path)
     found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5)).coefficients
@@ -36,11 +46,7 @@ def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
 def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
     inside = []
     for seed in range(SEEDS):
-        random = np.random.default_rng(7000 + seed)
-        truth = {name: value * random.uniform(0.85, 1.15) for name, value in KVLCC2.items()}
-        for name, (value, error) in estimated_masses(read_steady_tests(write_campaign(tmp_path, truth))).items():
-            key = {"Xudot": "mx", "Yvdot": "my"}.get(name, "")
-            truth |= {key: -value + error * random.standard_normal()} if key else {}
+        truth = another_ship(tmp_path, seed=7000 + seed)
         found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed)).coefficients
         inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
     assert 0.90 <= np.mean(inside) <= 0.98
@@ -220,3 +226,66 @@ def test_oscillating_runs_are_left_out_and_named(tmp_path) -> None:
     both = read_steady_tests(path)
     assert both.names == steady.names
     assert any("yaw.csv" in remark for remark in both.remarks)
+
+
+STATED = """[uncertainty]
+calibration_relative = 0.01
+alignment_deg = 0.4
+rudder_deg = 0.5
+speed_relative = 0.01
+blockage_relative = 0.005
+mass_relative = 0.01
+"""
+
+
+def with_common_errors(path: Path, seed: int) -> Path:
+    """The campaign with errors common to all its rows, of the sizes that it states; the sign of each by chance."""
+    random = np.random.default_rng([seed, 5])
+    rows = (path.parent / "runs.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    U, beta, r = table[:, 0].copy(), np.radians(table[:, 1]), table[:, 2].copy()
+    u, v, rate = U * np.cos(beta), -U * np.sin(beta), r * U / 7.0
+    mass = 3270.0 * 0.01 * random.standard_normal()
+    table[:, 5] += mass * (v * rate + 0.25 * rate**2)
+    table[:, 6] -= mass * u * rate
+    table[:, 7] -= mass * 0.25 * u * rate
+    table[:, 5:] *= 1 + 0.01 * random.standard_normal(5)
+    table[:, 1] += 0.4 * random.standard_normal()
+    table[:, 3] += 0.5 * random.standard_normal()
+    table[:, 0] *= 1 + np.hypot(0.01, 0.005) * random.standard_normal()
+    table[:, 2] = rate * 7.0 / table[:, 0]
+    lines = [rows[0], *(",".join(map(repr, row)) for row in table.tolist())]
+    (path.parent / "runs.csv").write_text("\n".join(lines))
+    path.write_text(STATED + path.read_text())
+    return path
+
+
+@pytest.mark.slow
+def test_errors_common_to_all_conditions_are_covered_where_they_are_stated(tmp_path) -> None:
+    inside, without = [], []
+    for seed in range(SEEDS):
+        truth = another_ship(tmp_path, 8000 + seed)
+        found = t2s.reduce_to_mmg(with_common_errors(write_campaign(tmp_path, truth, seed), seed)).coefficients
+        measured = {name: value for name, value in truth.items() if found[name].origin == "measured"}
+        apart = {name: abs(found[name].value - value) for name, value in measured.items()}
+        inside += [apart[name] < 1.96 * found[name].standard_error for name in measured]
+        without += [apart[name] < 1.96 * found[name].type_a for name in measured]
+    assert 0.90 <= np.mean(inside) <= 0.98
+    assert np.mean(without) < 0.85
+
+
+def test_parts_of_the_uncertainty_add_up_and_each_has_its_own_effect(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    plain = t2s.reduce_to_mmg(path)
+    path.write_text(STATED + path.read_text())
+    result = t2s.reduce_to_mmg(path)
+    for name, entry in result.coefficients.items():
+        assert entry.standard_error == pytest.approx(np.hypot(entry.type_a, np.linalg.norm([*entry.type_b.values()])))
+        assert entry.type_a == pytest.approx(plain.coefficients[name].standard_error, rel=1e-6)
+    # K_T = T/(rho n^2 D^4) of all points: 1 % of speed is 1 % of 1 - w_P0, 1 % of thrust moves only that.
+    w = result.coefficients["w_P0"]
+    assert w.type_b["speed_relative"] == pytest.approx(0.01 * (1 - w.value), rel=0.15)
+    assert result.coefficients["k_0"].type_b["mass_relative"] < 1e-3 * result.coefficients["k_0"].type_a
+    assert result.coefficients["Yr"].type_b["mass_relative"] > 1e3 * result.coefficients["t_P"].type_b["mass_relative"]
+    assert not any("scatter alone" in notice for notice in result.notices)
+    assert any("scatter alone" in notice for notice in plain.notices)

@@ -9,13 +9,14 @@ The error sigma_c of a channel is estimated from what is left, sigma_c^2 = RSS_c
 of the projection (variance components: Förstner 1979). m_k and s_k are those of ordinary ships with one screw, wide
 enough that only what the tests leave open takes its value from there; such coefficients are marked. m_x' and m_y',
 which steady tests do not show, have those of a published estimate: its error is in those of Y_r' and X_vr'. The
-covariance is the inverse of the normal matrix.
+covariance is the inverse of the normal matrix, and the outer products of what errors common to all conditions, as
+``[uncertainty]`` states them, move the coefficients by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -32,6 +33,7 @@ from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses, mmg_card_text
+from tank2sim.identification.captive_mmg.common_errors import erring_tests
 from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, SteadyTests
 
 ORDINARY: dict[str, tuple[float, float]] = {
@@ -96,6 +98,11 @@ class MmgFit:
         Coefficients; those of the hull in prime II; ``rudder_offset`` in rad.
     values : array, (k,)
     covariance : array, (k, k)
+        Of both types.
+    random : array, (k,)
+        Standard errors by the scatter alone (Type A).
+    common : mapping
+        Key of ``[uncertainty]`` to the standard errors by it (Type B), (k,).
     sigmas : array, (6,)
         Standard deviation of what is left of :data:`CHANNELS` (N, N m) and of K_T.
     residuals : array, (conditions, 5)
@@ -110,6 +117,8 @@ class MmgFit:
     names: tuple[str, ...]
     values: Array
     covariance: Array
+    random: Array
+    common: Mapping[str, Array]
     sigmas: Array
     residuals: Array
     explained: Array
@@ -123,7 +132,7 @@ class MmgFit:
     @property
     def open(self) -> tuple[str, ...]:
         """Coefficients that the tests leave open: they are those of ordinary ships."""
-        pairs = zip(self.names, self.errors, strict=True)
+        pairs = zip(self.names, self.random, strict=True)
         return tuple(name for name, error in pairs if name in ORDINARY and error > OPEN * ORDINARY[name][1])
 
     @property
@@ -136,8 +145,8 @@ class MmgFit:
         )
 
     def in_errors(self, name: str) -> float:
-        """Size of a coefficient over its standard error."""
-        return abs(self.value(name)) / float(self.errors[self.names.index(name)])
+        """Size of a coefficient over its standard error by the scatter."""
+        return abs(self.value(name)) / float(self.random[self.names.index(name)])
 
     def value(self, name: str) -> float:
         """A coefficient; 0 if it was not fitted."""
@@ -348,13 +357,22 @@ class _Regression:
             if np.all(np.abs(sigmas / before - 1) < _SETTLED):
                 break
         inverse = np.linalg.inv(triangle)
+        covariance = inverse @ inverse.T
+        random, common = np.sqrt(np.diag(covariance)), dict[str, Array]()
+        for source, erring in erring_tests(tests):
+            change = (replace(self, tests=erring).misfit(theta) - self.misfit(theta)) * weights
+            moved = inverse @ (orthogonal[: len(channel)].T @ change)
+            covariance = covariance + np.outer(moved, moved)
+            common[source] = np.hypot(common.get(source, 0.0), moved)
         count = len(tests.names)
         residuals = self.misfit(theta)[: count * len(CHANNELS)].reshape(len(CHANNELS), count).T
         return MmgFit(
             tests=tests,
             names=self.names,
             values=theta,
-            covariance=inverse @ inverse.T,
+            covariance=covariance,
+            random=random,
+            common=common,
             sigmas=sigmas,
             residuals=residuals,
             explained=1 - residuals.var(axis=0) / tests.readings.var(axis=0),
