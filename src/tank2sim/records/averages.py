@@ -42,6 +42,7 @@ class Condition:
     yaw_rate_radps: float = 0.0
     thrust_N: float | None = None
     rudder_normal_force_N: float | None = None
+    torque_Nm: float | None = None
 
 
 def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
@@ -141,7 +142,7 @@ def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
 
 def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:
     """Refuse a unit under a heading that is not the one in which the column is read."""
-    forces = {"X": "N", "Y": "N", "N": "Nm", "thrust": "N", "rudder_normal_force": "N"}
+    forces = {"X": "N", "Y": "N", "N": "Nm", "thrust": "N", "rudder_normal_force": "N", "torque": "Nm"}
     suffix = forces.get(key, key.rpartition("_")[2])
     if unit in ("", "-", "1") or (key == "propeller_radps"):
         return
@@ -188,6 +189,7 @@ def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignF
         yaw_rate_radps=yaw_rate,
         thrust_N=at["thrust"] * unit if "thrust" in at else None,
         rudder_normal_force_N=at["rudder_normal_force"] * unit * to_port if "rudder_normal_force" in at else None,
+        torque_Nm=at["torque"] * unit * arm if "torque" in at else None,
     )
 
 

@@ -242,6 +242,8 @@ class AverageColumns(CardSection):
         Yaw rate of rotating-arm and circular-motion tests, positive to starboard; prime: r L/U.
     thrust, rudder_normal_force
         Of the propeller, positive forward, and of the water on the rudder; in the scaling of the forces.
+    torque
+        That the propeller takes, positive ahead; in the scaling of the moments.
     """
 
     drift_rad: str | None = None
@@ -252,6 +254,7 @@ class AverageColumns(CardSection):
     yaw_rate_prime: str | None = None
     thrust: str | None = None
     rudder_normal_force: str | None = None
+    torque: str | None = None
     X: str
     Y: str
     N: str
@@ -272,13 +275,17 @@ class OpenWaterSection(CardSection):
 
     Parameters
     ----------
-    J, K_T
-        Points; or, with ``file``, the headings of their columns.
+    J, K_T, K_Q
+        Points; or, with ``file``, the headings of their columns. K_Q is needed where torque is measured.
+    K_Q_factor
+        What K_Q is multiplied by: 0.1 where 10 K_Q is given.
     """
 
     file: Text | None = None
     J: list[float] | Text = "J"
     K_T: list[float] | Text = "K_T"
+    K_Q: list[float] | Text | None = None
+    K_Q_factor: Positive = 1.0
 
 
 class PropellerTest(CardSection):

@@ -73,6 +73,8 @@ class CaptiveRun:
         Revolutions: the mean of the record, or those of the sheet.
     thrust_N, rudder_normal_force_N : array, (rows,), or None
         Of the propeller, positive forward; of the water on the rudder, positive to port.
+    torque_Nm : array, (rows,), or None
+        That the propeller takes.
     force_delay_s : float
         By how much the forces lag the motion.
     """
@@ -93,6 +95,7 @@ class CaptiveRun:
     propeller_radps: float | None = None
     thrust_N: Array | None = None
     rudder_normal_force_N: Array | None = None
+    torque_Nm: Array | None = None
     force_delay_s: float = 0.0
 
     @property
@@ -343,6 +346,7 @@ def read_captive_run(
         propeller_radps=revolutions,
         thrust_N=_optional(table, "thrust_N"),
         rudder_normal_force_N=_optional(table, "rudder_normal_force_N"),
+        torque_Nm=_optional(table, "torque_Nm"),
         force_delay_s=test.force_delay_s,
     )
 

@@ -32,6 +32,7 @@ RUN_QUANTITIES = {
     "N": "Nm",
     "thrust": "N",
     "rudder_normal_force": "N",
+    "torque": "Nm",
     "propeller": "radps",
 }
 """Quantities of a captive run, and the SI unit of each as the names of columns end with it; ``propeller`` is the

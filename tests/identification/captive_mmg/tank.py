@@ -9,7 +9,8 @@ import numpy as np
 
 RHO, L, B, D, MASS, X_G = 1000.0, 7.0, 1.27, 0.46, 3270.0, 0.25
 D_P, A_R, H_R, F_ALPHA, X_P, X_R = 0.216, 0.0539, 0.345, 2.747, -0.48, -0.5
-NOISE = {"X": 0.4, "Y": 1.0, "N": 2.5, "T": 0.25, "F": 0.4, "K": 0.002}
+NOISE = {"X": 0.4, "Y": 1.0, "N": 2.5, "T": 0.25, "F": 0.4, "Q": 0.01, "K": 0.002, "K_Q": 0.0002}
+TORQUE = {"q_0": 0.0318, "q_1": -0.0221, "q_2": -0.0138, "eta_R": 1.012}
 KVLCC2 = {
     "R0": 0.022, "Xvv": -0.040, "Xvr": 0.002, "Xrr": 0.011, "Xvvvv": 0.771,
     "Yv": -0.315, "Yr": 0.083, "Yvvv": -1.607, "Yvvr": 0.379, "Yvrr": -0.391, "Yrrr": 0.008,
@@ -55,6 +56,7 @@ def forces(p: dict[str, float], U, beta, r, delta, n) -> dict[str, np.ndarray]:
         + p[f"{f}vrr"] * v * r**2 + p[f"{f}rrr"] * r**3
         for f in "YN"
     )  # fmt: skip
+    q = {**TORQUE, **p}
     m, x_G = MASS / (0.5 * RHO * L**2 * D), X_G / L
     return {
         "X": unit * (hull_X + (m + p["my"]) * v * r + x_G * m * r**2)
@@ -63,11 +65,19 @@ def forces(p: dict[str, float], U, beta, r, delta, n) -> dict[str, np.ndarray]:
         "N": L * (unit * (hull_N - x_G * m * u * r) - (X_R + p["a_H"] * p["x_H"]) * F * np.cos(delta)),
         "T": T,
         "F": F,
+        "Q": RHO * n**2 * D_P**5 * (q["q_0"] + q["q_1"] * J + q["q_2"] * J**2) / q["eta_R"],
     }  # fmt: skip
 
 
 def write_campaign(
-    folder: Path, p: dict[str, float], seed: int = 0, *, noise: float = 1.0, rows=None, rudder_zero: float = 0.0
+    folder: Path,
+    p: dict[str, float],
+    seed: int = 0,
+    *,
+    noise: float = 1.0,
+    rows=None,
+    rudder_zero: float = 0.0,
+    torque: bool = False,
 ) -> Path:
     """``campaign.toml`` and its tables in a folder; random errors of standard deviation `noise` times :data:`NOISE`."""
     random, at = np.random.default_rng(seed), conditions() if rows is None else rows
@@ -82,6 +92,11 @@ def write_campaign(
         table.writerows(np.column_stack([U, np.degrees(beta), r, np.degrees(delta), n, *measured]).tolist())
     with (folder / "water.csv").open("w", newline="") as file:
         csv.writer(file).writerows([("J", "K_T"), *zip(J.tolist(), K_T.tolist(), strict=True)])
+    if torque:
+        q, random_of_torque = {**TORQUE, **p}, np.random.default_rng([seed, 7])
+        of_K_Q = noise * NOISE["K_Q"] * random_of_torque.standard_normal(len(J))
+        K_Q = q["q_0"] + q["q_1"] * J + q["q_2"] * J**2 + of_K_Q
+        add_torque(folder, read["Q"] + noise * NOISE["Q"] * random_of_torque.standard_normal(len(U)), K_Q)
     path = folder / "campaign.toml"
     path.write_text(f"""
 [model]
@@ -98,6 +113,8 @@ speed_mps = 1.179
 force_convention = "on_gauge"
 [open_water]
 file = "water.csv"
+{'K_Q = "10K_Q"' if torque else ""}
+{"K_Q_factor = 0.1" if torque else ""}
 [propeller]
 x_P = {X_P}
 [rudder]
@@ -118,8 +135,17 @@ Y = "Y"
 N = "N"
 thrust = "T"
 rudder_normal_force = "F"
+{'torque = "Q"' if torque else ""}
 """)
     return path
+
+
+def add_torque(folder: Path, torque: np.ndarray, K_Q: np.ndarray) -> None:
+    """A column of torque in the table, and one of 10 K_Q in that of the open-water test."""
+    for name, heading, values in (("runs.csv", "Q", torque), ("water.csv", "10K_Q", 10 * K_Q)):
+        rows = (folder / name).read_text().splitlines()
+        cells = [heading, *map(repr, values.tolist())]
+        (folder / name).write_text("\n".join(f"{row},{cell}" for row, cell in zip(rows, cells, strict=True)) + "\n")
 
 
 def hmri_campaign(data: Path, folder: Path) -> Path:

@@ -13,7 +13,15 @@ from tank2sim.identification.captive_mmg.card_text import estimated_masses
 from tank2sim.identification.captive_mmg.regression import ORDINARY, fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tests.cli.command_line import refused, tank2sim
-from tests.identification.captive_mmg.tank import KVLCC2, as_runs, conditions, forces, hmri_campaign, write_campaign
+from tests.identification.captive_mmg.tank import (
+    KVLCC2,
+    TORQUE,
+    as_runs,
+    conditions,
+    forces,
+    hmri_campaign,
+    write_campaign,
+)
 
 SEEDS = 20
 
@@ -289,3 +297,54 @@ def test_parts_of_the_uncertainty_add_up_and_each_has_its_own_effect(tmp_path) -
     assert result.coefficients["Yr"].type_b["mass_relative"] > 1e3 * result.coefficients["t_P"].type_b["mass_relative"]
     assert not any("scatter alone" in notice for notice in result.notices)
     assert any("scatter alone" in notice for notice in plain.notices)
+
+
+def test_torque_gives_the_relative_rotative_efficiency_and_leaves_the_ship_as_it_is(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5, torque=True)).coefficients
+    for name, value in (truth | TORQUE).items():
+        assert found[name].value == pytest.approx(value, rel=2e-3, abs=2e-4), name
+    plain = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, seed=3))
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, seed=3, torque=True))
+    assert result.coefficients["w_P0"].standard_error < plain.coefficients["w_P0"].standard_error
+    assert set(result.card.covariance.names) == set(plain.card.covariance.names)
+    assert result.content()["readings"]["Q"]["unit"] == "N.m"
+    for name in ("Yv", "Nr", "t_P", "eps"):
+        apart = abs(result.coefficients[name].value - plain.coefficients[name].value)
+        assert apart < plain.coefficients[name].standard_error, name
+
+
+@pytest.mark.slow
+def test_standard_errors_with_torque_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
+    inside = []
+    for seed in range(SEEDS):
+        random = np.random.default_rng(9500 + seed)
+        truth = another_ship(tmp_path, 9000 + seed)
+        truth |= {name: value * random.uniform(0.97, 1.03) for name, value in TORQUE.items()}
+        found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed, torque=True)).coefficients
+        inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("K_Q_factor = 0.1", "", "open_water.K_Q: is .*K_Q_factor"),
+        ('K_Q = "10K_Q"', "", "open_water.K_Q: is missing"),
+        ('torque = "Q"', 'torque = "T"', "Q: the MMG method leaves"),
+    ],
+)
+def test_torque_in_another_unit_sign_or_without_its_curve_is_refused(tmp_path, old, new, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2, torque=True)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError, match=words):
+        t2s.reduce_to_mmg(path)
+
+
+def test_a_torque_of_the_other_sign_is_refused(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2, torque=True)
+    rows = (tmp_path / "runs.csv").read_text().splitlines()
+    turned = [f"{row.rpartition(',')[0]},{-float(row.rpartition(',')[2])!r}" for row in rows[1:]]
+    (tmp_path / "runs.csv").write_text("\n".join([rows[0], *turned]))
+    with pytest.raises(InputError, match=r"open_water.K_Q: is .* off its curve"):
+        t2s.reduce_to_mmg(path)

@@ -13,7 +13,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.rigid_body import inertial_forces
-from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, SteadyTests
+from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
 
 
 def erring_tests(tests: SteadyTests) -> Iterator[tuple[str, SteadyTests]]:
@@ -24,8 +24,8 @@ def erring_tests(tests: SteadyTests) -> Iterator[tuple[str, SteadyTests]]:
     """
     stated = tests.form.uncertainty
     if size := stated.calibration_relative:
-        for place in range(len(CHANNELS)):
-            gains = np.ones(len(CHANNELS))
+        for place in range(len(tests.channels)):
+            gains = np.ones(len(tests.channels))
             gains[place] += size
             yield "calibration_relative", replace(tests, readings=tests.readings * gains)
     if size := stated.alignment_rad:

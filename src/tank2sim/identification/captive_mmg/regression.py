@@ -1,7 +1,9 @@
 """One weighted regression of all steady captive tests on the MMG method, by the equations of the simulated ship.
 
 The readings of each condition (u, v, r, delta, n) are X, Y, N, T and F_N of :mod:`tank2sim.dynamics.mmg`; the points of
-the open-water curve are K_T = k_0 + k_1 J + k_2 J^2. All coefficients theta are found together:
+the open-water curve are K_T = k_0 + k_1 J + k_2 J^2. Torque, where it was measured, is Q = rho n^2 D^5 K_Q/eta_R with
+K_Q = q_0 + q_1 J + q_2 J^2 of the open-water test at the J of the thrust, eta_R the relative rotative efficiency (ITTC
+7.5-02-03-01.4). All coefficients theta are found together:
 
     minimise  sum_c sum_i (y_ci - f_c(theta))^2/sigma_c^2 + sum_k (theta_k - m_k)^2/s_k^2
 
@@ -34,7 +36,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses, mmg_card_text
 from tank2sim.identification.captive_mmg.common_errors import erring_tests
-from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, SteadyTests
+from tank2sim.identification.captive_mmg.steady_tests import TORQUE, SteadyTests
 
 ORDINARY: dict[str, tuple[float, float]] = {
     "t_P": (0.2, 0.1),
@@ -61,9 +63,12 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "C_2_minus": (0.0, 5.0),
     "eps": (0.2, 3.0),
     "kappa": (0.0, 3.0),
+    "eta_R": (0.5, 1.5),
 }
 """Limits in which a coefficient is looked for. Project choice: beyond them it is not that of a ship; the regression
 would otherwise fit a normal force of the other sign by eps < 0."""
+OF_TORQUE = ("q_0", "q_1", "q_2", "eta_R")
+"""Coefficients of K_Q in open water, and the relative rotative efficiency; a card does not have them."""
 OPEN = 0.7
 """Standard error over that of ordinary ships from which a coefficient is called open. Project choice: the tests then
 halve the variance at best."""
@@ -103,11 +108,11 @@ class MmgFit:
         Standard errors by the scatter alone (Type A).
     common : mapping
         Key of ``[uncertainty]`` to the standard errors by it (Type B), (k,).
-    sigmas : array, (6,)
-        Standard deviation of what is left of :data:`CHANNELS` (N, N m) and of K_T.
-    residuals : array, (conditions, 5)
+    sigmas : array, (channels + 1 or 2,)
+        Standard deviation of what is left of the channels (N, N m), of K_T, and with torque of K_Q.
+    residuals : array, (conditions, channels)
         Measured less computed, N and N m.
-    explained : array, (5,)
+    explained : array, (channels,)
         Share of the variance of each channel that is explained.
     not_excited : tuple of str
         Coefficients of the hull that no condition shows; zero.
@@ -186,7 +191,7 @@ def _refuse_poor(tests: SteadyTests) -> None:
     for column, what in ((3, "rudder angle"), (1, "drift angle")):
         if len(np.unique(np.round(tests.motion[:, column], 6))) < 3:
             raise InputError(tests.path, "averages", f"has less than three values of the {what}", remedy)
-    for channel, readings in zip(CHANNELS, tests.readings.T, strict=True):
+    for channel, readings in zip(tests.channels, tests.readings.T, strict=True):
         if not np.ptp(readings) > 0:
             raise InputError(tests.path, "averages", f"{channel} is the same in all conditions", "the gauge is dead")
 
@@ -209,7 +214,8 @@ def _fitted_names(tests: SteadyTests) -> tuple[list[str], tuple[str, ...]]:
             hull.append(name)
     turning = ("l_R", "Xudot", "Yvdot")
     others = [name for name in (*ORDINARY, "Xudot", "Yvdot") if name not in turning or np.any(r)]
-    return ["k_0", "k_1", "k_2", *others, *hull, "rudder_offset"], tuple(missing)
+    torque = OF_TORQUE if TORQUE in tests.channels else ()
+    return ["k_0", "k_1", "k_2", *others, *hull, *torque, "rudder_offset"], tuple(missing)
 
 
 def start_card(tests: SteadyTests) -> MmgCard:
@@ -225,12 +231,14 @@ def start_card(tests: SteadyTests) -> MmgCard:
 
 def _open_water(tests: SteadyTests) -> Array:
     """k_0, k_1, k_2 of the open-water points alone, with which the regression starts."""
-    J, K_T = tests.open_water.T.tolist()
+    J, K_T = tests.open_water.T[:2].tolist()
     return open_water_fit(J, K_T, str(tests.path)).coefficients
 
 
 def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Function:
-    """The readings and their slopes: (motion (5,), theta (k,)) to (readings (5,), slopes (5, k)).
+    """The readings and their slopes: (motion (5,), theta (k,)) to (readings (c,), slopes (c, k)).
+
+    The torque is among the c channels if its coefficients are among the names.
 
     Parameters
     ----------
@@ -253,8 +261,16 @@ def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Fu
     )
     stated = zip(model.parameter_names, model.parameter_values(), strict=True)
     parameters = ca.vertcat(*(given.get(name, value) for name, value in stated))
-    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in _QUANTITIES)))
-    forces = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
+    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in (*_QUANTITIES, "propeller.inflow"))))
+    found = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
+    forces = found[:-1]
+    if "eta_R" in names:
+        q_0, q_1, q_2, eta_R = (theta[names.index(name)] for name in OF_TORQUE)
+        of_ship = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+        density, diameter = of_ship["ship.water_density"], of_ship["ship.propeller_diameter"]
+        n, u_P = motion[4] / (2 * ca.pi), found[-1]
+        K_Q = q_0 * (n * diameter) ** 2 + q_1 * n * diameter * u_P + q_2 * u_P**2  # times (n D)^2
+        forces = ca.vertcat(forces, density * diameter**3 * K_Q / eta_R)
     return ca.Function("readings", [motion, theta], [forces, ca.jacobian(forces, theta)])
 
 
@@ -297,9 +313,18 @@ class _Regression:
 
     @cached_property
     def channel(self) -> NDArray[np.int_]:
-        """Channel of each equation: five of the conditions, then the open-water points."""
-        count, points = len(self.tests.names), len(self.tests.open_water)
-        return np.concatenate([np.repeat(np.arange(len(CHANNELS)), count), np.full(points, len(CHANNELS))])
+        """Channel of each equation: those of the conditions, then K_T and K_Q of the open-water points."""
+        (count, channels), (points, columns) = self.tests.readings.shape, self.tests.open_water.shape
+        curves = channels + np.repeat(np.arange(columns - 1), points)
+        return np.concatenate([np.repeat(np.arange(channels), count), curves])
+
+    def curve_slopes(self) -> Array:
+        """Of the open-water points by the coefficients, (points of K_T and K_Q, k)."""
+        blocks = []
+        for first in ("k_0", "q_0")[: self.tests.open_water.shape[1] - 1]:
+            place = self.names.index(first)
+            blocks.append(np.pad(self.powers, ((0, 0), (place, len(self.names) - 3 - place))))
+        return np.vstack(blocks)
 
     @cached_property
     def _computed(self) -> ca.Function:
@@ -312,16 +337,15 @@ class _Regression:
     def misfit(self, theta: Array) -> Array:
         """Measured less computed, (equations,), N, N m and K_T."""
         forces, _ = self._computed(self.tests.motion.T, np.tile(theta[:, None], len(self.tests.names)))
-        curve = self.tests.open_water[:, 1] - self.powers @ theta[:3]
+        curve = self.tests.open_water[:, 1:].T.ravel() - self.curve_slopes() @ theta
         return np.concatenate([(self.tests.readings.T - np.array(forces)).ravel(), curve])
 
     def slopes(self, theta: Array) -> Array:
         """Of the misfit, (equations, k)."""
         count = len(self.tests.names)
         _, jacobian = self._computed(self.tests.motion.T, np.tile(theta[:, None], count))
-        by_condition = np.array(jacobian).reshape(len(CHANNELS), count, len(self.names))
-        curve = np.pad(self.powers, ((0, 0), (0, len(self.names) - 3)))
-        return -np.vstack([*by_condition, curve])
+        by_condition = np.array(jacobian).reshape(len(self.tests.channels), count, len(self.names))
+        return -np.vstack([*by_condition, self.curve_slopes()])
 
     def start(self) -> Array:
         """Means of ordinary ships, no hull but its resistance."""
@@ -330,12 +354,16 @@ class _Regression:
             theta[i] = mean
         theta[:3] = _open_water(self.tests)
         theta[self.names.index("X0")] = _START_X0
+        if "eta_R" in self.names:
+            place = self.names.index("q_0")
+            theta[place : place + 3] = np.linalg.lstsq(self.powers, self.tests.open_water[:, 2], rcond=None)[0]
+            theta[self.names.index("eta_R")] = 1.0
         return theta
 
     def fit(self, not_excited: tuple[str, ...]) -> MmgFit:
         """Least squares and variance components in turn until both stay."""
         tests, channel = self.tests, self.channel
-        sizes = np.append(tests.readings.std(axis=0), tests.open_water[:, 1].std())
+        sizes = np.concatenate([tests.readings.std(axis=0), tests.open_water[:, 1:].std(axis=0)])
         theta, sigmas = self.start(), _START_SIGMA * sizes
         by_prior = np.array([np.eye(len(theta))[i] / spread for i, (_, spread) in self.priors.items()])
         means = np.array([mean / spread for mean, spread in self.priors.values()])
@@ -365,7 +393,8 @@ class _Regression:
             covariance = covariance + np.outer(moved, moved)
             common[source] = np.hypot(common.get(source, 0.0), moved)
         count = len(tests.names)
-        residuals = self.misfit(theta)[: count * len(CHANNELS)].reshape(len(CHANNELS), count).T
+        channels = len(tests.channels)
+        residuals = self.misfit(theta)[: count * channels].reshape(channels, count).T
         return MmgFit(
             tests=tests,
             names=self.names,

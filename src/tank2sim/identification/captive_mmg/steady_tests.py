@@ -19,6 +19,11 @@ from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
+TORQUE = "Q"
+"""The channel of the propeller's torque (N m), which comes after the others if it was measured."""
+_K_Q_OVER_K_T = (0.03, 0.3)
+"""Range of K_Q over K_T at the lowest J. Project choice: the KVLCC2's is 0.10 at J = 0 (HMRI), and no usual screw is a
+factor of three away; 10 K_Q is."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,10 +40,10 @@ class SteadyTests:
         File of each condition, and line in a table of averages.
     motion : array, (conditions, 5)
         u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
-    readings : array, (conditions, 5)
-        :data:`CHANNELS`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
-    open_water : array, (points, 2)
-        J and K_T.
+    readings : array, (conditions, 5 or 6)
+        :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
+    open_water : array, (points, 2 or 3)
+        J, K_T, and K_Q if the torque was measured.
     remarks : tuple of str
         Of reading the files.
     """
@@ -50,6 +55,11 @@ class SteadyTests:
     readings: Array
     open_water: Array
     remarks: tuple[str, ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """:data:`CHANNELS`, and :data:`TORQUE` if it was measured."""
+        return (*CHANNELS, TORQUE)[: self.readings.shape[1]]
 
     @property
     def speed_mps(self) -> Array:
@@ -74,13 +84,17 @@ def read_steady_tests(path: Path) -> SteadyTests:
     form, factors = read_campaign_file(path)
     _refuse_missing(form, path)
     conditions, remarks = read_averages(form, factors, path) if form.averages else _averaged_runs(form, path)
+    with_torque = all(condition.torque_Nm is not None for condition in conditions)
+    if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
+        first = next(condition.name for condition in conditions if condition.torque_Nm is None)
+        raise InputError(path, "runs", f"{first} has no torque, and others have", "record it in all runs, or in none")
     return SteadyTests(
         path=path,
         form=form,
         names=tuple(condition.name for condition in conditions),
         motion=np.array([_motion(condition) for condition in conditions]),
         readings=np.array([_readings(condition, form) for condition in conditions]),
-        open_water=_open_water(form, path),
+        open_water=_open_water(form, path, with_torque=with_torque),
         remarks=tuple(remarks),
     )
 
@@ -174,6 +188,7 @@ def _condition(run: CaptiveRun, form: CampaignFile) -> Condition:
         yaw_rate_radps=float(np.mean(run.r_radps)),
         thrust_N=float(np.mean(run.thrust_N)),
         rudder_normal_force_N=float(np.mean(run.rudder_normal_force_N)),
+        torque_Nm=None if run.torque_Nm is None else float(np.mean(run.torque_Nm)),
     )
 
 
@@ -190,25 +205,42 @@ def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
         u, v, r, _, _ = _motion(condition)
         forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)
     assert condition.thrust_N is not None and condition.rudder_normal_force_N is not None
-    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N
+    torque = () if condition.torque_Nm is None else (condition.torque_Nm,)
+    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N, *torque
 
 
-def _open_water(form: CampaignFile, path: Path) -> Array:
+def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
     section = form.open_water
     assert section is not None
+    given = {"J": section.J, "K_T": section.K_T}
+    if with_torque:
+        if section.K_Q is None:
+            remedy = "give K_Q of the open-water test, or leave the torque out"
+            raise InputError(path, "open_water.K_Q", "is missing, and the torque was measured", remedy)
+        given["K_Q"] = section.K_Q
+    headings = {key: heading for key, heading in given.items() if isinstance(heading, str)}
     if section.file is None:
-        if isinstance(section.J, str) or isinstance(section.K_T, str):
-            raise InputError(path, "open_water.J", "is missing", "give lists J and K_T, or a file of them")
-        values = {"J": section.J, "K_T": section.K_T}
+        if headings:
+            raise InputError(path, f"open_water.{next(iter(headings))}", "is missing", "give lists, or a file of them")
+        values = {key: points for key, points in given.items() if not isinstance(points, str)}
     else:
-        if not (isinstance(section.J, str) and isinstance(section.K_T, str)):
-            raise InputError(path, "open_water.J", "is a list, and a file is given", "give one of the two")
-        columns = read_columns(path.parent / section.file, {"J": section.J, "K_T": section.K_T})
-        values = {key: columns[key] for key in ("J", "K_T")}
-    if len(values["J"]) != len(values["K_T"]):
-        problem = f"has {len(values['K_T'])} values and J {len(values['J'])}"
-        raise InputError(path, "open_water.K_T", problem, "give a K_T for each J")
+        if headings != given:
+            place = next(key for key in given if key not in headings)
+            raise InputError(path, f"open_water.{place}", "is a list, and a file is given", "give one of the two")
+        values = read_columns(path.parent / section.file, headings)
+    for key, points in values.items():
+        if len(points) != len(values["J"]):
+            problem = f"has {len(points)} values and J {len(values['J'])}"
+            raise InputError(path, f"open_water.{key}", problem, f"give a {key} for each J")
     if len(set(values["J"])) < 4:
         remedy = "a quadratic and its error need four"
         raise InputError(path, "open_water.J", "has less than four different values", remedy)
-    return np.column_stack([values["J"], values["K_T"]])
+    table = np.column_stack([values[key] for key in given])
+    if with_torque:
+        table[:, 2] *= section.K_Q_factor
+        first = int(np.argmin(np.abs(table[:, 0])))
+        low, high = _K_Q_OVER_K_T
+        if not low < table[first, 2] / table[first, 1] < high:
+            problem = f"is {table[first, 2]:.3g} next to K_T = {table[first, 1]:.3g} at J = {table[first, 0]:.3g}"
+            raise InputError(path, "open_water.K_Q", problem, "if the column is 10 K_Q, give K_Q_factor = 0.1")
+    return table

@@ -16,6 +16,7 @@ _CHANNELS = {
     "N": "yaw moment",
     "T": "thrust",
     "F_N": "normal force of the rudder",
+    "Q": "torque of the propeller",
 }
 
 
