@@ -28,8 +28,8 @@ _UNEXPLAINED = 0.5
 """Share of a channel (rms of what is left over rms of the readings) from which the method is not that of the
 ship, and the result is refused. Project choice: a wrong sign leaves more than 1, HMRI's KVLCC2 at most 0.13."""
 _CURVE_UNEXPLAINED = 0.2
-"""Share of K_Q (rms of what is left over that of the points) from which the open-water curve is not that of the propeller
-behind the model. Project choice: open-water tests scatter by 1 or 2 %, a wrong sign leaves 100 %."""
+"""Share of K_Q (rms of what is left over that of the points) from which the open-water curve is not that of the
+propeller behind the model. Project choice: open-water tests scatter by 1 or 2 %, a wrong sign leaves 100 %."""
 _FAR = 3.0
 """Deviations from ordinary ships from which a coefficient is named (project choice)."""
 _UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "Q": "N.m"}

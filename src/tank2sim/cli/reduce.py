@@ -93,7 +93,9 @@ def command(
 def _reduce_to_mmg(
     campaign: Path, output: Path | None, page: Path | None, plots: Path | None, json_file: Path | None
 ) -> None:
-    from tank2sim.api.mmg_reduction import reduce_to_mmg  # not for the polynomial, which needs no model
+    # Not for the polynomial, which needs no model:
+    from tank2sim.api.mmg_reduction import reduce_to_mmg
+    from tank2sim.identification.captive_mmg.regression import OF_TORQUE
 
     result = reduce_to_mmg(campaign)
     form = result.fit.tests.form
@@ -104,4 +106,5 @@ def _reduce_to_mmg(
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)
     if output:
-        screen.print(f"{output}: {len(result.coefficients)} coefficients", soft_wrap=True, markup=False)
+        on_card = [name for name in result.coefficients if name not in OF_TORQUE]
+        screen.print(f"{output}: {len(on_card)} coefficients", soft_wrap=True, markup=False)

@@ -43,6 +43,7 @@ class Condition:
     thrust_N: float | None = None
     rudder_normal_force_N: float | None = None
     torque_Nm: float | None = None
+    heel_rad: float = 0.0
 
 
 def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
@@ -166,7 +167,7 @@ def _number(file: Path, place: tuple[int, str], text: str) -> float:
 def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignFile) -> Condition:
     assert form.averages is not None
     file, line = place
-    for key in ("drift_rad", "rudder_rad"):
+    for key in ("drift_rad", "rudder_rad", "heel_rad"):
         if abs(at.get(key, 0.0)) >= math.pi / 2:
             raise InputError(file, f"line {line}", f"{key} is {at[key]:g}", "name its column as _deg if it is degrees")
     speed = at.get("speed_mps", form.test.speed_mps)
@@ -190,6 +191,7 @@ def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignF
         thrust_N=at["thrust"] * unit if "thrust" in at else None,
         rudder_normal_force_N=at["rudder_normal_force"] * unit * to_port if "rudder_normal_force" in at else None,
         torque_Nm=at["torque"] * unit * arm if "torque" in at else None,
+        heel_rad=at.get("heel_rad", 0.0),
     )
 
 

@@ -218,6 +218,8 @@ class RunSheet(CardSection):
     ----------
     yaw_rate_radps
         Of a steady turn on a rotating arm or in circular motion, positive to starboard.
+    heel_rad
+        At which the model is held, positive to starboard.
     """
 
     file: Text
@@ -227,6 +229,7 @@ class RunSheet(CardSection):
     frequency_radps: Positive | None = None
     amplitude_m: Positive | None = None
     yaw_rate_radps: float | None = None
+    heel_rad: Angle | None = None
     yaw_rate_amplitude_radps: Positive | None = None
     propeller_radps: NotNegative | None = None
     notes: str | None = None
@@ -238,6 +241,8 @@ class AverageColumns(CardSection):
 
     Parameters
     ----------
+    heel_rad
+        Angle at which the model is held, positive to starboard.
     yaw_rate_radps, yaw_rate_prime
         Yaw rate of rotating-arm and circular-motion tests, positive to starboard; prime: r L/U.
     thrust, rudder_normal_force
@@ -248,6 +253,7 @@ class AverageColumns(CardSection):
 
     drift_rad: str | None = None
     rudder_rad: str | None = None
+    heel_rad: str | None = None
     speed_mps: str | None = None
     propeller_radps: str | None = None
     yaw_rate_radps: str | None = None

@@ -75,6 +75,8 @@ class CaptiveRun:
         Of the propeller, positive forward; of the water on the rudder, positive to port.
     torque_Nm : array, (rows,), or None
         That the propeller takes.
+    heel_rad : float
+        At which the model is held, positive to starboard.
     force_delay_s : float
         By how much the forces lag the motion.
     """
@@ -96,6 +98,7 @@ class CaptiveRun:
     thrust_N: Array | None = None
     rudder_normal_force_N: Array | None = None
     torque_Nm: Array | None = None
+    heel_rad: float = 0.0
     force_delay_s: float = 0.0
 
     @property
@@ -347,6 +350,7 @@ def read_captive_run(
         thrust_N=_optional(table, "thrust_N"),
         rudder_normal_force_N=_optional(table, "rudder_normal_force_N"),
         torque_Nm=_optional(table, "torque_Nm"),
+        heel_rad=sheet.heel_rad or 0.0,
         force_delay_s=test.force_delay_s,
     )
 
@@ -412,4 +416,5 @@ def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
         Y_N=sense * np.array([condition.Y_N]),
         N_Nm=sense * np.array([condition.N_Nm]),
         propeller_radps=condition.propeller_radps,
+        heel_rad=condition.heel_rad,
     )

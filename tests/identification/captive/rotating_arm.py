@@ -20,6 +20,11 @@ TRUTH = {
     "Yrdd": -0.0007, "Nrdd": 0.0004, "Yvvd": -0.006, "Nvvd": 0.003, "Yddd": 0.0009, "Nddd": -0.0004,
 }  # fmt: skip
 """Prime, by 1/2 rho L^2 U^2; rudder positive to starboard."""
+HEEL = {
+    "Xphiphi": -0.0004, "Yphi": -0.0006, "Yvvphi": 0.046, "Yvphiphi": 0.013, "Yrrphi": 0.009, "Yrphiphi": -0.004,
+    "Nphi": -0.0003, "Nvvphi": -0.019, "Nvphiphi": -0.0054, "Nrrphi": -0.0039, "Nrphiphi": 0.0024,
+}  # fmt: skip
+"""Of the heel, rad, positive to starboard."""
 
 
 def conditions() -> np.ndarray:
@@ -34,14 +39,23 @@ def conditions() -> np.ndarray:
     return np.array(rows)
 
 
-def gauges(truth: dict[str, float], U, beta, r, delta) -> dict[str, np.ndarray]:
+def at_heel() -> np.ndarray:
+    """:func:`conditions`, and straight, drifting and turning at heels of 5 and 10 deg to both sides: phi (rad) last."""
+    deg, U = np.radians, 1.3
+    motions = [(b, 0) for b in (-12, -6, 0, 6, 12)] + [(0, r) for r in (-0.6, -0.3, 0.3, 0.6)]
+    heeled = [(U, deg(b), r, 0, deg(heel)) for heel in (-10, -5, 5, 10) for b, r in motions]
+    upright = conditions()
+    return np.vstack([np.column_stack([upright, np.zeros(len(upright))]), heeled])
+
+
+def gauges(truth: dict[str, float], U, beta, r, delta, phi=0.0) -> dict[str, np.ndarray]:
     """Readings X, Y (N) and N (N m), positive as the water pushes the model; `r` is r'."""
     v = -np.sin(beta)
     unit, total = 0.5 * RHO * L**2 * U**2, {"X": 0.0, "Y": 0.0, "N": 0.0}
     for name, value in truth.items():
         term = np.ones_like(U)
-        for letter in name[1:].replace("0", ""):
-            term = term * {"v": v, "r": r, "d": delta}[letter]
+        for letter in name[1:].replace("0", "").replace("phi", "f"):
+            term = term * {"v": v, "r": r, "d": delta, "f": phi}[letter]
         total[name[0]] = total[name[0]] + value * term
     rate, sway, ahead = r * U / L, v * U, U * np.cos(beta)
     return {
@@ -56,15 +70,16 @@ def write_arm(
 ) -> Path:
     """``campaign.toml`` and its table; random errors of `noise` times :data:`NOISE`; yaw rate prime or in deg/s."""
     random = np.random.default_rng(seed)
-    U, beta, r, delta = conditions().T
-    read = gauges(truth, U, beta, r, delta)
+    U, beta, r, delta, *heel = (at_heel() if "Yphi" in truth else conditions()).T
+    read = gauges(truth, U, beta, r, delta, *heel)
     measured = [read[key] + noise * NOISE[key] * random.standard_normal(len(U)) for key in "XYN"]
     rate = r if column == "prime" else np.degrees(r * U / L)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "runs.csv").open("w", newline="") as file:
         table = csv.writer(file)
-        table.writerow(["U", "beta", "r", "delta", "X", "Y", "N"])
-        table.writerows(np.column_stack([U, np.degrees(beta), rate, np.degrees(delta), *measured]).tolist())
+        table.writerow(["U", "beta", "r", "delta", "X", "Y", "N", *(["phi"] if heel else [])])
+        angles = map(np.degrees, heel)
+        table.writerows(np.column_stack([U, np.degrees(beta), rate, np.degrees(delta), *measured, *angles]).tolist())
     key = "yaw_rate_prime" if column == "prime" else "yaw_rate_degps"
     path = folder / "campaign.toml"
     path.write_text(f"""
@@ -87,6 +102,7 @@ drift_deg = "beta"
 rudder_deg = "delta"
 speed_mps = "U"
 {key} = "r"
+{'heel_deg = "phi"' if heel else ""}
 X = "X"
 Y = "Y"
 N = "N"

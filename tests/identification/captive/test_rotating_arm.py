@@ -11,7 +11,8 @@ import tank2sim as t2s
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.records.campaigns import read_campaign
-from tests.identification.captive.rotating_arm import TRUTH, L, conditions, gauges, write_arm
+from tests.identification.captive.rotating_arm import HEEL, TRUTH, L, conditions, gauges, write_arm
+from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
 
 
 def reduced(path):
@@ -92,3 +93,38 @@ def test_a_yaw_rate_of_the_other_sign_is_in_the_first_lines(tmp_path):
         table.writerows([{**row, "r": -float(row["r"])} for row in rows])
     assert any("Nr" in line for line in t2s.reduce(path).headline)
     assert not any("Nr" in line for line in t2s.reduce(write_arm(tmp_path, TRUTH)).headline)
+
+
+def test_tests_at_a_heel_give_the_terms_of_the_heel_and_leave_the_others(tmp_path):
+    result = t2s.reduce(write_arm(tmp_path, TRUTH | HEEL, noise=1e-4))
+    for name, value in (TRUTH | HEEL).items():
+        if name != "X0":  # of a towed model, which a card does not have
+            assert result.derivatives.value[name] == pytest.approx(value, rel=1e-3), name
+    assert not set(HEEL) & set(result.card.derivatives)
+    assert set(result.to_dict()["heel_derivatives"]) == set(HEEL)
+    assert any("Nvvphi" in notice for notice in result.notices)
+
+
+@pytest.mark.slow
+def test_intervals_of_the_heel_have_the_truth_in_90_to_98_percent(tmp_path):
+    inside = []
+    for seed in range(20):
+        random = np.random.default_rng(900 + seed)
+        truth = {name: value * random.uniform(0.85, 1.15) for name, value in (TRUTH | HEEL).items()}
+        found = reduced(write_arm(tmp_path, truth, seed))
+        inside += [abs(found[name].value - truth[name]) < 1.96 * found[name].standard_error for name in HEEL]
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+def test_a_heel_is_refused_where_the_method_is_of_an_upright_hull(tmp_path):
+    path = write_campaign(tmp_path, KVLCC2)
+    path.write_text(path.read_text().replace('drift_deg = "beta"', 'drift_deg = "beta"\nheel_deg = "beta"'))
+    with pytest.raises(InputError, match="heel"):
+        t2s.reduce_to_mmg(path)
+
+
+def test_a_heel_in_degrees_read_as_radians_is_refused(tmp_path):
+    path = write_arm(tmp_path, TRUTH | HEEL)
+    path.write_text(path.read_text().replace("heel_deg", "heel_rad"))
+    with pytest.raises(InputError, match="heel_rad"):
+        reduced(path)

@@ -30,9 +30,19 @@ _ACTIVE = 1e-3
 """A term is excited if its product of motions reaches this share of the product of the campaign's largest motions."""
 
 
-def candidate_terms(force: str) -> tuple[Term, ...]:
-    """Terms of (3.8) and acceleration terms of one force, in their order."""
+HEEL_TERMS = {
+    "X": ("Xphiphi",),
+    "Y": ("Yphi", "Yvvphi", "Yvphiphi", "Yrrphi", "Yrphiphi"),
+    "N": ("Nphi", "Nvvphi", "Nvphiphi", "Nrrphi", "Nrphiphi"),
+}
+"""Terms of the heel that steady tests at a heel show: those of Son and Nomoto (1982), Naval Architecture and Ocean
+Engineering 20, 73-83."""
+
+
+def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
+    """Terms of (3.8) and acceleration terms of one force, in their order; last those of the heel, if asked for."""
     names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
+    names += HEEL_TERMS[force] if heeled else ()
     return tuple(term for term in map(parse_term, names) if term is not None)
 
 
@@ -246,6 +256,7 @@ def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
         history = np.asarray(Scales(density, length, motion.speed_mps).derivative(replace(term, force="Y")))
         for factor in powers:
             history = history * factor
+        history = history * motion.heel_rad**term.phi
     if trend:
         history = history * (motion.frequency_radps * length / u0) ** 2
     return np.broadcast_to(history, len(motion.time_s))
@@ -264,7 +275,7 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
         )
     if term.u and not speeds_differ(campaign, runs):
         return False
-    powers = np.array([term.v, term.r, term.d, term.u])
+    powers = np.array([term.v, term.r, term.d, term.u, term.phi])
     motions = np.array([_largest_motions(run.motion, u0, length) for run in runs])
     # The largest motions of one run count as simultaneous: a coarse bound is enough to detect a missing motion.
     products, bound = np.prod(motions**powers, axis=1), np.prod(motions.max(axis=0) ** powers)
@@ -272,10 +283,10 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
 
 
 def _largest_motions(motion: CaptiveMotion, u0: float, length: float) -> list[float]:
-    """Largest v', r', rudder angle and change of speed U (a change of u by drift alone does not determine Du)."""
+    """Largest v', r', rudder angle, change of speed U (a change of u by drift alone does not determine Du), heel."""
     change = abs(motion.mean_speed_mps / u0 - 1)
     v, r, delta = motion.largest
-    return [v / u0, r * length / u0, delta, change if change > SPEED_RANGE else 0.0]
+    return [v / u0, r * length / u0, delta, change if change > SPEED_RANGE else 0.0, abs(motion.heel_rad)]
 
 
 def speeds_differ(campaign: Campaign, runs: Sequence[ReducedRun]) -> bool:

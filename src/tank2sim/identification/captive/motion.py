@@ -47,6 +47,8 @@ class CaptiveMotion:
         Whole periods kept; 0 in a steady run.
     v_mps, r_radps, speed_mps, delta_rad, vdot_mps2, rdot_radps2 : array, (rows,)
         ``speed_mps`` is U through the water.
+    heel_rad : float
+        At which the model is held.
     projections : dict
         What :mod:`tank2sim.identification.captive.equations` has projected on the harmonics of this motion, kept
         because a campaign's equations are set up several times.
@@ -64,6 +66,7 @@ class CaptiveMotion:
     delta_rad: Array
     vdot_mps2: Array
     rdot_radps2: Array
+    heel_rad: float = 0.0
     projections: dict[Hashable, Array] = field(init=False, repr=False, default_factory=dict)
     erring: dict[tuple[str, float], dict[Hashable, Array]] = field(init=False, repr=False, default_factory=dict)
 
@@ -141,6 +144,7 @@ def _steady(run: CaptiveRun) -> CaptiveMotion:
         delta_rad=level(run.delta_rad),
         vdot_mps2=np.broadcast_to(0.0, count),
         rdot_radps2=np.broadcast_to(0.0, count),
+        heel_rad=run.heel_rad,
     )
 
 
@@ -177,6 +181,7 @@ def _oscillating(run: CaptiveRun) -> CaptiveMotion:
         delta_rad=basis @ rudder,
         vdot_mps2=slope @ v,
         rdot_radps2=slope @ r,
+        heel_rad=run.heel_rad,
     )
 
 

@@ -58,7 +58,7 @@ def plots_as_json(reduction: Reduction) -> dict[str, Plot]:
 
 def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tuple[str, str]) -> Plot | None:
     """Force coefficient of the steady runs at the test speed against the one motion that they vary."""
-    runs = [run for run in reduction.runs if run.run.type == kind]
+    runs = [run for run in reduction.runs if run.run.type == kind and not run.motion.heel_rad]
     if kind == "steady_turn":
         runs = [run for run in runs if abs(_motion_of(run, "v")) < _ZERO and abs(_motion_of(run, "d")) < _ZERO]
     straight_runs = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
@@ -91,7 +91,8 @@ def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tupl
 def _varies_alone(run: ReducedRun, kind: str) -> bool:
     """A static run in which all but the motion of a kind is zero: the straight run belongs to all kinds."""
     others = [letter for letter in "vd" if letter != _LETTER[kind]]
-    return run.run.type.startswith("static") and all(abs(_motion_of(run, letter)) < _ZERO for letter in others)
+    upright = run.run.type.startswith("static") and not run.motion.heel_rad
+    return upright and all(abs(_motion_of(run, letter)) < _ZERO for letter in others)
 
 
 def _motion_of(run: ReducedRun, letter: str, length_m: float = 1.0) -> float:
@@ -128,7 +129,7 @@ def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array
     for name in result.solution.names:
         term = parse_term(name.partition(" ")[0])
         assert term is not None
-        acts = not term.acceleration and not term.u and " " not in name
+        acts = not term.acceleration and not term.u and not term.phi and " " not in name
         value = polynomial([term.name], {term.name: 1.0}, v=v, r=r, d=rudder) if acts else 0.0
         columns.append(value * np.ones(len(v)))
     return np.column_stack(columns) if columns else np.zeros((len(v), 0))

@@ -88,6 +88,11 @@ def read_steady_tests(path: Path) -> SteadyTests:
     if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
         first = next(condition.name for condition in conditions if condition.torque_Nm is None)
         raise InputError(path, "runs", f"{first} has no torque, and others have", "record it in all runs, or in none")
+    if heeled := next((condition.name for condition in conditions if condition.heel_rad), ""):
+        remedy = "reduce such tests to a polynomial, without --model mmg"
+        raise InputError(
+            path, "averages.columns.heel_rad", f"{heeled} has a heel; the method is of an upright hull", remedy
+        )
     return SteadyTests(
         path=path,
         form=form,
@@ -188,6 +193,7 @@ def _condition(run: CaptiveRun, form: CampaignFile) -> Condition:
         yaw_rate_radps=float(np.mean(run.r_radps)),
         thrust_N=float(np.mean(run.thrust_N)),
         rudder_normal_force_N=float(np.mean(run.rudder_normal_force_N)),
+        heel_rad=run.heel_rad,
         torque_Nm=None if run.torque_Nm is None else float(np.mean(run.torque_Nm)),
     )
 
