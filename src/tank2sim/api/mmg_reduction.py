@@ -17,6 +17,7 @@ from tank2sim.cards.card import PROPELLER_COEFFICIENTS
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, mmg_card_text
 from tank2sim.identification.captive_mmg.regression import OF_TORQUE, ORDINARY, MmgFit, fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import TORQUE, read_steady_tests
@@ -234,6 +235,13 @@ class MmgReductionResult(PagedResult):
             found.append(
                 "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to "
                 "all conditions, are in them where [uncertainty] of the campaign states them."
+            )
+        form = fit.tests.form
+        raised = blockage_speed(form.model, form.tank, form.test)
+        if raised and not form.uncertainty.blockage_relative:
+            found.append(
+                f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
+                "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in."
             )
         if TORQUE in fit.tests.channels:
             found.append("eta_R and K_Q (q_0, q_1, q_2) are not on the card: no force on the ship depends on them.")

@@ -348,3 +348,14 @@ def test_a_torque_of_the_other_sign_is_refused(tmp_path) -> None:
     (tmp_path / "runs.csv").write_text("\n".join([rows[0], *turned]))
     with pytest.raises(InputError, match=r"open_water.K_Q: is .* off its curve"):
         t2s.reduce_to_mmg(path)
+
+
+def test_blockage_of_the_tank_is_named_until_it_is_stated(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    tank = "[tank]\nlength_m = 200.0\nbreadth_m = 10.0\ndepth_m = 5.0\n"
+    path.write_text(tank + path.read_text())
+    share = 1.27 * 0.46 / 50.0
+    raised = share / (1 - share - 1.179**2 / (9.80665 * 5.0))
+    assert any("Schuster" in notice and f"{100 * raised:.2g} %" in notice for notice in t2s.reduce_to_mmg(path).notices)
+    path.write_text(STATED + path.read_text())
+    assert not any("Schuster" in notice for notice in t2s.reduce_to_mmg(path).notices)

@@ -83,11 +83,12 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
 
 def _budget(reduction: Reduction) -> dict[str, Any]:
     """The budget after ITTC 7.5-02-06-04: standard uncertainties (prime) and shares of the variance by source."""
+    campaign = reduction.campaign
     return {
         "coverage_factor": COVERAGE_FACTOR,
         "sources": BUDGET_SOURCES,
         "not_stated": sources_not_stated(reduction),
-        "blockage_speed_relative": blockage_speed(reduction),
+        "blockage_speed_relative": blockage_speed(campaign.model, campaign.tank, campaign.test),
         "derivatives": {
             row.name: {
                 "value": row.value,

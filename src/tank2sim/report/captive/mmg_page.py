@@ -36,7 +36,7 @@ def mmg_reduction_page(found: Json) -> Page:
         [
             name,
             *(
-                100 * (part / entry["standard_error"]) ** 2
+                round(100 * (part / entry["standard_error"]) ** 2, 2)
                 for part in (entry["type_a"], *(entry["type_b"].get(source, 0.0) for source in sources))
             ),
             entry["standard_error"],
@@ -48,7 +48,7 @@ def mmg_reduction_page(found: Json) -> Page:
         caption="Shares of the variance",
         columns=[
             *(Column(title=""), Column(title="scatter", unit="%", digits=3)),
-            *(Column(title=source, unit="%", digits=3) for source in sources),
+            *(Column(title=source.rpartition("_")[0], unit="%", digits=3) for source in sources),
             *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
         ],
         rows=shares,
