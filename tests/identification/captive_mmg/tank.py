@@ -189,3 +189,44 @@ def as_runs(folder: Path, seed: int = 0, *, readings: int = 40) -> Path:
             csv.writer(file).writerows([list(columns), *np.column_stack(list(columns.values())).tolist()])
     (folder / "campaign.toml").write_text(sheet)
     return folder / "campaign.toml"
+
+
+def ship_like_the_kvlcc2(seed: int, masses: dict[str, tuple[float, float]]) -> dict[str, float]:
+    """Every coefficient off by up to 15 %; m_x and m_y off `masses`, estimate and standard error by name, by chance."""
+    random = np.random.default_rng(seed)
+    truth = {name: value * random.uniform(0.85, 1.15) for name, value in KVLCC2.items()}
+    for name, key in (("Xudot", "mx"), ("Yvdot", "my")):
+        truth[key] = -masses[name][0] + masses[name][1] * random.standard_normal()
+    return truth
+
+
+STATED = """[uncertainty]
+calibration_relative = 0.01
+alignment_deg = 0.4
+rudder_deg = 0.5
+speed_relative = 0.01
+blockage_relative = 0.005
+mass_relative = 0.01
+"""
+
+
+def with_common_errors(path: Path, seed: int) -> Path:
+    """The campaign with errors common to all its rows, of the sizes that it states; the sign of each by chance."""
+    random = np.random.default_rng([seed, 5])
+    rows = (path.parent / "runs.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    U, beta, r = table[:, 0].copy(), np.radians(table[:, 1]), table[:, 2].copy()
+    u, v, rate = U * np.cos(beta), -U * np.sin(beta), r * U / 7.0
+    mass = 3270.0 * 0.01 * random.standard_normal()
+    table[:, 5] += mass * (v * rate + 0.25 * rate**2)
+    table[:, 6] -= mass * u * rate
+    table[:, 7] -= mass * 0.25 * u * rate
+    table[:, 5:] *= 1 + 0.01 * random.standard_normal(5)
+    table[:, 1] += 0.4 * random.standard_normal()
+    table[:, 3] += 0.5 * random.standard_normal()
+    table[:, 0] *= 1 + np.hypot(0.01, 0.005) * random.standard_normal()
+    table[:, 2] = rate * 7.0 / table[:, 0]
+    lines = [rows[0], *(",".join(map(repr, row)) for row in table.tolist())]
+    (path.parent / "runs.csv").write_text("\n".join(lines))
+    path.write_text(STATED + path.read_text())
+    return path

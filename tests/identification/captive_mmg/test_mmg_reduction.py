@@ -15,31 +15,29 @@ from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tests.cli.command_line import refused, tank2sim
 from tests.identification.captive_mmg.tank import (
     KVLCC2,
+    STATED,
     TORQUE,
     as_runs,
     conditions,
     forces,
     hmri_campaign,
+    ship_like_the_kvlcc2,
+    with_common_errors,
     write_campaign,
 )
 
 SEEDS = 20
 
 
+def another_ship(folder: Path, seed: int) -> dict[str, float]:
+    """A ship like the KVLCC2, its added masses off their estimate by chance."""
+    return ship_like_the_kvlcc2(seed, estimated_masses(read_steady_tests(write_campaign(folder, KVLCC2))))
+
+
 def of_the_estimate(folder: Path) -> dict[str, float]:
     """The KVLCC2 with the added masses that the reduction estimates, so that nothing but the readings is in error."""
     masses = estimated_masses(read_steady_tests(write_campaign(folder, KVLCC2)))
     return KVLCC2 | {"mx": -masses["Xudot"][0], "my": -masses["Yvdot"][0]}
-
-
-def another_ship(folder: Path, seed: int) -> dict[str, float]:
-    """A ship like the KVLCC2, its added masses off their estimate by chance."""
-    random = np.random.default_rng(seed)
-    truth = {name: value * random.uniform(0.85, 1.15) for name, value in KVLCC2.items()}
-    masses = estimated_masses(read_steady_tests(write_campaign(folder, truth)))
-    for name, key in (("Xudot", "mx"), ("Yvdot", "my")):
-        truth[key] = -masses[name][0] + masses[name][1] * random.standard_normal()
-    return truth
 
 
 def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
@@ -54,7 +52,7 @@ def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
 def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
     inside = []
     for seed in range(SEEDS):
-        truth = another_ship(tmp_path, seed=7000 + seed)
+        truth = another_ship(tmp_path, 7000 + seed)
         found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed)).coefficients
         inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
     assert 0.90 <= np.mean(inside) <= 0.98
@@ -234,38 +232,6 @@ def test_oscillating_runs_are_left_out_and_named(tmp_path) -> None:
     both = read_steady_tests(path)
     assert both.names == steady.names
     assert any("yaw.csv" in remark for remark in both.remarks)
-
-
-STATED = """[uncertainty]
-calibration_relative = 0.01
-alignment_deg = 0.4
-rudder_deg = 0.5
-speed_relative = 0.01
-blockage_relative = 0.005
-mass_relative = 0.01
-"""
-
-
-def with_common_errors(path: Path, seed: int) -> Path:
-    """The campaign with errors common to all its rows, of the sizes that it states; the sign of each by chance."""
-    random = np.random.default_rng([seed, 5])
-    rows = (path.parent / "runs.csv").read_text().splitlines()
-    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
-    U, beta, r = table[:, 0].copy(), np.radians(table[:, 1]), table[:, 2].copy()
-    u, v, rate = U * np.cos(beta), -U * np.sin(beta), r * U / 7.0
-    mass = 3270.0 * 0.01 * random.standard_normal()
-    table[:, 5] += mass * (v * rate + 0.25 * rate**2)
-    table[:, 6] -= mass * u * rate
-    table[:, 7] -= mass * 0.25 * u * rate
-    table[:, 5:] *= 1 + 0.01 * random.standard_normal(5)
-    table[:, 1] += 0.4 * random.standard_normal()
-    table[:, 3] += 0.5 * random.standard_normal()
-    table[:, 0] *= 1 + np.hypot(0.01, 0.005) * random.standard_normal()
-    table[:, 2] = rate * 7.0 / table[:, 0]
-    lines = [rows[0], *(",".join(map(repr, row)) for row in table.tolist())]
-    (path.parent / "runs.csv").write_text("\n".join(lines))
-    path.write_text(STATED + path.read_text())
-    return path
 
 
 @pytest.mark.slow

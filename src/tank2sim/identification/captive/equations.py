@@ -40,7 +40,7 @@ Engineering 20, 73-83."""
 
 
 def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
-    """Terms of (3.8) and acceleration terms of one force, in their order; last those of the heel, if asked for."""
+    """Terms of (3.8) and acceleration terms of one force, in their order; with `heeled` last those of the heel."""
     names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
     names += HEEL_TERMS[force] if heeled else ()
     return tuple(term for term in map(parse_term, names) if term is not None)

@@ -246,7 +246,7 @@ def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
         table[:, 2] *= section.K_Q_factor
         first = int(np.argmin(np.abs(table[:, 0])))
         low, high = _K_Q_OVER_K_T
-        if not low < table[first, 2] / table[first, 1] < high:
+        if not low * table[first, 1] < table[first, 2] < high * table[first, 1]:
             problem = f"is {table[first, 2]:.3g} next to K_T = {table[first, 1]:.3g} at J = {table[first, 0]:.3g}"
             raise InputError(path, "open_water.K_Q", problem, "if the column is 10 K_Q, give K_Q_factor = 0.1")
     return table
