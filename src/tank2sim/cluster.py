@@ -43,7 +43,7 @@ again is back in a few seconds (project choice)."""
 LOOKS_EVERY_S = 1.0
 """How often the cluster is asked whether it has workers (project choice)."""
 
-_COMPUTING = ("numpy", "scipy", "casadi", "numba")
+_COMPUTING = ("numpy", "scipy", "casadi")
 """Packages on whose version the digits of a result depend."""
 
 _NOT_SENT = ("cli/", "demo/", "report/")
