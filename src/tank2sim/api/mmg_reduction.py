@@ -33,7 +33,7 @@ _CURVE_UNEXPLAINED = 0.2
 propeller behind the model. Project choice: open-water tests scatter by 1 or 2 %, a wrong sign leaves 100 %."""
 _FAR = 3.0
 """Deviations from ordinary ships from which a coefficient is named (project choice)."""
-_UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "Q": "N.m"}
+_UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "T_left": "N", "F_N_left": "N", "Q": "N.m"}
 
 
 @dataclass(frozen=True)

@@ -246,7 +246,10 @@ class AverageColumns(CardSection):
     yaw_rate_radps, yaw_rate_prime
         Yaw rate of rotating-arm and circular-motion tests, positive to starboard; prime: r L/U.
     thrust, rudder_normal_force
-        Of the propeller, positive forward, and of the water on the rudder; in the scaling of the forces.
+        Of the propeller, positive forward, and of the water on the rudder; in the scaling of the forces. With two
+        propellers those of the right side.
+    thrust_left, rudder_normal_force_left
+        The same of the left side.
     torque
         That the propeller takes, positive ahead; in the scaling of the moments.
     """
@@ -260,6 +263,8 @@ class AverageColumns(CardSection):
     yaw_rate_prime: str | None = None
     thrust: str | None = None
     rudder_normal_force: str | None = None
+    thrust_left: str | None = None
+    rudder_normal_force_left: str | None = None
     torque: str | None = None
     X: str
     Y: str
@@ -295,9 +300,21 @@ class OpenWaterSection(CardSection):
 
 
 class PropellerTest(CardSection):
-    """``[propeller]``: the place of the propeller over L, positive forward of midships."""
+    """``[propeller]``: the place of the propeller over L.
+
+    Parameters
+    ----------
+    x_P
+        Positive forward of midships.
+    number
+        1, or 2 side by side, each before a rudder.
+    y_P
+        Of the right one of two, to starboard.
+    """
 
     x_P: Annotated[float, Field(gt=-1, lt=1)] = -0.5
+    number: Literal[1, 2] = 1
+    y_P: Annotated[float, Field(gt=0, lt=0.5)] | None = None
 
 
 class RudderTest(CardSection):
@@ -311,12 +328,15 @@ class RudderTest(CardSection):
         One of the two: f_alpha, the slope of the normal force, by Fujii's formula from the aspect ratio.
     x_R
         Its place over L, positive forward of midships.
+    y_R
+        Place over L of the right one of two rudders, to starboard.
     """
 
     height_m: Positive
     aspect_ratio: Positive | None = None
     f_alpha: Positive | None = None
     x_R: Annotated[float, Field(gt=-1, lt=1)] = -0.5
+    y_R: Annotated[float, Field(gt=0, lt=0.5)] | None = None
 
 
 class CampaignFile(CardSection):

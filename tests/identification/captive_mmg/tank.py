@@ -34,39 +34,54 @@ def conditions() -> np.ndarray:
     return np.array(rows)
 
 
-def forces(p: dict[str, float], U, beta, r, delta, n) -> dict[str, np.ndarray]:
-    """Gauge readings X, Y (N), N (N m) of a model in steady motion, its thrust T and normal force F (N)."""
-    u, v = np.cos(beta), -np.sin(beta)  # prime
-    unit = 0.5 * RHO * L * D * U**2
+def side(p: dict[str, float], motion, delta, n, *, y: float = 0.0, mirror: float = 1.0) -> dict[str, np.ndarray]:
+    """Thrust T, normal force F (N, to port) and torque Q (N m) of a propeller and rudder `y` L to starboard.
+
+    `motion` is U, beta, r'; the numbers of the ship are those of the right side, and mirrored on the left.
+    """
+    U, beta, r = motion
+    ahead = U * (np.cos(beta) - y * r)
     beta_P = beta - X_P * r
-    C_2 = np.where(beta_P > 0, p["C_2_plus"], p["C_2_minus"])
+    C_2 = np.where(mirror * beta_P > 0, p["C_2_plus"], p["C_2_minus"])
     kept = (1 - p["w_P0"]) * (1 + (1 - np.exp(-p["C_1"] * np.abs(beta_P))) * (C_2 - 1))
-    J = u * U * kept / (n * D_P)
+    J = ahead * kept / (n * D_P)
     K_T = p["k_0"] + p["k_1"] * J + p["k_2"] * J**2
     T = RHO * n**2 * D_P**4 * K_T
     eta = D_P / H_R
     race = (1 + p["kappa"] * (np.sqrt(1 + 8 * K_T / (np.pi * J**2)) - 1)) ** 2
-    u_R = p["eps"] * u * U * kept * np.sqrt(eta * race + 1 - eta)
+    u_R = p["eps"] * ahead * kept * np.sqrt(eta * race + 1 - eta)
     beta_R = beta - p["l_R"] * r
-    v_R = U * np.where(beta_R > 0, p["gamma_R_plus"], p["gamma_R_minus"]) * beta_R
+    v_R = U * np.where(mirror * beta_R > 0, p["gamma_R_plus"], p["gamma_R_minus"]) * beta_R
     F = 0.5 * RHO * A_R * F_ALPHA * (u_R**2 + v_R**2) * np.sin(delta - np.arctan2(v_R, u_R))
+    q = {**TORQUE, **p}
+    return {"T": T, "F": F, "Q": RHO * n**2 * D_P**5 * (q["q_0"] + q["q_1"] * J + q["q_2"] * J**2) / q["eta_R"]}
+
+
+def forces(p: dict[str, float], U, beta, r, delta, n, *, y: float = 0.0) -> dict[str, np.ndarray]:
+    """Gauge readings X, Y (N), N (N m) of a model in steady motion, thrust T, normal force F (N) and torque Q.
+
+    With `y` it has two propellers and rudders, that far to either side; TL and FL are of the left one.
+    """
+    u, v = np.cos(beta), -np.sin(beta)  # prime
+    unit = 0.5 * RHO * L * D * U**2
+    right = side(p, (U, beta, r), delta, n, y=y)
+    sides = [(right, y), (side(p, (U, beta, r), delta, n, y=-y, mirror=-1.0), -y)] if y else [(right, 0.0)]
     hull_X = -p["R0"] + p["Xvv"] * v**2 + p["Xvr"] * v * r + p["Xrr"] * r**2 + p["Xvvvv"] * v**4
     hull_Y, hull_N = (
         p[f"{f}v"] * v + p[f"{f}r"] * r + p[f"{f}vvv"] * v**3 + p[f"{f}vvr"] * v**2 * r
         + p[f"{f}vrr"] * v * r**2 + p[f"{f}rrr"] * r**3
         for f in "YN"
     )  # fmt: skip
-    q = {**TORQUE, **p}
     m, x_G = MASS / (0.5 * RHO * L**2 * D), X_G / L
-    return {
-        "X": unit * (hull_X + (m + p["my"]) * v * r + x_G * m * r**2)
-        + (1 - p["t_P"]) * T - (1 - p["t_R"]) * F * np.sin(delta),
-        "Y": unit * (hull_Y - (m + p["mx"]) * u * r) - (1 + p["a_H"]) * F * np.cos(delta),
-        "N": L * (unit * (hull_N - x_G * m * u * r) - (X_R + p["a_H"] * p["x_H"]) * F * np.cos(delta)),
-        "T": T,
-        "F": F,
-        "Q": RHO * n**2 * D_P**5 * (q["q_0"] + q["q_1"] * J + q["q_2"] * J**2) / q["eta_R"],
-    }  # fmt: skip
+    X = unit * (hull_X + (m + p["my"]) * v * r + x_G * m * r**2)
+    Y = unit * (hull_Y - (m + p["mx"]) * u * r)
+    N = L * unit * (hull_N - x_G * m * u * r)
+    for each, place in sides:
+        push, drag = (1 - p["t_P"]) * each["T"], (1 - p["t_R"]) * each["F"] * np.sin(delta)
+        X = X + push - drag
+        Y = Y - (1 + p["a_H"]) * each["F"] * np.cos(delta)
+        N = N - L * (X_R + p["a_H"] * p["x_H"]) * each["F"] * np.cos(delta) - L * place * (push - drag)
+    return {"X": X, "Y": Y, "N": N, **right} | ({"TL": sides[1][0]["T"], "FL": sides[1][0]["F"]} if y else {})
 
 
 def write_campaign(
@@ -78,17 +93,19 @@ def write_campaign(
     rows=None,
     rudder_zero: float = 0.0,
     torque: bool = False,
+    y: float = 0.0,
 ) -> Path:
     """``campaign.toml`` and its tables in a folder; random errors of standard deviation `noise` times :data:`NOISE`."""
     random, at = np.random.default_rng(seed), conditions() if rows is None else rows
     U, beta, r, delta, n = at.T
-    read = forces(p, U, beta, r, delta + rudder_zero, n)
+    read = forces(p, U, beta, r, delta + rudder_zero, n, y=y)
     J = np.linspace(0, 0.9, 19)
     K_T = p["k_0"] + p["k_1"] * J + p["k_2"] * J**2 + noise * NOISE["K"] * random.standard_normal(len(J))
     with (folder / "runs.csv").open("w", newline="") as file:
         table = csv.writer(file)
-        table.writerow(["U", "beta", "r", "delta", "rps", "X", "Y", "N", "T", "F"])
-        measured = [read[key] + noise * NOISE[key] * random.standard_normal(len(U)) for key in "XYNTF"]
+        keys = ["X", "Y", "N", "T", "F", *(["TL", "FL"] if y else [])]
+        table.writerow(["U", "beta", "r", "delta", "rps", *keys])
+        measured = [read[key] + noise * NOISE[key[0]] * random.standard_normal(len(U)) for key in keys]
         table.writerows(np.column_stack([U, np.degrees(beta), r, np.degrees(delta), n, *measured]).tolist())
     with (folder / "water.csv").open("w", newline="") as file:
         csv.writer(file).writerows([("J", "K_T"), *zip(J.tolist(), K_T.tolist(), strict=True)])
@@ -117,10 +134,12 @@ file = "water.csv"
 {"K_Q_factor = 0.1" if torque else ""}
 [propeller]
 x_P = {X_P}
+{f"number = 2{chr(10)}y_P = {y}" if y else ""}
 [rudder]
 height_m = {H_R}
 f_alpha = {F_ALPHA}
 x_R = {X_R}
+{f"y_R = {y}" if y else ""}
 [averages]
 file = "runs.csv"
 scaling = "dimensional"
@@ -136,6 +155,7 @@ N = "N"
 thrust = "T"
 rudder_normal_force = "F"
 {'torque = "Q"' if torque else ""}
+{f'thrust_left = "TL"{chr(10)}rudder_normal_force_left = "FL"' if y else ""}
 """)
     return path
 

@@ -325,3 +325,50 @@ def test_blockage_of_the_tank_is_named_until_it_is_stated(tmp_path) -> None:
     assert any("Schuster" in notice and f"{100 * raised:.2g} %" in notice for notice in t2s.reduce_to_mmg(path).notices)
     path.write_text(STATED + path.read_text())
     assert not any("Schuster" in notice for notice in t2s.reduce_to_mmg(path).notices)
+
+
+def test_two_propellers_and_rudders_give_the_coefficients_of_both_sides(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5, y=0.05))
+    for name, value in truth.items():
+        assert result.coefficients[name].value == pytest.approx(value, rel=2e-3, abs=2e-4), name
+    assert result.card.propeller.number == result.card.rudder.number == 2
+    assert result.card.propeller.y_P == result.card.rudder.y_R == 0.05
+    assert set(result.content()["readings"]) == {"X", "Y", "N", "T", "F_N", "T_left", "F_N_left"}
+
+
+@pytest.mark.slow
+def test_standard_errors_of_two_propellers_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
+    inside = []
+    for seed in range(SEEDS):
+        truth = another_ship(tmp_path, 9900 + seed)
+        found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed, y=0.05)).coefficients
+        inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("y_P = 0.05", "", "propeller.y_P"),
+        ("y_R = 0.05", "", "rudder.y_R"),
+        ('thrust_left = "TL"', "", "averages.columns.thrust_left"),
+        ('rudder_normal_force_left = "FL"', "", "averages.columns.rudder_normal_force_left"),
+        ('rudder_normal_force_left = "FL"', 'rudder_normal_force_left = "FL"\ntorque = "T"', "averages.columns.torque"),
+    ],
+)
+def test_two_propellers_without_what_the_method_needs_are_refused(tmp_path, old, new, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2, y=0.05)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError, match=words):
+        t2s.reduce_to_mmg(path)
+
+
+def test_sides_that_are_exchanged_do_not_pass_for_the_ship(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2, y=0.05)
+    right = t2s.reduce_to_mmg(path)
+    text = path.read_text().replace('thrust = "T"', 'thrust = "TL"').replace('thrust_left = "TL"', 'thrust_left = "T"')
+    path.write_text(text)
+    exchanged = t2s.reduce_to_mmg(path)
+    assert exchanged.unexplained[3] > 3 * right.unexplained[3]

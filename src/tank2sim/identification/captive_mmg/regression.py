@@ -76,7 +76,16 @@ OFFSETS = ("Y0", "N0", "rudder_offset")
 """Of a model that is not alike to both sides: force and moment straight ahead, and the angle of no rudder force."""
 KEPT_FROM = 3.0
 """Standard errors from which an offset is kept. Project choice: by chance in three of a thousand."""
-_QUANTITIES = ("force.X", "force.Y", "force.N", "propeller.thrust", "rudder.normal_force")
+_QUANTITIES = {
+    "X": "force.X",
+    "Y": "force.Y",
+    "N": "force.N",
+    "T": "propeller.thrust",
+    "F_N": "rudder.normal_force",
+    "T_left": "propeller.thrust_left",
+    "F_N_left": "rudder.normal_force_left",
+}
+"""Channel to the quantity of the model that it reads; with two sides that of the right ends in ``_right``."""
 _MOTION = ("motion.u", "motion.v", "motion.r", "rudder.angle", "propeller.speed")
 _START_X0 = -0.02
 """X_0' (prime II) with which the regression starts: the KVLCC2 has -0.022."""
@@ -235,7 +244,7 @@ def _open_water(tests: SteadyTests) -> Array:
     return open_water_fit(J, K_T, str(tests.path)).coefficients
 
 
-def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Function:
+def computed_readings(model: Model, names: Sequence[str], units: Array, channels: Sequence[str]) -> ca.Function:
     """The readings and their slopes: (motion (5,), theta (k,)) to (readings (c,), slopes (c, k)).
 
     The torque is among the c channels if its coefficients are among the names.
@@ -247,6 +256,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Fu
     names : sequence of str, (k,)
     units : array, (k,)
         What one of a coefficient is in the model: L/d of those of the hull.
+    channels : sequence of str, (c,)
     """
     theta, motion = ca.SX.sym("theta", len(names)), ca.SX.sym("motion", len(_MOTION))
     given = {name: motion[i] for i, name in enumerate(_MOTION)}
@@ -261,7 +271,10 @@ def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Fu
     )
     stated = zip(model.parameter_names, model.parameter_values(), strict=True)
     parameters = ca.vertcat(*(given.get(name, value) for name, value in stated))
-    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in (*_QUANTITIES, "propeller.inflow"))))
+    right = "_right" if "T_left" in channels else ""
+    read = [_QUANTITIES[channel] for channel in channels if channel != TORQUE]
+    read = [name + right * (name in (_QUANTITIES["T"], _QUANTITIES["F_N"])) for name in read]
+    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in (*read, f"propeller.inflow{right}"))))
     found = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
     forces = found[:-1]
     if "eta_R" in names:
@@ -332,7 +345,7 @@ class _Regression:
         assert form.model.draught_m is not None
         ratio = form.model.draught_m / form.model.length_m
         units = np.array([ratio if _variable(name).startswith("derivatives") else 1.0 for name in self.names])
-        return computed_readings(self.model, self.names, units).map(len(self.tests.names))
+        return computed_readings(self.model, self.names, units, self.tests.channels).map(len(self.tests.names))
 
     def misfit(self, theta: Array) -> Array:
         """Measured less computed, (equations,), N, N m and K_T."""

@@ -19,6 +19,8 @@ from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
+LEFT = ("T_left", "F_N_left")
+"""Thrust and normal force on the left side of a ship with two propellers and rudders; T and F_N are of the right."""
 TORQUE = "Q"
 """The channel of the propeller's torque (N m), which comes after the others if it was measured."""
 _K_Q_OVER_K_T = (0.03, 0.3)
@@ -40,7 +42,7 @@ class SteadyTests:
         File of each condition, and line in a table of averages.
     motion : array, (conditions, 5)
         u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
-    readings : array, (conditions, 5 or 6)
+    readings : array, (conditions, 5 to 7)
         :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
     open_water : array, (points, 2 or 3)
         J, K_T, and K_Q if the torque was measured.
@@ -58,8 +60,9 @@ class SteadyTests:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """:data:`CHANNELS`, and :data:`TORQUE` if it was measured."""
-        return (*CHANNELS, TORQUE)[: self.readings.shape[1]]
+        """:data:`CHANNELS`, and :data:`LEFT` of two sides, or :data:`TORQUE` if it was measured."""
+        others = LEFT if self.form.propeller.number == 2 else (TORQUE,)
+        return (*CHANNELS, *others)[: self.readings.shape[1]]
 
     @property
     def speed_mps(self) -> Array:
@@ -131,6 +134,8 @@ def _refuse_missing(form: CampaignFile, path: Path) -> None:
         "model.propeller_diameter_m": (form.model.propeller_diameter_m, "add it"),
         "model.rudder_area_m2": (form.model.rudder_area_m2, "add the area of the rudder"),
     }
+    if form.propeller.number == 2:
+        needed |= _needed_of_two(form, path)
     for place, (value, remedy) in needed.items():
         if value is None:
             raise InputError(path, place, "is missing, and the MMG method needs it", remedy)
@@ -138,6 +143,25 @@ def _refuse_missing(form: CampaignFile, path: Path) -> None:
     if (form.rudder.aspect_ratio is None) == (form.rudder.f_alpha is None):
         given = "both are given" if form.rudder.f_alpha else "neither is given"
         raise InputError(path, "rudder.f_alpha", f"and aspect_ratio: {given}", "give one of the two")
+
+
+def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, str]]:
+    """What two propellers and rudders need: place to what is given there and a remedy."""
+    if form.averages is None:
+        raise InputError(path, "propeller.number", "is 2, and there are [[runs]]", "give their means in [averages]")
+    columns = form.averages.columns
+    if columns.torque is not None:
+        remedy = "leave the column out"
+        raise InputError(path, "averages.columns.torque", "is of one of two propellers", remedy)
+    return {
+        "propeller.y_P": (form.propeller.y_P, "give the place of the right propeller over L"),
+        "rudder.y_R": (form.rudder and form.rudder.y_R, "give the place of the right rudder over L"),
+        "averages.columns.thrust_left": (columns.thrust_left, "thrust is that of the right one: name both columns"),
+        "averages.columns.rudder_normal_force_left": (
+            columns.rudder_normal_force_left,
+            "rudder_normal_force is that of the right one: name both columns",
+        ),
+    }
 
 
 def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[str]]:
@@ -211,8 +235,11 @@ def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
         u, v, r, _, _ = _motion(condition)
         forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)
     assert condition.thrust_N is not None and condition.rudder_normal_force_N is not None
-    torque = () if condition.torque_Nm is None else (condition.torque_Nm,)
-    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N, *torque
+    others: tuple[float, ...] = () if condition.torque_Nm is None else (condition.torque_Nm,)
+    if form.propeller.number == 2:
+        assert condition.thrust_left_N is not None and condition.rudder_normal_force_left_N is not None
+        others = condition.thrust_left_N, condition.rudder_normal_force_left_N
+    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N, *others
 
 
 def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:

@@ -16,6 +16,8 @@ _CHANNELS = {
     "N": "yaw moment",
     "T": "thrust",
     "F_N": "normal force of the rudder",
+    "T_left": "thrust of the left propeller",
+    "F_N_left": "normal force of the left rudder",
     "Q": "torque of the propeller",
 }
 
