@@ -1,6 +1,6 @@
 """The MMG method's coefficients from captive tests: coverage on made-up tanks, and HMRI's KVLCC2 against the paper's.
 
-The tanks are without and with torque of the propeller, and with errors common to all tests, stated in the campaign.
+The tanks are without and with torque, with two propellers, and with errors common to all tests, stated in the campaign.
 
 python benchmarks/mmg_from_tank.py [--seeds 100]
 """
@@ -45,8 +45,12 @@ def main() -> None:
         print(f"  fewest {worst}, {100 * np.mean(inside[worst]):.0f} %")
         for key in ("w_P0", "t_P", "t_R", "a_H", "x_H", "eps", "kappa", "l_R", "gamma_R_plus", "gamma_R_minus"):
             print(f"  {key}: standard error {np.median(sizes[key]):.2g} in the median")
-        for words, options in (("with torque", {"torque": True}), ("with stated common errors", {"common": True})):
-            more, _ = _coverage(Path(name), seeds, **options)
+        for words, made in (
+            ("with torque", {"torque": True}),
+            ("two propellers and rudders", {"y": 0.05}),
+            ("with stated common errors", {"common": True}),
+        ):
+            more, _ = _coverage(Path(name), seeds, **made)
             print(f"{words}: {100 * np.mean([found for every in more.values() for found in every]):.1f} %")
         if not (DATA / "data").is_dir():
             print(f"HMRI: measured data are missing, no folder {DATA / 'data'} (set TANK2SIM_DATA)")
@@ -61,7 +65,7 @@ def main() -> None:
 
 
 def _coverage(
-    folder: Path, seeds: int, *, torque: bool = False, common: bool = False
+    folder: Path, seeds: int, *, torque: bool = False, y: float = 0.0, common: bool = False
 ) -> tuple[dict[str, list[bool]], dict[str, list[float]]]:
     """Whether 95 % intervals of what was measured have the truth, and standard errors, by coefficient."""
     inside: dict[str, list[bool]] = {}
@@ -69,7 +73,7 @@ def _coverage(
     masses = estimated_masses(read_steady_tests(write_campaign(folder, KVLCC2)))
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         truth = ship_like_the_kvlcc2(seed, masses) | (TORQUE if torque else {})
-        path = write_campaign(folder, truth, seed, torque=torque)
+        path = write_campaign(folder, truth, seed, torque=torque, y=y)
         found = t2s.reduce_to_mmg(with_common_errors(path, seed) if common else path).coefficients
         for key, value in truth.items():
             inside.setdefault(key, []).append(abs(found[key].value - value) < 1.96 * found[key].standard_error)
