@@ -183,8 +183,11 @@ def hmri_campaign(data: Path, folder: Path) -> Path:
     return folder / "campaign.toml"
 
 
-def as_runs(folder: Path, seed: int = 0, *, readings: int = 40) -> Path:
-    """The campaign of :func:`write_campaign` in `folder` with a file for each condition, of noisy readings about it."""
+def as_runs(folder: Path, seed: int = 0, *, readings: int = 40, on_model: bool = False) -> Path:
+    """The campaign of :func:`write_campaign` in `folder` with a file for each condition, of noisy readings about it.
+
+    `on_model` records the forces of the mechanism on the model.
+    """
     random = np.random.default_rng([seed, 9])
     sheet = (folder / "campaign.toml").read_text().partition("[averages]")[0]
     with (folder / "runs.csv").open() as file:
@@ -204,9 +207,11 @@ def as_runs(folder: Path, seed: int = 0, *, readings: int = 40) -> Path:
         }
         for key, name in names.items():
             noise = random.standard_normal(readings)
-            columns[name] = row[key] + 3 * NOISE[key] * (noise - noise.mean())
+            sign = -1 if on_model and key in "XYN" else 1
+            columns[name] = sign * row[key] + 3 * NOISE[key] * (noise - noise.mean())
         with (folder / f"{place}.csv").open("w", newline="") as file:
             csv.writer(file).writerows([list(columns), *np.column_stack(list(columns.values())).tolist()])
+    sheet = sheet.replace('"on_gauge"', '"on_model"') if on_model else sheet
     (folder / "campaign.toml").write_text(sheet)
     return folder / "campaign.toml"
 

@@ -199,10 +199,11 @@ def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> No
     assert found["Nv"].value == pytest.approx(-0.137, rel=0.1)
 
 
-def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path) -> None:
+@pytest.mark.parametrize("on_model", [False, True])
+def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path, on_model) -> None:
     path = write_campaign(tmp_path, KVLCC2, seed=4)
     by_rows = fit_mmg(read_steady_tests(path))
-    by_runs = fit_mmg(read_steady_tests(as_runs(tmp_path)))
+    by_runs = fit_mmg(read_steady_tests(as_runs(tmp_path, on_model=on_model)))
     assert by_runs.names == by_rows.names
     np.testing.assert_allclose(by_runs.values, by_rows.values, rtol=1e-3, atol=1e-5)
     np.testing.assert_allclose(by_runs.errors, by_rows.errors, rtol=1e-2)
