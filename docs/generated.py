@@ -29,6 +29,7 @@ from tank2sim.api.schemas import KEYS, json_schema
 from tank2sim.cards import form, read_card
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as program
+from tank2sim.design import tank_form
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
 from tank2sim.dynamics.external_forces import with_external_forces
@@ -205,7 +206,9 @@ def schemas() -> str:
 
 def keys(name: str) -> str:
     """The keys of a section of a card or campaign, with the default where the file gives none."""
-    section: type[BaseModel] = getattr(form, name, None) or getattr(campaign_form, name)
+    section: type[BaseModel] = next(
+        vars(module)[name] for module in (form, campaign_form, tank_form) if name in vars(module)
+    )
     lines = ["| key | where the file gives none |", "|---|---|"]
     for key, field in section.model_fields.items():
         absent = "required" if field.is_required() else _absent(field.default)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tank2sim.api.convention import ConventionResult, convention
     from tank2sim.api.conversion import ConversionResult, convert
     from tank2sim.api.demo import DemoResult, run_demo
+    from tank2sim.api.design import CampaignDesignResult, TrialDesignResult, design_campaign, design_trial
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
     from tank2sim.api.gap import GapResult, find_gap
     from tank2sim.api.glide import GlideResult
@@ -47,6 +48,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "AuditResult": "api.audit",
     "AutopilotResult": "api.autopilot",
+    "CampaignDesignResult": "api.design",
     "CaptiveRunResult": "api.captive_run",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
@@ -76,6 +78,7 @@ _HOMES = {
     "SteeringModelsResult": "api.steering_models",
     "SteeringPageResult": "api.steering_page",
     "TowResult": "api.tow",
+    "TrialDesignResult": "api.design",
     "TrialRecord": "api.trial",
     "TuningResult": "api.influence",
     "TurnTuningResult": "api.turn_tuning",
@@ -86,6 +89,8 @@ _HOMES = {
     "compare": "api.comparison",
     "convention": "api.convention",
     "convert": "api.conversion",
+    "design_campaign": "api.design",
+    "design_trial": "api.design",
     "find_gap": "api.gap",
     "guess": "api.guess",
     "identify": "api.identification",
@@ -110,6 +115,7 @@ _HOMES = {
 __all__ = [
     "AuditResult",
     "AutopilotResult",
+    "CampaignDesignResult",
     "CaptiveRunResult",
     "CheckResult",
     "ComparisonResult",
@@ -139,6 +145,7 @@ __all__ = [
     "SteeringModelsResult",
     "SteeringPageResult",
     "TowResult",
+    "TrialDesignResult",
     "TrialRecord",
     "TuningResult",
     "TurnTuningResult",
@@ -149,6 +156,8 @@ __all__ = [
     "compare",
     "convention",
     "convert",
+    "design_campaign",
+    "design_trial",
     "find_gap",
     "guess",
     "identify",

@@ -10,6 +10,9 @@ EXTRAPOLATED = "EXTRAPOLATED beyond"
 ASSUMED = "ASSUMED standard errors"
 """No standard error is known, and every interval rests on an assumed one."""
 
+LINEARISED = "LINEARISED standard errors"
+"""Predicted errors of a ship whose motion is not linear in its coefficients within their errors."""
+
 FORCED = "FORCED"
 """A refusal was overridden."""
 
@@ -21,6 +24,8 @@ def marked(messages: Iterable[str]) -> list[str]:
     """The messages that contain a mark, each once, in their order."""
     return list(
         dict.fromkeys(
-            text for text in messages if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, FORCED, UNCONFIRMED))
+            text
+            for text in messages
+            if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, LINEARISED, FORCED, UNCONFIRMED))
         )
     )

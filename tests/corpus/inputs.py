@@ -80,6 +80,8 @@ def plain() -> Files:
         "tows.csv": (MODELS / "wilinski-zellman" / "tows.csv").read_bytes(),
         "programme.csv": (MODELS / "kulikovsky-velikanov" / "programme.csv").read_bytes(),
         "orders.csv": b"t_s,delta_order_deg\n0,10\n20,-10\n40,0\n60,0\n",
+        "tank.toml": TANK.encode(),
+        "captive_runs.toml": CAPTIVE_RUNS.encode(),
         "track.csv": b"x_m,y_m\n0,0\n2000,0\n3000,1500\n6000,1500\n",
         "captive.toml": AVERAGES,
         "averages.csv": _csv([], "beta,delta,U,X,Y,N", [
@@ -116,6 +118,54 @@ speed_mps = "U"
 X = "X"
 Y = "Y"
 N = "N"
+"""
+
+
+TANK = """format = "tank2sim-tank/1"
+[carriage]
+length_m = 240.0
+waiting_s = 600.0
+[mechanism]
+sway_amplitude_m = 2.0
+heading_amplitude_deg = 35.0
+drift_deg = 20.0
+cycles = 3
+[gauges]
+Y_range_N = 300.0
+noise_share = 0.005
+zero_share = 0.001
+rate_hz = 20.0
+[model]
+length_m = 4.0
+[tank]
+breadth_m = 10.0
+"""
+
+CAPTIVE_RUNS = """[model]
+name = "model"
+length_m = 4.0
+mass_kg = 240.0
+[test]
+speed_mps = 1.2
+force_convention = "on_gauge"
+[[runs]]
+file = "a.csv"
+type = "static_drift"
+drift_deg = 6.0
+[[runs]]
+file = "b.csv"
+type = "static_rudder"
+rudder_deg = -20.0
+[[runs]]
+file = "c.csv"
+type = "pure_sway"
+frequency_radps = 0.6
+amplitude_m = 0.3
+[[runs]]
+file = "d.csv"
+type = "pure_yaw"
+frequency_radps = 0.6
+yaw_rate_amplitude_degps = 5.0
 """
 
 
@@ -172,6 +222,7 @@ RESULTS: dict[str, list[str]] = {
     "compare.json": ["compare", "card.toml", "tanker.toml", "--members", "0"],
     "validate.json": ["validate", "card.toml", "zigzag.csv", "--members", "0"],
     "influence.json": ["influence", "card.toml", "--figure", "K_per_s"],
+    "design.json": ["design", "card.toml", "--figures", "steady_radius_m@20", "--hours", "3", "--draws", "0"],
     "glide.json": ["glide", "--card", "glider.toml", "--angle-deg", "-30", "--programme", "programme.csv"],
     "autopilot.json": ["autopilot", "card.toml"],
     "signals.json": ["signals", "zigzag.csv"],

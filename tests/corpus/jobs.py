@@ -13,6 +13,7 @@ from tests.corpus.worker import Job
 Recipe = tuple[list[str], list[str]]
 """Arguments, and the files among them that are mutated."""
 
+QUICK = ["--figures", "steady_radius_m@20", "--hours", "3", "--draws", "0"]
 FAST = ["--structure", "linear", "--members", "0", "--method"]
 
 RECIPES: dict[str, list[Recipe]] = {
@@ -72,6 +73,11 @@ RECIPES: dict[str, list[Recipe]] = {
         (["card.toml", "--figure", "steady_radius_m@20"], ["card.toml"]),
         (["steering.toml", "--json", "out.json"], ["steering.toml"]),
     ],
+    "design": [
+        (["card.toml", *QUICK, "--json", "out.json", "-o", "out.csv"], ["card.toml"]),
+        (["card.toml", *QUICK, "--tank", "tank.toml", "--campaign", "out.toml"], ["tank.toml"]),
+        (["card.toml", *QUICK, "--usual", "captive_runs.toml"], ["captive_runs.toml"]),
+    ],
     "autopilot": [
         (["card.toml", "--design", "pd", "--json", "out.json"], ["card.toml"]),
         (["card.toml", "--design", "pd", "--track", "track.csv"], ["track.csv"]),
@@ -90,8 +96,8 @@ RECIPES: dict[str, list[Recipe]] = {
 
 SHARES: dict[str, int] = {
     "simulate": 380, "reduce": 340, "tow": 270, "yaw": 150, "audit": 300, "log": 120, "identify": 180, "gap": 25,
-    "signals": 270,
-    "validate": 120, "compare": 60, "influence": 130, "autopilot": 75, "glide": 200, "export": 30, "check": 20,
+    "signals": 250, "design": 60,
+    "validate": 120, "compare": 60, "influence": 110, "autopilot": 75, "glide": 180, "export": 30, "check": 20,
     "stability": 60, "report": 270,
 }  # fmt: skip
 """Jobs of each command: 3 000 in all, fewer of those that take long."""

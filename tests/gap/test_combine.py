@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.gap.outcome.combine import combine_passes
+from tank2sim.gap import workflow
+from tank2sim.gap.outcome.combine import combine_passes, without_effect
 from tank2sim.gap.result import Named, Passed, Refitted
 from tests.gap.made_up import missing
 
@@ -50,3 +51,39 @@ def test_trials_are_shown_before_the_first_and_after_the_second_search(passes) -
         assert combined.misfit("before", held_out=held_out) == first.misfit("before", held_out=held_out)
         assert combined.misfit("after", held_out=held_out) == further.misfit("after", held_out=held_out)
     assert combined.improved is further.improved and combined.card is first.card
+
+
+def test_an_effect_that_others_make_superfluous_is_gone_and_the_others_are_no_surer_than_before(passes) -> None:
+    both = combine_passes(*passes)
+    unsure = replace(both, effects=tuple(replace(effect, confidence=0.8) for effect in both.effects))
+    smaller = replace(passes[1], effects=(replace(DRAG, confidence=0.99),), coefficients=(), notices=())
+    found = without_effect(smaller, unsure, "current")
+    assert [(effect.name, effect.confidence) for effect in found.effects] == [("cross_flow_drag", 0.8)]
+    assert found.improved is smaller.improved and found.passed is smaller.passed
+    assert found.rivals is both.rivals and found.could_hide is both.could_hide
+    assert len(found.notices) == 1
+
+
+@pytest.mark.parametrize(("further_off", "dropped"), [(1.0, True), (1.5, False)])
+def test_a_smaller_set_takes_the_place_only_where_it_follows_the_trials_as_closely(
+    passes, monkeypatch: pytest.MonkeyPatch, further_off: float, dropped: bool
+) -> None:
+    both = combine_passes(*passes)
+
+    def away(passed: Passed) -> Passed:
+        after = {
+            name: passed.measured[name] + further_off * (passed.after[name] - passed.measured[name])
+            for name in passed.after
+        }
+        return replace(passed, after=after)
+
+    asked = []
+
+    def search_again(card, trials, options, progress, pool):
+        asked.append(options.effects)
+        return replace(passes[1], effects=(DRAG,), passed=tuple(map(away, both.passed))), trials
+
+    monkeypatch.setattr(workflow, "_search_once", search_again)
+    found = workflow._smaller(both.card, (), (passes[0], both), workflow.GapOptions(), None)
+    assert asked == [("cross_flow_drag",)]
+    assert (found is not None) == dropped

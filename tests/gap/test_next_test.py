@@ -11,7 +11,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.reading import linear_card
 from tank2sim.dynamics import build
-from tank2sim.gap.outcome.next_test import Explanation, _Prediction, _unabsorbed, next_test
+from tank2sim.gap.outcome.next_test import Explanation, WindowPrediction, _unabsorbed, next_test
 from tank2sim.gap.outcome.next_test_candidates import candidate_manoeuvres, orders_csv
 from tank2sim.gap.result import NextTest
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
@@ -164,9 +164,9 @@ def test_what_is_left_is_that_of_the_plain_formula() -> None:
     A[:30, 4:7], A[30:, 7:] = S[0, 0], S[0, 1]
     flat = d.ravel()
     expected = flat @ (np.eye(60) - A @ np.linalg.inv(A.T @ A + np.eye(10)) @ A.T) @ flat
-    assert _unabsorbed(d, _Prediction(d, J, S))[0] == pytest.approx(expected)
+    assert _unabsorbed(d, WindowPrediction(d, J, S))[0] == pytest.approx(expected)
     d[0, 1, 3] = np.nan
-    assert np.isnan(_unabsorbed(d, _Prediction(d, J, S))[0])
+    assert np.isnan(_unabsorbed(d, WindowPrediction(d, J, S))[0])
 
 
 def test_the_straight_run_on_two_headings_turns_after_a_third_of_its_length(mariner_card: ManoeuvringCard) -> None:

@@ -26,6 +26,7 @@ from tank2sim.plugins import PluginWarning
 
 GROUPS = {
     "Measure": {
+        "design": "the next captive campaign or sea trial, for the certainty of chosen figures",
         "log": "a vessel's own log, cut into trials",
         "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
         "reduce": "captive tests to derivatives",

@@ -26,14 +26,14 @@ from tank2sim.gap.diagnosis.residuals import (
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
-from tank2sim.gap.outcome.combine import combine_passes
+from tank2sim.gap.outcome.combine import combine_passes, without_effect
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.refit import refit_coefficients
 from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
-from tank2sim.gap.proof.replay import Replays
+from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import (
     AMBIGUOUS,
     COEFFICIENTS,
@@ -169,7 +169,9 @@ def run_gap_workflow(
             further, found_trials = _search_once(gap.improved, trials, more, progress, pool)
             if not _adds(gap, further, 1 - options.false_discovery):
                 break
-            gap, trials = combine_passes(gap, further), found_trials
+            both = combine_passes(gap, further)
+            smaller = _smaller(card, (fitted, held), (gap, both), options, pool)
+            gap, trials = smaller or (both, found_trials)
         return replace(gap, notices=(*lowered_bound_notice(given, card), *gap.notices))
 
 
@@ -201,7 +203,7 @@ def _search_once(
     found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
     decision = decide(found, options.false_discovery)
     progress("proving")
-    replays = Replays({name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, pool)
+    replays = TrialReplays({name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, pool)
     judged = _judge_by_simulation(card, trials, found, decision, replays, options.false_discovery)
     progress("where and how much")
     return _assemble_gap(card, trials, found, judged, replays.noise)
@@ -223,6 +225,38 @@ def _adds(gap: Gap, further: Gap, likely: float) -> bool:
         return False
     before, after = (_misfit_of(result.passed, "after", held_out=False) for result in (gap, further))
     return min(effect.confidence for effect in further.effects) >= likely and after < (1 - BETTER) * before
+
+
+def _smaller(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    passes: tuple[Gap, Gap],
+    options: GapOptions,
+    pool: Executor | None,
+) -> tuple[Gap, tuple[Measured, Measured]] | None:
+    """The result without an effect of the first search that those of the second make superfluous; None without one.
+
+    The first search saw the best one or two effects where others were missing too, and one may have stood in for
+    another. The others, fitted together to the card as given, must then follow the fitted trials as closely as all.
+
+    Parameters
+    ----------
+    card, trials
+        As given.
+    passes : tuple of Gap
+        Of the first search, and of both together.
+    """
+    first, both = passes
+    reached = _misfit_of(both.passed, "after", held_out=False)
+    for dropped in first.effects:
+        others = tuple(effect.name for effect in both.effects if effect.name != dropped.name)
+        if len(others) > options.max_effects:
+            continue
+        again, found_trials = _search_once(card, trials, replace(options, effects=others), lambda text: None, pool)
+        same = again.verdict == MISSING and {effect.name for effect in again.effects} == set(others)
+        if same and _misfit_of(again.passed, "after", held_out=False) <= (1 + BETTER) * reached:
+            return without_effect(again, both, dropped.name), found_trials
+    return None
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
@@ -318,7 +352,7 @@ def _judge_by_simulation(
     trials: tuple[Measured, Measured],
     found: Search,
     decision: Decision,
-    replays: Replays,
+    replays: TrialReplays,
     share: float,
 ) -> _Judged:
     """The decision after free-running simulations with what it names.
@@ -395,7 +429,7 @@ def _prove(
     card: ManoeuvringCard,
     given: tuple[Measured, Measured],
     named: _NamedEffects,
-    replays: Replays,
+    replays: TrialReplays,
     found: Search,
     best: ExplanationFit,
 ) -> _Proof:
@@ -424,7 +458,9 @@ def _prove(
     return proof
 
 
-def _with_black_box(card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], replays: Replays) -> list[Passed]:
+def _with_black_box(
+    card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], replays: TrialReplays
+) -> list[Passed]:
     """The replays of a proof, and by a black box with as many coefficients as the named effects have parameters."""
     box = black_box(card, proof.trials[0], replays.noise, max(sum(len(errors) for *_, errors in estimated), 1))
     boxed: list[Passed] = []
@@ -450,7 +486,7 @@ def _replay_all(
     improved: ManoeuvringCard,
     trials: tuple[Measured, Measured],
     sensors: Sequence[Found],
-    replays: Replays,
+    replays: TrialReplays,
 ) -> list[Passed]:
     """All trials replayed by both cards."""
     results: list[Passed] = []

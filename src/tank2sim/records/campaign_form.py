@@ -376,10 +376,10 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
     spelt: dict[str, str] = {}
     for section in ("model", "test", "tank", "uncertainty", "full_scale"):
         if isinstance(content.get(section), dict):
-            content[section] = _in_si(content[section], section, source, spelt)
+            content[section] = section_in_si(content[section], section, source, spelt)
     if isinstance(content.get("runs"), list):
         content["runs"] = tuple(
-            _in_si(run, f"runs.{number}", source, spelt) if isinstance(run, dict) else run
+            section_in_si(run, f"runs.{number}", source, spelt) if isinstance(run, dict) else run
             for number, run in enumerate(content["runs"])
         )
     factors: dict[str, float] = {}
@@ -396,7 +396,14 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
         raise form_fault(error, source, spelt, form=CampaignFile, what="a campaign") from None
 
 
-def _in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:
+def section_in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:
+    """A section of parsed TOML with its numbers, and their keys, in SI; `spelt` gets the file's key of each place.
+
+    Raises
+    ------
+    InputError
+        A key is given twice in two units.
+    """
     converted: dict[str, Any] = {}
     for key, value in section.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)

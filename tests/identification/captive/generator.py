@@ -64,6 +64,8 @@ class Campaign:
         Standard deviation of the gauges' relative gain from run to run, each force by itself.
     force_delay_s : float
         By how much the forces lag the motion in the record.
+    noise_seed : int
+        Of the disturbances, next to `seed`: other noise on the same ship.
     faults : mapping
         Name of a run to what is wrong with it: see :data:`FAULTS`.
     """
@@ -86,6 +88,7 @@ class Campaign:
     periods: float = 6.0
     gain_error: float = 0.0
     force_delay_s: float = 0.0
+    noise_seed: int = 0
     faults: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -109,7 +112,8 @@ class Ship:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: type, drift and rudder (rad), and the oscillation as it truly is."""
+    """One run: type, drift and rudder (rad), the oscillation as it truly is, and the length of its record (s; 0: as
+    the campaign says)."""
 
     name: str
     kind: str
@@ -117,6 +121,7 @@ class Run:
     rudder: float = 0.0
     frequency: float = 0.0
     amplitude: float = 0.0
+    duration: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -229,7 +234,7 @@ def motion(campaign: Campaign, model: Ship, run: Run, rng: np.random.Generator, 
     course)."""
     w = run.frequency
     periods = campaign.periods + (rng.uniform(0.0, 0.9) if campaign.part_periods else 0.0)
-    duration = periods * 2 * math.pi / w if w else 12.0
+    duration = run.duration or (periods * 2 * math.pi / w if w else 12.0)
     t = np.arange(round(duration * campaign.rate_hz)) / campaign.rate_hz - before_s
     phase = w * t + (rng.uniform(0, 2 * math.pi) if campaign.part_periods else 0.0)
     cos, sin, zero = np.cos(phase), np.sin(phase), np.zeros_like(t)
@@ -350,13 +355,13 @@ FAULTS = {"saturated": _saturated, "step": _step, "degrees": _in_degrees}
 """Faults of the readings; next to them ``short`` (0.7 periods), ``wrong type`` and ``missing``."""
 
 
-def write(campaign: Campaign, folder: Path) -> Written:
-    """Write the campaign to a folder (made if need be)."""
+def write(campaign: Campaign, folder: Path, planned: list[Run] | None = None) -> Written:
+    """Write the campaign to a folder (made if need be); its runs, or those of another plan."""
     folder.mkdir(parents=True, exist_ok=True)
     model = ship(campaign)
-    runs = plan(campaign, model)
-    sheet = plan(replace(campaign, sheet_error=0.0), model)
-    rng = np.random.default_rng([campaign.seed, 3])
+    runs = plan(campaign, model) if planned is None else planned
+    sheet = plan(replace(campaign, sheet_error=0.0), model) if planned is None else planned
+    rng = np.random.default_rng([campaign.seed, 3, campaign.noise_seed] if campaign.noise_seed else [campaign.seed, 3])
     for run in runs:
         fault = campaign.faults.get(run.name, "")
         table = _table(campaign, model, run, rng)
@@ -377,7 +382,8 @@ def _table(campaign: Campaign, model: Ship, run: Run, rng: np.random.Generator) 
     before = motion(campaign, model, run, copy.deepcopy(rng), campaign.force_delay_s)
     m = motion(campaign, model, run, rng)
     number = zlib.crc32(run.name.encode())
-    gains = 1 + campaign.gain_error * np.random.default_rng([campaign.seed, 4, number]).standard_normal((3, 1))
+    draw = np.random.default_rng([campaign.seed, 4, number, *([campaign.noise_seed] if campaign.noise_seed else [])])
+    gains = 1 + campaign.gain_error * draw.standard_normal((3, 1))
     forces = gains * gauge_forces(campaign, model, before) + disturbances(campaign, model, m.t, rng)
     shown_speed = m.speed + 5e-4 * campaign.noise * rng.standard_normal(m.t.size)
     return np.column_stack([m.t, m.y, m.psi, m.v, m.r, shown_speed, m.rudder, *forces])

@@ -50,6 +50,34 @@ def combine_passes(first: Gap, further: Gap) -> Gap:
     )
 
 
+def without_effect(smaller: Gap, both: Gap, dropped: str) -> Gap:
+    """The result of a search for the effects of two searches without one of them, `dropped`.
+
+    Parameters
+    ----------
+    smaller : Gap
+        Of a search for these effects alone: what it says of rivals, and of what could hide, is of `both`, and no effect
+        is surer than there.
+    both : Gap
+        Of both searches together.
+    dropped : str
+        The effect that is superfluous with the others.
+    """
+    sure = {effect.name: effect.confidence for effect in both.effects}
+    names = " and ".join(effect.name for effect in smaller.effects)
+    notice = f"{dropped}: found first, and superfluous with {names}, which follow the trials as closely without it"
+    return replace(
+        smaller,
+        effects=tuple(
+            replace(effect, confidence=min(effect.confidence, sure[effect.name])) for effect in smaller.effects
+        ),
+        rivals=both.rivals,
+        could_hide=both.could_hide,
+        missing_force=both.missing_force,
+        notices=tuple(dict.fromkeys((*smaller.notices, notice))),
+    )
+
+
 def _of_names(first: Gap, further: Gap) -> list[str]:
     names = (" and ".join(effect.name for effect in gap.effects) for gap in (first, further))
     before, after = names

@@ -85,7 +85,7 @@ class Explanation:
 
 
 @dataclass(frozen=True, eq=False)
-class _Prediction:
+class WindowPrediction:
     """Prediction of one explanation for c manoeuvres in w windows each, in noise units.
 
     Parameters
@@ -156,7 +156,7 @@ def next_test(
     )
 
 
-def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[_Ship]:
+def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[SailedShip]:
     """The ship of each explanation, with the available sensors that all models have."""
     models = [driven_model(explanation.card, "order") for explanation in explanations]
     seen = {
@@ -164,7 +164,7 @@ def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], corr
         for name in OBSERVED_SIGNALS.values()
         if name in noise and all(name in model for model in models)
     }
-    return [_Ship(explanation, seen, correlation_s) for explanation in explanations]
+    return [SailedShip(explanation, seen, correlation_s) for explanation in explanations]
 
 
 def _best_and_least(scores: Array) -> tuple[int, int]:
@@ -184,25 +184,30 @@ def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, 
     return {entry.name: (entry.parameters, entry.uncertainty) for entry in reversed(entries)}
 
 
-def _expected_loss(first: _Prediction, second: _Prediction) -> Array:
+def _expected_loss(first: WindowPrediction, second: WindowPrediction) -> Array:
     """Expected loss of the wrong one of two explanations in each manoeuvre (c,); nan where a motion left all bounds."""
     difference = first.readings - second.readings
     return 0.5 * (_unabsorbed(difference, second) + _unabsorbed(difference, first))
 
 
-def _unabsorbed(difference: Array, wrong: _Prediction) -> Array:
+def _unabsorbed(difference: Array, wrong: WindowPrediction) -> Array:
     """Loss by a difference (c, w, m) that the wrong explanation cannot absorb; unknowns have unit prior variance."""
     known = np.isfinite(difference).all(axis=(1, 2)) & np.isfinite(wrong.slopes).all(axis=(1, 2, 3))
     losses = np.full(len(difference), np.nan)
-    S, A = wrong.passing[known], np.concatenate([wrong.slopes, difference[..., None]], axis=3)[known]
-    pull = S.swapaxes(2, 3) @ A
-    inner = S.swapaxes(2, 3) @ S + np.eye(S.shape[3])
-    # Slopes and difference with the unknowns of each window projected out, summed over the windows.
-    G = (A.swapaxes(2, 3) @ A - pull.swapaxes(2, 3) @ np.linalg.solve(inner, pull)).sum(axis=1)
+    columns = np.concatenate([wrong.slopes, difference[..., None]], axis=3)
+    G = _without_passing(wrong.passing[known], columns[known])
     J, mixed = G[:, :-1, :-1] + np.eye(G.shape[1] - 1), G[:, :-1, -1:]
     losses[known] = G[:, -1, -1] - (mixed.swapaxes(1, 2) @ np.linalg.solve(J, mixed))[:, 0, 0]
     positive: Array = np.maximum(losses, 0.0)
     return positive
+
+
+def _without_passing(passing: Array, columns: Array) -> Array:
+    """Products (c, k, k) of columns (c, w, m, k) without the unknowns of each window, summed over the windows."""
+    pull = passing.swapaxes(2, 3) @ columns
+    inner = passing.swapaxes(2, 3) @ passing + np.eye(passing.shape[3])
+    found: Array = (columns.swapaxes(2, 3) @ columns - pull.swapaxes(2, 3) @ np.linalg.solve(inner, pull)).sum(axis=1)
+    return found
 
 
 def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation]) -> list[Candidate]:
@@ -230,8 +235,17 @@ def _why(best: Candidate, names: Sequence[str], each: Array, least: tuple[float,
     return text
 
 
-class _Ship:
-    """An explanation ready to be sailed, many motions side by side."""
+class SailedShip:
+    """An explanation ready to be sailed, many motions side by side.
+
+    Parameters
+    ----------
+    explanation : Explanation
+    seen : mapping
+        Variable (``motion.*``) to the standard deviation of one reading, SI.
+    correlation_s : float
+        Time constant of the readings' errors.
+    """
 
     def __init__(self, explanation: Explanation, seen: Mapping[str, float], correlation_s: float):
         self.card, self.free = explanation.card, explanation.free
@@ -272,7 +286,7 @@ class _Ship:
             x = self._after(x, inputs[:, row], self.p)
         return {name: inputs[:, :, names.index(name)] for name in ordered}, motion
 
-    def predict(self, of: Sequence[Candidate], orders: Mapping[str, Array], motion: Array) -> _Prediction:
+    def predict(self, of: Sequence[Candidate], orders: Mapping[str, Array], motion: Array) -> WindowPrediction:
         """Readings in windows that begin with the motion (c, n, 6) of another explanation, under its orders."""
         c, n, _ = motion.shape
         inputs = np.tile(self.model.input_values(), (c, n, 1))
@@ -293,7 +307,26 @@ class _Ship:
         seen = np.stack(readings, axis=1).reshape(rows, c, w, -1)
         slopes = np.moveaxis((seen[1:] - seen[0]) / shares[1:, None, None, None], 0, -1)
         unknown = self.axes.shape[1]
-        return _Prediction(seen[0], slopes[..., :unknown], slopes[..., unknown:])
+        return WindowPrediction(seen[0], slopes[..., :unknown], slopes[..., unknown:])
+
+    def information(self, of: Sequence[Candidate], length: float) -> tuple[dict[str, Array], Array]:
+        """The helmsmen's orders, and what each manoeuvre of a length (L/u0) shows of the unknowns.
+
+        Returns
+        -------
+        orders : mapping
+            Input to its orders (c, n), each held :attr:`step_s`.
+        information : array (c, k, k)
+            Fisher information about the columns of :attr:`axes`, the unknowns in units of their spread beforehand,
+            with the first state and constant disturbances of every window unknown; nan for a motion that left all
+            bounds.
+        """
+        orders, motion = self.sail(of, length)
+        found = self.predict(of, orders, motion)
+        information = np.full((len(of), self.axes.shape[1], self.axes.shape[1]), np.nan)
+        known = np.isfinite(found.slopes).all(axis=(1, 2, 3))
+        information[known] = _without_passing(found.passing[known], found.slopes[known])
+        return orders, information
 
     def _after(self, x: Array, inputs: Array, p: Array) -> Array:
         """States (rows, nx) a step later."""

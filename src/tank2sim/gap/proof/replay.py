@@ -24,7 +24,7 @@ _LEAST_NOISE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Replays:
+class TrialReplays:
     """How trials are replayed.
 
     Parameters
@@ -115,7 +115,7 @@ def replay_trials(
     InputError
         A trial is too short, or has none of the signals in `noise`.
     """
-    return Replays(noise).by_cards(card, improved, measured, held_out, corrected)
+    return TrialReplays(noise).by_cards(card, improved, measured, held_out, corrected)
 
 
 @dataclass(frozen=True, eq=False)

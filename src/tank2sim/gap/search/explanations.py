@@ -24,9 +24,13 @@ from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import candidate_explanations
 from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
 
-FIRST_SINGLES, FIRST_PAIRS = 4, 2
-SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 4, 3, 3, 2
+FIRST_SINGLES, FIRST_PAIRS = 6, 2
+SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 8, 3, 3, 2
 """Number of proposals of each screen that are fitted (project choice)."""
+
+COMPARABLE = 0.5
+"""Share of the largest gain in the screen from which a single effect is fitted (project choice): a gain is linear in
+the effect, and of a large effect it is wrong by a share of itself."""
 
 WORTH = 5.0
 """Proposals whose gain in the screen is further below 0 are not fitted (project choice)."""
@@ -137,7 +141,8 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
     starts = [best.logs, believed]
     second = Screen(fitting.likelihood, replace(fitting.best(0), logs=best.logs), every)
     singles, pairs = second.singles(), second.pairs() if most > 1 else ()
-    proposed = [single for single in singles[:SINGLES] if single.gain > singles[0].gain - HOPELESS]
+    enough = min(singles[0].gain - HOPELESS, COMPARABLE * singles[0].gain)
+    proposed = [single for single in singles[:SINGLES] if single.gain > enough]
     proposed += [pair for pair in pairs[:PAIRS] if pair.gain > singles[0].gain]
     if len(best.hypothesis.effects) == 1 and most > 1:
         proposed += _on_top_of(fitting, best, every)[:WITH_THE_BEST]

@@ -227,7 +227,9 @@ def _projected_terms(
     known = run.motion.projections
     *of_terms, body = keys
     histories = {
-        key: _history(campaign, run.motion, name) for key, name in zip(of_terms, names, strict=True) if key not in known
+        key: term_history(campaign, run.motion, f"Y{name[1:]}")
+        for key, name in zip(of_terms, names, strict=True)
+        if key not in known
     }
     if (body, force) not in known:
         histories |= {(body, of): history for of, history in rigid_body_force(campaign, run.motion).items()}
@@ -239,21 +241,21 @@ def _projected_terms(
     return found
 
 
-def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
-    """Force of a term of X or Y whose prime value is 1, (rows,), N; of one of N, over L."""
+def term_history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
+    """Force of a term whose prime value is 1, (rows,), N or N m."""
     spelt, _, trend = name.partition(" ")
     term = parse_term(spelt)
     assert term is not None
     model, u0 = campaign.model, campaign.test.speed_mps
     density, length = campaign.test.water_density_kgpm3, model.length_m
     if term.acceleration:
-        scale = Scales(density, length, u0).derivative(replace(term, force="Y"))
+        scale = Scales(density, length, u0).derivative(term)
         history = scale * (motion.vdot_mps2 if term.acceleration == "v" else motion.rdot_radps2)
     else:
         powers = [motion.v_mps] * term.v + [motion.r_radps] * term.r + [motion.delta_rad] * term.d
         if term.u:
             powers += [axial_speed(motion) - u0] * term.u
-        history = np.asarray(Scales(density, length, motion.speed_mps).derivative(replace(term, force="Y")))
+        history = np.asarray(Scales(density, length, motion.speed_mps).derivative(term))
         for factor in powers:
             history = history * factor
         history = history * motion.heel_rad**term.phi

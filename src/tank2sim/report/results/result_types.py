@@ -54,6 +54,12 @@ RESULT_TYPES = (
         "Heading control", "autopilot", ("ship", "design", "gains"), ("design", "margins.at_design.phase_margin_deg")
     ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
+    ResultType(
+        "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)
+    ),
+    ResultType(
+        "Sea trial, designed", "design", ("usual_set", "certainty", "manoeuvres"), ("minutes_for_usual_certainty",)
+    ),
     ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
         "Captive tests to MMG",

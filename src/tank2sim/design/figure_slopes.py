@@ -1,0 +1,181 @@
+"""Slopes of the figures by the coefficients, of the ship of a card and of ships drawn from its errors."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.analysis.influence.figures import FIGURE_KINDS, InfluenceFigure, parse_figure
+from tank2sim.analysis.influence.study import Study
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.writing import TestedRange
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, joint_errors
+from tank2sim.dynamics.effects.derivatives import hydrodynamic
+from tank2sim.errors import InputError
+from tank2sim.identification.estimates import RELATIVE_ERROR
+from tank2sim.simulation.run import simulate
+
+FIGURES_OPTION = "--figures"
+
+_LEAST_RANGE = TestedRange(np.radians(4.0), np.radians(10.0), 0.2)
+"""Range of the tests where the figures are those of a straight course. Project choice: the smallest angles that gauges
+measure well."""
+
+_UNLISTED = 1e-12
+"""Standard error by which a coefficient that the card lacks is among the parameters of a study; it is not used."""
+
+
+def figure_of_text(text: str) -> InfluenceFigure:
+    """A figure of a command line; units and underlines may be left out: ``advance@35``, ``overshoot_1_deg@10/10``.
+
+    Raises
+    ------
+    InputError
+        The figure does not exist, or its argument is missing or out of bounds.
+    """
+    name, at, argument = text.strip().partition("@")
+    plain = {kind.replace("_", ""): kind for kind in FIGURE_KINDS}
+    spelt = name.replace("_", "").lower()
+    for key in (spelt, f"{spelt}m", f"{spelt}deg"):
+        if name not in FIGURE_KINDS and key in plain:
+            name = plain[key]
+    if name not in FIGURE_KINDS and (close := difflib.get_close_matches(name, FIGURE_KINDS, n=1)):
+        raise InputError(FIGURES_OPTION, text, "is not a figure", f"did you mean {close[0]}?")
+    return parse_figure(f"{name}{at}{argument}", FIGURES_OPTION)
+
+
+@dataclass(frozen=True, eq=False)
+class FigureSlopes:
+    """Figures and their slopes by named coefficients.
+
+    Parameters
+    ----------
+    figures : tuple of InfluenceFigure
+    values : array (m,)
+        Of the card's ship.
+    parameters : tuple of CardParameter
+        k coefficients.
+    at_card : array (m, k)
+        Slopes of the card's ship.
+    drawn : array (draws, m, k)
+        Slopes of ships drawn from the errors, the card's first.
+    errors : JointErrors
+    notices : tuple of str
+    """
+
+    figures: tuple[InfluenceFigure, ...]
+    values: Array
+    parameters: tuple[CardParameter, ...]
+    at_card: Array
+    drawn: Array
+    errors: JointErrors
+    notices: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Short names of the coefficients, (k,)."""
+        return tuple(parameter.short for parameter in self.parameters)
+
+    def of(self, names: Sequence[str], slopes: Array) -> Array:
+        """Columns (..., len(names)) of slopes (..., k): 0 for a coefficient that does not move the figures."""
+        places = {name: place for place, name in enumerate(self.names)}
+        found = np.zeros((*slopes.shape[:-1], len(names)))
+        for column, name in enumerate(names):
+            if name in places:
+                found[..., column] = slopes[..., places[name]]
+        return found
+
+
+def both_sides(figure: InfluenceFigure) -> tuple[InfluenceFigure, ...]:
+    """The figure and that of the manoeuvre to the other side; itself alone on a straight course."""
+    if not figure.angles:
+        return (figure,)
+    return figure, replace(figure, angles=(-figure.angles[0], *figure.angles[1:]))
+
+
+def figure_slopes(
+    card: ManoeuvringCard,
+    figures: Sequence[InfluenceFigure],
+    terms: Sequence[str],
+    *,
+    draws: int,
+    seed: int,
+    one_side: bool,
+) -> FigureSlopes:
+    """Slopes of figures by the derivatives of a card and by `terms` that it lacks.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    figures : sequence of InfluenceFigure
+    terms : sequence of str
+        Derivatives that may become known though the card has none.
+    draws : int
+        Ships drawn from the card's errors; a derivative without a stated one has :data:`.RELATIVE_ERROR`. Ships that do
+        not show all figures are left out.
+    seed : int
+    one_side : bool
+        Figures to the side of the given rudder, in place of the mean over both sides.
+    """
+    stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
+    known = {f"derivatives.{name}" for name in stated} | {f"derivatives.{name}" for name in card.uncertainty}
+    absent = {name: _UNLISTED for name in terms if name not in card.derivatives and name not in card.uncertainty}
+    sides = [(figure,) if one_side else both_sides(figure) for figure in figures]
+    every = [figure for each in sides for figure in each]
+    mean = np.array([[(figure in each) / len(each) for figure in every] for each in sides])
+    study = Study(replace(card, uncertainty={**stated, **absent, **card.uncertainty}), every)
+    errors = joint_errors(study.card, study.parameters)
+    at_card = mean @ study.slopes_at(study.values)[1]
+    if not np.isfinite(at_card).all():
+        bad = figures[int(np.flatnonzero(~np.isfinite(at_card).all(axis=1))[0])]
+        problem = f"{card.ship.name} shows it without a clean event: it has no slopes"
+        raise InputError(FIGURES_OPTION, bad.text, problem, "ask for another figure, or for another rudder")
+    free = np.array([parameter.name in known for parameter in study.parameters])
+    covariance = np.where(np.outer(free, free), errors.covariance, 0.0)
+    rng = np.random.default_rng(seed)
+    found = [at_card]
+    for values in rng.multivariate_normal(study.values, covariance, size=draws, method="eigh"):
+        try:
+            slopes = mean @ study.slopes_at(values)[1]
+        except InputError:
+            continue
+        if np.isfinite(slopes).all():
+            found.append(slopes)
+    return FigureSlopes(
+        tuple(figures), mean @ study.base, study.parameters, at_card, np.stack(found), errors, study.notices
+    )
+
+
+def hydrodynamic_derivatives(card: ManoeuvringCard) -> dict[str, float]:
+    """Derivatives (prime) without the inertia of the ship that a card may have in its terms of yaw."""
+    model = build(card)
+    names = [name.removeprefix("derivatives.") for name in model.parameter_names if name.startswith("derivatives.")]
+    values = ca.Function("values", [model.p], [ca.vcat([hydrodynamic(model, name, card) for name in names])])
+    return dict(zip(names, np.array(values(model.parameter_values())).ravel().tolist(), strict=True))
+
+
+def range_of_figures(card: ManoeuvringCard, figures: Sequence[InfluenceFigure]) -> TestedRange:
+    """Largest drift, rudder and r' of the manoeuvres of the figures, rounded up to 1 deg, 1 deg and 0.05."""
+    model = build(card)
+    length = card.ship.length_m
+    drift, rudder, rate = _LEAST_RANGE
+    for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in figures):
+        if manoeuvre is None:
+            continue
+        run = simulate(model, manoeuvre).trajectory
+        speed = np.maximum(run["motion.speed"], 1e-6)
+        drift = max(drift, float(np.max(np.abs(run["motion.beta"]))))
+        rate = max(rate, float(np.max(np.abs(run["motion.r"]) * length / speed)))
+        rudder = max(rudder, abs(manoeuvre.rudder))
+    degree = np.radians(1.0)
+    return TestedRange(
+        float(np.ceil(drift / degree - 1e-9) * degree),
+        float(np.ceil(rudder / degree - 1e-9) * degree),
+        float(np.ceil(rate / 0.05 - 1e-9) * 0.05),
+    )

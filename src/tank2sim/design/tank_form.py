@@ -1,0 +1,190 @@
+"""The form of a tank's file: what its carriage, its mechanism and its gauges can do.
+
+Angles may be given in degrees; the key is then renamed (``drift_deg`` to ``drift_rad``).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from tank2sim.cards.form import CardSection, Positive
+from tank2sim.cards.form_faults import form_fault
+from tank2sim.cards.reading import faults_of_toml
+from tank2sim.errors import InputError
+from tank2sim.files import read_text
+from tank2sim.records.campaign_form import (
+    Angle,
+    TankSection,
+    TestGravity,
+    TestWaterDensity,
+    section_in_si,
+)
+
+_Share = Annotated[float, Field(ge=0, lt=1)]
+_Seconds = Annotated[float, Field(ge=0, le=1e5)]
+_Speed = Annotated[float, Field(ge=0.01, le=100)]
+_Metres = Annotated[float, Field(gt=0, le=5000)]
+"""Project choice, each far beyond any tank: refuses wrong units."""
+
+
+class CarriageSection(CardSection):
+    """``[carriage]``: the way and the time of a run.
+
+    Parameters
+    ----------
+    length_m
+        Way of the carriage from standstill to standstill.
+    acceleration_mps2
+        Of its start and its stop.
+    settling_lengths
+        Lengths of the model that it sails before the record begins.
+    waiting_s
+        From the end of a run to the next, until the water is calm.
+    return_speed_mps
+        Of the way back, which is part of the waiting time.
+    speed_mps
+        Highest speed.
+    """
+
+    length_m: _Metres = 240.0
+    acceleration_mps2: Annotated[float, Field(ge=1e-3, le=10)] = 0.3
+    settling_lengths: Annotated[float, Field(ge=0, le=100)] = 2.0
+    waiting_s: _Seconds = 600.0
+    return_speed_mps: _Speed = 2.0
+    speed_mps: _Speed | None = None
+
+
+class MechanismSection(CardSection):
+    """``[mechanism]``: the limits of the planar motion mechanism; what is not stated is not limited.
+
+    Parameters
+    ----------
+    sway_amplitude_m
+        Largest sideways amplitude, also of the path of pure yaw.
+    heading_amplitude_rad
+        Largest amplitude of the heading in yaw.
+    drift_rad, rudder_rad
+        Largest angles.
+    lowest_frequency_radps, highest_frequency_radps
+        Of the oscillation.
+    cycles
+        Fewest whole cycles of a record.
+    """
+
+    sway_amplitude_m: Positive | None = None
+    heading_amplitude_rad: Annotated[float, Field(gt=0, lt=3.2)] | None = None
+    drift_rad: Annotated[Angle, Field(gt=0)] | None = None
+    rudder_rad: Annotated[Angle, Field(gt=0)] | None = None
+    lowest_frequency_radps: Positive | None = None
+    highest_frequency_radps: Positive | None = None
+    cycles: Annotated[int, Field(ge=1, le=100)] = 3
+
+
+class GaugesSection(CardSection):
+    """``[gauges]``: ranges and errors (one standard deviation).
+
+    Parameters
+    ----------
+    X_range_N, Y_range_N, N_range_Nm
+        Largest force and moment to either side; without them the largest of the usual matrix, and a quarter more.
+    noise_share
+        Noise of a single reading, over the range.
+    zero_share
+        Zero error that is constant in a run and differs from run to run, over the range.
+    X_noise_N, Y_noise_N, N_noise_Nm, X_zero_N, Y_zero_N, N_zero_Nm
+        The same as forces, in place of the shares.
+    gain_relative
+        Relative error of the gain from run to run.
+    rate_hz
+        Independent readings a second.
+    """
+
+    X_range_N: Positive | None = None
+    Y_range_N: Positive | None = None
+    N_range_Nm: Positive | None = None
+    noise_share: _Share = 0.005
+    zero_share: _Share = 0.001
+    X_noise_N: Positive | None = None
+    Y_noise_N: Positive | None = None
+    N_noise_Nm: Positive | None = None
+    X_zero_N: Positive | None = None
+    Y_zero_N: Positive | None = None
+    N_zero_Nm: Positive | None = None
+    gain_relative: _Share = 0.003
+    rate_hz: Annotated[float, Field(ge=0.01, le=1e5)] = 20.0
+
+
+class TestedModelSection(CardSection):
+    """``[model]``: the ship model.
+
+    Parameters
+    ----------
+    length_m
+        By default 4 m, or that of the ship if it is shorter.
+    speed_mps
+        Test speed; by default that of the card at the same Froude number.
+    """
+
+    length_m: Annotated[float, Field(gt=0.1, le=100)] | None = None
+    speed_mps: _Speed | None = None
+    water_density_kgpm3: TestWaterDensity = 1000.0
+    gravity_mps2: TestGravity = 9.80665
+
+
+class TankFile(CardSection):
+    """The whole of ``tank.toml``."""
+
+    format: Literal["tank2sim-tank/1"] = "tank2sim-tank/1"
+    carriage: CarriageSection = CarriageSection()
+    mechanism: MechanismSection = MechanismSection()
+    gauges: GaugesSection = GaugesSection()
+    model: TestedModelSection = TestedModelSection()
+    tank: TankSection = TankSection()
+
+
+def read_tank(path: Path | str) -> TankFile:
+    """Read a tank's file.
+
+    Raises
+    ------
+    InputError
+        It is missing, not TOML, or has a key that is unknown, given twice, or out of its bounds.
+    """
+    path = Path(path)
+    text = read_text(path)
+    with faults_of_toml(str(path)):
+        content: dict[str, Any] = tomllib.loads(text)
+    spelt: dict[str, str] = {}
+    content = {
+        key: section_in_si(section, key, path, spelt) if isinstance(section, dict) else section
+        for key, section in content.items()
+    }
+    try:
+        return TankFile.model_validate(content)
+    except ValidationError as error:
+        raise form_fault(error, path, spelt, form=TankFile, what="a tank") from None
+
+
+def with_tank_values(tank: TankFile, section: str, **values: float | None) -> TankFile:
+    """The tank with other values in one section; None leaves a value as it is.
+
+    Raises
+    ------
+    InputError
+        A value is out of its bounds.
+    """
+    changed = {key: value for key, value in values.items() if value is not None}
+    if not changed:
+        return tank
+    content = tank.model_dump(exclude_unset=True)
+    content[section] = {**content.get(section, {}), **changed}
+    try:
+        return TankFile.model_validate(content)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        option = "--" + "-".join((section, str(fault["loc"][-1]).rpartition("_")[0]))
+        raise InputError(option, str(fault["input"]), fault["msg"].lower(), "give a number within its bounds") from None

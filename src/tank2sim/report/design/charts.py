@@ -1,0 +1,102 @@
+"""Charts of a designed campaign or trial: where its runs are, and how certain the figures become over the time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import altair as alt
+
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.json_values import Json
+
+_WIDTH = 320
+_HEIGHT = 240
+DESIGN, USUAL = "design", "usual"
+
+
+def run_planes(found: Json) -> list[alt.TopLevelMixin]:
+    """Runs in the plane of drift and rudder, and oscillations in that of frequency and amplitude; areas are numbers of
+    runs."""
+    length, steady, swinging = found["model"]["length_m"], Counter[tuple[float, ...]](), Counter[tuple[object, ...]]()
+    for run in found["runs"]:
+        if run["frequency_radps"] is None:
+            steady[run["drift_deg"], run["rudder_deg"]] += 1
+        elif run["type"] == "pure_sway":
+            ratio = run["sway_amplitude_m"] * run["frequency_radps"] / run["speed_mps"]
+            swinging["pure sway (v')", plain(run["frequency_radps"]), plain(ratio)] += 1
+        else:
+            ratio = run["yaw_rate_amplitude_degps"] * 3.14159265 / 180 * length / run["speed_mps"]
+            kind = f"{run['type'].replace('_', ' ')} (r')"
+            swinging[kind, plain(run["frequency_radps"]), plain(ratio)] += 1
+    planes: list[alt.TopLevelMixin] = []
+    if swinging:
+        rows = [{"run": kind, "x": x, "y": y, "runs": count} for (kind, x, y), count in swinging.items()]
+        title = "Oscillations: amplitude and frequency"
+        planes.append(_plane(rows, title, "frequency (rad/s)", "amplitude of v/U or r L/U"))
+    if steady:
+        rows = [{"run": "steady", "x": x, "y": y, "runs": count} for (x, y), count in steady.items()]
+        planes.append(_plane(rows, "Steady runs: drift and rudder", "drift (deg)", "rudder (deg)"))
+    return planes
+
+
+def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> alt.Chart:
+    kinds = list(dict.fromkeys(str(row["run"]) for row in rows))
+    look = series_look(kinds, as_points=kinds)
+    size = alt.Size(
+        "runs:Q", scale=alt.Scale(range=[40, 500]), legend=alt.Legend(title="runs", tickCount=4, format="d")
+    )
+    return (
+        alt.Chart(data(rows))
+        .mark_point(filled=True, opacity=0.7)
+        .encode(
+            x=alt.X("x:Q", title=across, scale=alt.Scale(zero=False, padding=20)),
+            y=alt.Y("y:Q", title=up, scale=alt.Scale(padding=20)),
+            size=size,
+            color=look.colour,
+            shape=look.shape,
+            tooltip=[
+                alt.Tooltip("run:N", title="type"),
+                alt.Tooltip("x:Q", title=across, format=NUMBER),
+                alt.Tooltip("y:Q", title=up, format=NUMBER),
+                alt.Tooltip("runs:Q", title="runs"),
+            ],
+        )
+        .properties(width=2 * _WIDTH, height=_HEIGHT, title=title, description=f"{title}, by number of runs.")
+    )
+
+
+def certainty_charts(found: Json, across: str, unit: str) -> list[alt.TopLevelMixin]:
+    """Standard error of each figure over the time, by the design and by the usual programme."""
+    curve = found["certainty"]
+    charts: list[alt.TopLevelMixin] = []
+    for figure in curve[DESIGN]:
+        rows = [
+            {"run": kind, "x": plain(x), "y": plain(y)}
+            for kind, times in ((DESIGN, curve[across]), (USUAL, curve[f"usual_{across}"]))
+            for x, y in zip(times, curve[kind][figure], strict=True)
+            if y is not None
+        ]
+        look = series_look([DESIGN, USUAL])
+        base = alt.Chart(data(rows)).encode(
+            x=alt.X("x:Q", title=f"time ({unit})", scale=alt.Scale(zero=False)),
+            y=alt.Y("y:Q", title="standard error", scale=alt.Scale(zero=True)),
+        )
+        lines = base.mark_line().encode(color=look.colour, strokeDash=look.dash)
+        points = base.mark_point(filled=True, size=36).encode(
+            color=look.colour,
+            tooltip=[
+                alt.Tooltip("run:N", title="plan"),
+                alt.Tooltip("x:Q", title=unit, format=NUMBER),
+                alt.Tooltip("y:Q", title="standard error", format=NUMBER),
+            ],
+        )
+        charts.append(
+            alt.layer(lines, points).properties(
+                width=2 * _WIDTH,
+                height=160,
+                title=f"Certainty of {figure}",
+                description=f"Standard error of {figure} over the time, by the design and by the usual programme.",
+            )
+        )
+    return charts

@@ -1,0 +1,75 @@
+"""``tank2sim design`` as a user gives it."""
+
+import csv
+import json
+
+import pytest
+
+from .command_line import refused, tank2sim
+
+FAST = ("--figures", "steady_radius_m@20", "--draws", "0")
+
+
+def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
+    result = tank2sim(
+        *(
+            "design",
+            "esso-osaka",
+            *FAST,
+            "--hours",
+            "4",
+            "--largest",
+            "12/25/0.6",
+            "-o",
+            "plan.csv",
+            "--campaign",
+            "campaign.toml",
+        ),
+        *("--page", "p.html", "--json", "d.json"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "d.json").read_text(encoding="utf-8"))
+    rows = list(csv.DictReader((tmp_path / "plan.csv").open(encoding="utf-8")))
+    assert len(rows) == len(found["runs"]) and found["hours_used"] <= 4
+    assert [float(row["drift_deg"]) for row in rows] == [run["drift_deg"] for run in found["runs"]]
+    assert result.stdout.startswith("ASSUMED")
+    assert "<html" in (tmp_path / "p.html").read_text(encoding="utf-8")
+    assert found["range"] == pytest.approx({"drift_deg": 12.0, "rudder_deg": 25.0, "yaw_rate_prime": 0.6})
+    assert max(abs(run["drift_deg"]) for run in found["runs"]) <= 12.0 + 1e-6
+    again = tank2sim("report", "d.json", "-o", "again.html", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    missing = tank2sim("reduce", "campaign.toml", cwd=tmp_path)
+    refused(missing, "run_001.csv")
+
+
+def test_a_trial_is_written_with_its_orders(tmp_path):
+    result = tank2sim(
+        *("design", "esso-osaka", "--figures", "steady_radius_m@20", "--trial", "--minutes", "8"),
+        *("--sensors", "r_degps=0.02", "psi_deg=0.2", "u_mps=0.02", "-o", "trial.csv", "--orders", "orders"),
+        *("--json", "d.json"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "d.json").read_text(encoding="utf-8"))
+    assert {row["orders"] for row in found["manoeuvres"]} == {path.name for path in (tmp_path / "orders").iterdir()}
+    assert found["sensors"] == {"r_degps": 0.02, "psi_deg": 0.2, "u_mps": 0.02} and found["minutes_used"] <= 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--hours", "0"), ("--hours",)),
+        (("--trial", "--hours", "3"), ("--hours", "campaign")),
+        (("--minutes", "3"), ("--minutes", "trial")),
+        (("--trial", "--sensors", "r_degps=x"), ("--sensors", "r_degps=x")),
+        (("--tank", "none.toml"), ("none.toml",)),
+        (("--largest", "12/35"), ("--largest", "12/35")),
+        (("--largest", "12/35/nan"), ("--largest",)),
+        (("--carriage-length", "nan"), ("--carriage-length",)),
+    ],
+)
+def test_bad_options_are_refused_in_a_line(tmp_path, arguments, words):
+    result = tank2sim("design", "esso-osaka", *FAST, *arguments, "-o", "plan.csv", cwd=tmp_path)
+    refused(result, *words)
+    assert list(tmp_path.iterdir()) == []
