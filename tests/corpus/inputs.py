@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import numpy as np
 
 from tests.corpus.mutations import Files
 from tests.identification.captive.generator import Campaign, write
+from tests.identification.captive.rotating_arm import HEEL, TRUTH, write_arm
+from tests.identification.captive_mmg.tank import KVLCC2, STATED, write_campaign
 from tests.logs.made_logs import candump_lines, frame, nmea_lines
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
@@ -61,7 +64,7 @@ def simman(rows: int = 200) -> bytes:
 def plain() -> Files:
     """Inputs that nothing has to compute."""
     oscillating = np.sin(np.linspace(0, 40, 400))
-    campaign = {f"tank/{name}": data for name, data in _campaign().items()}
+    campaign = {f"tank/{name}": data for name, data in _campaign().items()} | _averages()
     return {
         **campaign,
         "zigzag.csv": trial(20, 150, 20, 1),
@@ -166,9 +169,18 @@ yaw_rate_amplitude_degps = 5.0
 """
 
 
-def _campaign() -> Files:
-    import tempfile
+def _averages() -> Files:
+    """Tables of a rotating arm with heel, and of a tank with thrust, torque and normal force of the rudder."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_arm(Path(folder) / "arm", TRUTH | HEEL)
+        (Path(folder) / "mmg").mkdir()
+        path = write_campaign(Path(folder) / "mmg", KVLCC2, torque=True)
+        path.write_text(STATED + path.read_text())
+        files = [file for part in ("arm", "mmg") for file in sorted((Path(folder) / part).iterdir())]
+        return {f"{file.parent.name}/{file.name}": file.read_bytes() for file in files}
 
+
+def _campaign() -> Files:
     with tempfile.TemporaryDirectory() as folder:
         path = write(Campaign(seed=6, size="linear", rate_hz=2.0), Path(folder)).path
         return {

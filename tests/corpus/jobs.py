@@ -27,6 +27,9 @@ RECIPES: dict[str, list[Recipe]] = {
         (["captive.toml", "-o", "out.toml"], ["captive.toml", "averages.csv"]),
         (["tank/campaign.toml", "-o", "out.toml"], ["tank/campaign.toml", "tank/*.csv"]),
         (["tank/campaign.toml", "--keep-going", "--json", "out.json"], ["tank/*.csv"]),
+        (["arm/campaign.toml", "-o", "out.toml"], ["arm/campaign.toml", "arm/runs.csv"]),
+        (["mmg/campaign.toml", "--model", "mmg", "-o", "out.toml"],
+         ["mmg/campaign.toml", "mmg/runs.csv", "mmg/water.csv"]),
     ],
     "tow": [
         (["tows.csv", "-o", "out.toml"], ["tows.csv"]),
@@ -147,4 +150,7 @@ def _inputs(arguments: list[str]) -> list[str]:
         names.append("averages.csv")
     if "tank/campaign.toml" in names:
         names += [name for name in plain() if name.startswith("tank/") and name.endswith(".csv")]
+    for folder in ("arm", "mmg"):
+        if f"{folder}/campaign.toml" in names:
+            names += [name for name in plain() if name.startswith(f"{folder}/") and name.endswith(".csv")]
     return names

@@ -68,6 +68,28 @@ def test_ordinary_files_with_gaps_are_read_by_the_compiled_reader(write, monkeyp
     np.testing.assert_array_equal(table.columns["a"], [np.nan, -2500])
 
 
+def test_a_file_read_in_blocks_is_the_file_read_at_once(write, monkeypatch):
+    rows = [f"{i * 0.1!r},{i % 7 or ''},{-i}e-3" for i in range(500)]
+    path = write("# force_N: 3\nt_s,a,b\n" + "\n".join(rows))
+    whole = read_table(path)
+    monkeypatch.setattr(csv_table, "_BLOCK", 61)
+    parts = read_table(path)
+    assert len(parts.lines) == 500
+    assert parts.lines[0] == 3
+    assert parts.comments == {"force_N": "3"}
+    for name, values in whole.columns.items():
+        np.testing.assert_array_equal(parts.columns[name], values)
+    np.testing.assert_array_equal(parts.columns["b"], [-i / 1000 for i in range(500)])
+
+
+def test_a_fault_in_a_late_block_is_named_by_its_line(write, monkeypatch):
+    monkeypatch.setattr(csv_table, "_BLOCK", 16)
+    rows = [f"{i},{i}" for i in range(40)]
+    rows[30] = "30,3O"
+    with pytest.raises(InputError, match=r"line 32, column a: '3O' is not a number"):
+        read_table(write("t_s,a\n" + "\n".join(rows) + "\n"))
+
+
 cells = st.one_of(st.none(), st.floats(-1e15, 1e15), st.integers(-(10**9), 10**9))
 
 

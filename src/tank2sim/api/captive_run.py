@@ -354,7 +354,7 @@ def _read(
 def _run_json(run: SingleRun) -> dict[str, object]:
     motion, record = run.reduced.motion, run.reduced.run
     forces = {force: record.force(force)[motion.kept] for force in FORCE_COLUMNS}
-    fits = {force: forces[force] - run.reduced.fits[force].residual for force in FORCE_COLUMNS}
+    fits = {force: run.reduced.fitted(force) for force in FORCE_COLUMNS}
     time = record.time_s[motion.kept]
     unit = {"X": "N", "Y": "N", "N": "Nm"}
     history = {"t_s": time}
@@ -362,7 +362,7 @@ def _run_json(run: SingleRun) -> dict[str, object]:
         history |= {
             f"{force}_{unit[force]}": forces[force],
             f"{force}_fit_{unit[force]}": fits[force],
-            f"{force}_residual_{unit[force]}": run.reduced.fits[force].residual,
+            f"{force}_residual_{unit[force]}": forces[force] - fits[force],
         }
     return {
         "name": record.name,

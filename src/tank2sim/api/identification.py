@@ -309,6 +309,10 @@ def captive_runs(campaign: str | Path) -> CaptiveRuns:
         The campaign is at fault, see :func:`tank2sim.reduce`.
     """
     read = read_campaign(campaign)
+    if heeled := next((run.name for run in read.runs if run.heel_rad), ""):
+        raise InputError(
+            campaign, "runs", f"{heeled} is at a heel", "identify takes captive tests upright: leave it out"
+        )
     return CaptiveRuns(read, reduce_campaign(read, ReductionOptions(off_speed=True)).runs)
 
 

@@ -17,9 +17,10 @@ from tank2sim.cards.card import PROPELLER_COEFFICIENTS
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, mmg_card_text
-from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit, fit_mmg
-from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, read_steady_tests
+from tank2sim.identification.captive_mmg.regression import OF_TORQUE, ORDINARY, MmgFit, fit_mmg
+from tank2sim.identification.captive_mmg.steady_tests import TORQUE, read_steady_tests
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,9 +28,12 @@ if TYPE_CHECKING:
 _UNEXPLAINED = 0.5
 """Share of a channel (rms of what is left over rms of the readings) from which the method is not that of the
 ship, and the result is refused. Project choice: a wrong sign leaves more than 1, HMRI's KVLCC2 at most 0.13."""
+_CURVE_UNEXPLAINED = 0.2
+"""Share of K_Q (rms of what is left over that of the points) from which the open-water curve is not that of the
+propeller behind the model. Project choice: open-water tests scatter by 1 or 2 %, a wrong sign leaves 100 %."""
 _FAR = 3.0
 """Deviations from ordinary ships from which a coefficient is named (project choice)."""
-_UNITS = ("N", "N", "N.m", "N", "N")
+_UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "T_left": "N", "F_N_left": "N", "Q": "N.m"}
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,10 @@ class MmgCoefficient:
     ----------
     value, standard_error : float
         Of the hull by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them.
+    type_a : float
+        Standard error by the scatter of the tests alone.
+    type_b : mapping
+        Key of ``[uncertainty]`` to the standard error by it.
     origin : str
         ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open``: that of ordinary ships.
     """
@@ -47,6 +55,8 @@ class MmgCoefficient:
     value: float
     standard_error: float
     origin: str
+    type_a: float
+    type_b: Mapping[str, float]
 
 
 class MmgReductionResult(PagedResult):
@@ -66,12 +76,23 @@ class MmgReductionResult(PagedResult):
 
     def __init__(self, fit: MmgFit) -> None:
         self.fit = fit
-        for channel, share in zip(CHANNELS, self.unexplained, strict=True):
+        for channel, share in zip(fit.tests.channels, self.unexplained, strict=True):
             if share > _UNEXPLAINED:
                 problem = f"{channel}: the MMG method leaves {100 * share:.0f} % of the readings unexplained"
                 remedy = "check sign, unit and scaling of the column, normal_force_sign and the revolutions"
                 raise InputError(fit.tests.path, "averages.columns", problem, remedy)
+        if TORQUE in fit.tests.channels:
+            self._refuse_other_torque()
         self.notices = self._notices()
+
+    def _refuse_other_torque(self) -> None:
+        """Refuse an open-water K_Q that the torque behind the model contradicts."""
+        tests = self.fit.tests
+        share = float(self.fit.sigmas[-1] / np.sqrt(np.mean(tests.open_water[:, 2] ** 2)))
+        if share > _CURVE_UNEXPLAINED:
+            problem = f"is {100 * share:.0f} % off its curve where the torque behind the model is met"
+            remedy = "check sign and unit of the torque, and that the propeller is the same"
+            raise InputError(tests.path, "open_water.K_Q", problem, remedy)
 
     @cached_property
     def unexplained(self) -> tuple[float, ...]:
@@ -81,17 +102,20 @@ class MmgReductionResult(PagedResult):
 
     @cached_property
     def coefficients(self) -> Mapping[str, MmgCoefficient]:
-        """Coefficients by the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot."""
+        """Coefficients by the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot; with torque, those of K_Q (q_0,
+        q_1, q_2) and the relative rotative efficiency eta_R, too."""
         fit, found = self.fit, {}
-        for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
+        for place, name in enumerate(fit.names):
             if name == "rudder_offset":
                 continue
             key, sign = _card_key(name)
             origin = "estimated" if name in MASS_KEYS else "open" if name in fit.open else "measured"
-            found[key] = MmgCoefficient(sign * float(value), float(error), origin)
+            value, error, random = sign * fit.values[place], fit.errors[place], fit.random[place]
+            common = {source: float(errors[place]) for source, errors in fit.common.items()}
+            found[key] = MmgCoefficient(float(value), float(error), origin, float(random), common)
         for name, (mean, deviation) in ORDINARY.items():
             if name not in found:
-                found[name] = MmgCoefficient(mean, deviation, "open")
+                found[name] = MmgCoefficient(mean, deviation, "open", deviation, {})
         return found
 
     @cached_property
@@ -109,7 +133,7 @@ class MmgReductionResult(PagedResult):
         source = f"{path.resolve().parent.name}/{path.name}"
         note = f"tank2sim reduce --model mmg {source}: {len(fit.tests.names)} steady conditions"
         card = parse_card(mmg_card_text(fit.tests, values, errors, note), "the reduced card")
-        kept = [i for i, name in enumerate(fit.names) if name != "rudder_offset"]
+        kept = [i for i, name in enumerate(fit.names) if name not in ("rudder_offset", *OF_TORQUE)]
         keys = [_card_key(fit.names[i]) for i in kept]
         signs = np.array([sign for _, sign in keys])
         matrix = fit.covariance[np.ix_(kept, kept)] * np.outer(signs, signs)
@@ -125,14 +149,17 @@ class MmgReductionResult(PagedResult):
         """Coefficients by name: value, standard error, origin; hull in prime II."""
         import pandas as pd
 
-        rows = {name: asdict(coefficient) for name, coefficient in self.coefficients.items()}
+        rows = {
+            name: {key: value for key, value in asdict(coefficient).items() if not key.startswith("type")}
+            for name, coefficient in self.coefficients.items()
+        }
         return pd.DataFrame.from_dict(rows, orient="index")
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
         fit = self.fit
         arm, arm_error = fit.yaw_arm()
-        computed = fit.tests.readings - fit.residuals
+        computed, channels = fit.tests.readings - fit.residuals, fit.tests.channels
         offset = fit.names.index("rudder_offset") if "rudder_offset" in fit.names else None
         return {
             "campaign": str(fit.tests.path),
@@ -141,13 +168,13 @@ class MmgReductionResult(PagedResult):
             "yaw_arm": {"value": arm, "standard_error": arm_error},
             "rudder_angle_of_no_force_deg": None if offset is None else -float(np.degrees(fit.values[offset])),
             "channels": {
-                name: {"unit": unit, "standard_deviation": float(deviation), "unexplained": share}
-                for name, unit, deviation, share in zip(CHANNELS, _UNITS, fit.sigmas, self.unexplained, strict=False)
+                name: {"unit": _UNITS[name], "standard_deviation": float(deviation), "unexplained": share}
+                for name, deviation, share in zip(channels, fit.sigmas, self.unexplained, strict=False)
             },
-            "open_water": {"points": len(fit.tests.open_water), "standard_deviation": float(fit.sigmas[-1])},
+            "open_water": {"points": len(fit.tests.open_water), "standard_deviation": float(fit.sigmas[len(channels)])},
             "readings": {
-                name: {"unit": unit, "measured": fit.tests.readings[:, i], "computed": computed[:, i]}
-                for i, (name, unit) in enumerate(zip(CHANNELS, _UNITS, strict=True))
+                name: {"unit": _UNITS[name], "measured": fit.tests.readings[:, i], "computed": computed[:, i]}
+                for i, name in enumerate(channels)
             },
             "conditions": list(fit.tests.names),
             "not_excited": list(fit.not_excited),
@@ -175,8 +202,8 @@ class MmgReductionResult(PagedResult):
         arm, error = self.fit.yaw_arm()
         rows.append(("x_R + a_H x_H", f"{arm:.4g} ± {error:.2g}", "measured"))
         left = [
-            (name, unit, f"{deviation:.3g}", f"{100 * share:.2g}")
-            for name, unit, deviation, share in zip(CHANNELS, _UNITS, self.fit.sigmas, self.unexplained, strict=False)
+            (name, _UNITS[name], f"{deviation:.3g}", f"{100 * share:.2g}")
+            for name, deviation, share in zip(self.fit.tests.channels, self.fit.sigmas, self.unexplained, strict=False)
         ]
         return (
             ResultTable("Coefficients (hull: prime II, by 1/2 rho L d U²)", ("", "value", ""), rows),
@@ -204,8 +231,20 @@ class MmgReductionResult(PagedResult):
                 f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of "
                 "the propeller or the zero of the gear; the card does not have it."
             )
-        if fit.tests.form.uncertainty.model_fields_set:
-            found.append("[uncertainty] of the campaign is not in these standard errors, which are of the scatter.")
+        if not fit.common:
+            found.append(
+                "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to "
+                "all conditions, are in them where [uncertainty] of the campaign states them."
+            )
+        form = fit.tests.form
+        raised = blockage_speed(form.model, form.tank, form.test)
+        if raised and not form.uncertainty.blockage_relative:
+            found.append(
+                f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
+                "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in."
+            )
+        if TORQUE in fit.tests.channels:
+            found.append("eta_R and K_Q (q_0, q_1, q_2) are not on the card: no force on the ship depends on them.")
         found.append("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated.")
         return tuple(found)
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.result import Result, ResultTable
-from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.errors import InputError
@@ -29,6 +28,7 @@ from tank2sim.identification.captive.tables import (
     prediction_rows,
     terms_left_out,
     terms_not_excited,
+    terms_of_heel,
 )
 from tank2sim.identification.captive.uncertainty_budget import uncertainty_budget
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
@@ -36,6 +36,8 @@ from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
 if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
+
+    from tank2sim.api.ship import Ship
 
 
 class ReductionResult(Result):
@@ -63,7 +65,7 @@ class ReductionResult(Result):
         self.reduction, self.contents, self.ratio = reduction, contents, ratio
         self.findings = tuple(implausible(reduction))
         fillings = _fill_notices(contents, fill, ratio, reduction.campaign)
-        self.notices = (*reduction_findings(reduction), *fillings)
+        self.notices = (*reduction_findings(reduction), *fillings, *_heel_notices(reduction))
 
     @cached_property
     def card(self) -> Card:
@@ -79,6 +81,8 @@ class ReductionResult(Result):
     @property
     def ship(self) -> Ship:
         """The ship of the card found."""
+        from tank2sim.api.ship import Ship
+
         return Ship(self.card)
 
     @property
@@ -221,6 +225,16 @@ def _ratio(campaign: Campaign, given: float | str | None) -> float | None:
     if not 1.0 <= ratio < 1e4:
         raise InputError("--scale", "", f"{given} is not a ratio of lengths", "give a number such as 46.4, or 'ship'")
     return ratio
+
+
+def _heel_notices(reduction: Reduction) -> list[str]:
+    names = terms_of_heel(reduction)
+    if not names:
+        return []
+    return [
+        f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with [roll], "
+        "a metacentric height and terms of K takes them."
+    ]
 
 
 def _fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[str]:

@@ -308,6 +308,7 @@ class ReduceKeys(_Keys):
     prediction_errors: dict[str, dict[str, Any]]
     oscillations: list[dict[str, Any]]
     third_order: list[dict[str, Any]]
+    heel_derivatives: dict[str, dict[str, Any]]
     runs: list[dict[str, Any]]
     plots: dict[str, dict[str, Any]]
     not_used: dict[str, Any]
@@ -322,6 +323,8 @@ class MmgCoefficientKeys(_Part):
     value: float
     standard_error: float
     origin: str
+    type_a: float
+    type_b: dict[str, float]
 
 
 class ReduceMmgKeys(_Keys):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 _VELOCITY_TERM = re.compile(r"([XYKN])(0?)((?:phi|[vrpdu])*)")
 _ACCELERATION_TERM = re.compile(r"([XYKN])([uvrp])dot")
@@ -59,6 +60,7 @@ class Term:
         return self.force + zero + odd + "u" * self.u
 
 
+@lru_cache(maxsize=4096)
 def parse_term(name: str) -> Term | None:
     """The term a name denotes, whatever the order of its letters (``Xudd`` is ``Xddu``); None if it is not a name."""
     acceleration = _ACCELERATION_TERM.fullmatch(name)

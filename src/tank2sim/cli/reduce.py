@@ -6,7 +6,6 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.mmg_reduction import reduce_to_mmg
 from tank2sim.api.reduction import reduce
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import page_option, plot_folder_option
@@ -94,12 +93,18 @@ def command(
 def _reduce_to_mmg(
     campaign: Path, output: Path | None, page: Path | None, plots: Path | None, json_file: Path | None
 ) -> None:
+    # Not for the polynomial, which needs no model:
+    from tank2sim.api.mmg_reduction import reduce_to_mmg
+    from tank2sim.identification.captive_mmg.regression import OF_TORQUE
+
     result = reduce_to_mmg(campaign)
     form = result.fit.tests.form
     tables = [section.file for section in (form.averages, form.open_water) if section and section.file]
     files = result.card.files(output) if output else {}
+    tables += [run.file for run in form.runs if form.averages is None]
     inputs = [campaign, *(campaign.parent / table for table in tables)]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)
     if output:
-        screen.print(f"{output}: {len(result.coefficients)} coefficients", soft_wrap=True, markup=False)
+        on_card = [name for name in result.coefficients if name not in OF_TORQUE]
+        screen.print(f"{output}: {len(on_card)} coefficients", soft_wrap=True, markup=False)

@@ -42,6 +42,10 @@ class Condition:
     yaw_rate_radps: float = 0.0
     thrust_N: float | None = None
     rudder_normal_force_N: float | None = None
+    thrust_left_N: float | None = None
+    rudder_normal_force_left_N: float | None = None
+    torque_Nm: float | None = None
+    heel_rad: float = 0.0
 
 
 def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
@@ -141,7 +145,8 @@ def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
 
 def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:
     """Refuse a unit under a heading that is not the one in which the column is read."""
-    forces = {"X": "N", "Y": "N", "N": "Nm", "thrust": "N", "rudder_normal_force": "N"}
+    forces = {"X": "N", "Y": "N", "N": "Nm", "thrust": "N", "rudder_normal_force": "N", "torque": "Nm"}
+    forces |= {"thrust_left": "N", "rudder_normal_force_left": "N"}
     suffix = forces.get(key, key.rpartition("_")[2])
     if unit in ("", "-", "1") or (key == "propeller_radps"):
         return
@@ -165,7 +170,7 @@ def _number(file: Path, place: tuple[int, str], text: str) -> float:
 def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignFile) -> Condition:
     assert form.averages is not None
     file, line = place
-    for key in ("drift_rad", "rudder_rad"):
+    for key in ("drift_rad", "rudder_rad", "heel_rad"):
         if abs(at.get(key, 0.0)) >= math.pi / 2:
             raise InputError(file, f"line {line}", f"{key} is {at[key]:g}", "name its column as _deg if it is degrees")
     speed = at.get("speed_mps", form.test.speed_mps)
@@ -176,6 +181,10 @@ def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignF
     arm = 1.0 if form.averages.scaling == "dimensional" else form.model.length_m
     yaw_rate = at.get("yaw_rate_radps", at.get("yaw_rate_prime", 0.0) * speed / form.model.length_m)
     to_port = 1.0 if form.averages.normal_force_sign == "port" else -1.0
+
+    def scaled(key: str, factor: float) -> float | None:
+        return at[key] * factor if key in at else None
+
     return Condition(
         name=f"{file.name} line {line}",
         drift_rad=at.get("drift_rad", 0.0),
@@ -186,8 +195,12 @@ def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignF
         N_Nm=at["N"] * unit * arm,
         propeller_radps=at.get("propeller_radps", form.test.propeller_radps),
         yaw_rate_radps=yaw_rate,
-        thrust_N=at["thrust"] * unit if "thrust" in at else None,
-        rudder_normal_force_N=at["rudder_normal_force"] * unit * to_port if "rudder_normal_force" in at else None,
+        thrust_N=scaled("thrust", unit),
+        rudder_normal_force_N=scaled("rudder_normal_force", unit * to_port),
+        thrust_left_N=scaled("thrust_left", unit),
+        rudder_normal_force_left_N=scaled("rudder_normal_force_left", unit * to_port),
+        torque_Nm=scaled("torque", unit * arm),
+        heel_rad=at.get("heel_rad", 0.0),
     )
 
 

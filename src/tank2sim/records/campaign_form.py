@@ -16,11 +16,14 @@ from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
 from tank2sim.units import to_si
 
-RunType = Literal["static_drift", "static_rudder", "drift_and_rudder", "pure_sway", "pure_yaw", "yaw_with_drift"]
+RunType = Literal[
+    "static_drift", "static_rudder", "drift_and_rudder", "steady_turn", "pure_sway", "pure_yaw", "yaw_with_drift"
+]
 RUN_TYPES: tuple[RunType, ...] = (
     "static_drift",
     "static_rudder",
     "drift_and_rudder",
+    "steady_turn",
     "pure_sway",
     "pure_yaw",
     "yaw_with_drift",
@@ -83,7 +86,8 @@ class TankTest(CardSection):
         To which side a positive rudder angle turns the ship, in the run files and ``[[runs]]``.
     inertia_speed
         The u with which the rigid body's m u r and m x_G u r are computed: ``test``, u = U as the paper has it
-        (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone.
+        (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone; steady turns
+        always have u = U cos(beta).
     force_delay_s
         By how much the recorded forces lag the recorded motion, s (filters, clocks); it is taken out.
     free_motions
@@ -208,7 +212,15 @@ class FilesSection(CardSection):
 
 
 class RunSheet(CardSection):
-    """One of ``[[runs]]``: what the test sheet says of a run; its file holds what was measured."""
+    """One of ``[[runs]]``: what the test sheet says of a run; its file holds what was measured.
+
+    Parameters
+    ----------
+    yaw_rate_radps
+        Of a steady turn on a rotating arm or in circular motion, positive to starboard.
+    heel_rad
+        At which the model is held, positive to starboard.
+    """
 
     file: Text
     type: RunType
@@ -216,6 +228,8 @@ class RunSheet(CardSection):
     rudder_rad: Angle | None = None
     frequency_radps: Positive | None = None
     amplitude_m: Positive | None = None
+    yaw_rate_radps: float | None = None
+    heel_rad: Angle | None = None
     yaw_rate_amplitude_radps: Positive | None = None
     propeller_radps: NotNegative | None = None
     notes: str | None = None
@@ -227,20 +241,31 @@ class AverageColumns(CardSection):
 
     Parameters
     ----------
+    heel_rad
+        Angle at which the model is held, positive to starboard.
     yaw_rate_radps, yaw_rate_prime
         Yaw rate of rotating-arm and circular-motion tests, positive to starboard; prime: r L/U.
     thrust, rudder_normal_force
-        Of the propeller, positive forward, and of the water on the rudder; in the scaling of the forces.
+        Of the propeller, positive forward, and of the water on the rudder; in the scaling of the forces. With two
+        propellers those of the right side.
+    thrust_left, rudder_normal_force_left
+        The same of the left side.
+    torque
+        That the propeller takes, positive ahead; in the scaling of the moments.
     """
 
     drift_rad: str | None = None
     rudder_rad: str | None = None
+    heel_rad: str | None = None
     speed_mps: str | None = None
     propeller_radps: str | None = None
     yaw_rate_radps: str | None = None
     yaw_rate_prime: str | None = None
     thrust: str | None = None
     rudder_normal_force: str | None = None
+    thrust_left: str | None = None
+    rudder_normal_force_left: str | None = None
+    torque: str | None = None
     X: str
     Y: str
     N: str
@@ -261,19 +286,35 @@ class OpenWaterSection(CardSection):
 
     Parameters
     ----------
-    J, K_T
-        Points; or, with ``file``, the headings of their columns.
+    J, K_T, K_Q
+        Points; or, with ``file``, the headings of their columns. K_Q is needed where torque is measured.
+    K_Q_factor
+        What K_Q is multiplied by: 0.1 where 10 K_Q is given.
     """
 
     file: Text | None = None
     J: list[float] | Text = "J"
     K_T: list[float] | Text = "K_T"
+    K_Q: list[float] | Text | None = None
+    K_Q_factor: Positive = 1.0
 
 
 class PropellerTest(CardSection):
-    """``[propeller]``: the place of the propeller over L, positive forward of midships."""
+    """``[propeller]``: the place of the propeller over L.
+
+    Parameters
+    ----------
+    x_P
+        Positive forward of midships.
+    number
+        1, or 2 side by side, each before a rudder.
+    y_P
+        Of the right one of two, to starboard.
+    """
 
     x_P: Annotated[float, Field(gt=-1, lt=1)] = -0.5
+    number: Literal[1, 2] = 1
+    y_P: Annotated[float, Field(gt=0, lt=0.5)] | None = None
 
 
 class RudderTest(CardSection):
@@ -287,12 +328,15 @@ class RudderTest(CardSection):
         One of the two: f_alpha, the slope of the normal force, by Fujii's formula from the aspect ratio.
     x_R
         Its place over L, positive forward of midships.
+    y_R
+        Place over L of the right one of two rudders, to starboard.
     """
 
     height_m: Positive
     aspect_ratio: Positive | None = None
     f_alpha: Positive | None = None
     x_R: Annotated[float, Field(gt=-1, lt=1)] = -0.5
+    y_R: Annotated[float, Field(gt=0, lt=0.5)] | None = None
 
 
 class CampaignFile(CardSection):

@@ -70,7 +70,13 @@ class CaptiveRun:
     X_N, Y_N, N_Nm : array, (rows,)
         Forces and moment in the hydrodynamic sense (see the module), about midships.
     propeller_radps : float or None
-        Revolutions.
+        Revolutions: the mean of the record, or those of the sheet.
+    thrust_N, rudder_normal_force_N : array, (rows,), or None
+        Of the propeller, positive forward; of the water on the rudder, positive to port.
+    torque_Nm : array, (rows,), or None
+        That the propeller takes.
+    heel_rad : float
+        At which the model is held, positive to starboard.
     force_delay_s : float
         By how much the forces lag the motion.
     """
@@ -89,6 +95,10 @@ class CaptiveRun:
     y_m: Array | None = None
     psi_rad: Array | None = None
     propeller_radps: float | None = None
+    thrust_N: Array | None = None
+    rudder_normal_force_N: Array | None = None
+    torque_Nm: Array | None = None
+    heel_rad: float = 0.0
     force_delay_s: float = 0.0
 
     @property
@@ -315,8 +325,15 @@ def read_captive_run(
         speed = np.full(len(time), test.speed_mps)
     y, psi = _optional(table, "y_m"), _optional(table, "psi_rad")
     rate = _optional(table, "r_radps")
-    if rate is None:
-        rate = np.zeros(len(time)) if sheet.type not in ("pure_yaw", "yaw_with_drift") else _rate_of(table, psi, time)
+    if rate is None and sheet.type == "steady_turn" and sheet.yaw_rate_radps is not None:
+        rate = np.full(len(time), sheet.yaw_rate_radps)
+    elif rate is None:
+        turns = sheet.type in ("pure_yaw", "yaw_with_drift", "steady_turn")
+        rate = _rate_of(table, psi, time) if turns else np.zeros(len(time))
+    revolutions = sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps
+    recorded = _optional(table, "propeller_radps")
+    if recorded is not None:
+        revolutions = float(np.mean(recorded))
     return CaptiveRun(
         name=sheet.file,
         type=sheet.type,
@@ -329,7 +346,11 @@ def read_captive_run(
         **{column: sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
         y_m=y,
         psi_rad=psi,
-        propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps,
+        propeller_radps=revolutions,
+        thrust_N=_optional(table, "thrust_N"),
+        rudder_normal_force_N=_optional(table, "rudder_normal_force_N"),
+        torque_Nm=_optional(table, "torque_Nm"),
+        heel_rad=sheet.heel_rad or 0.0,
         force_delay_s=test.force_delay_s,
     )
 
@@ -357,7 +378,8 @@ def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array 
             raise InputError(table.path, "header", "there is neither v_mps nor y_m", "add one of them")
         velocity: Array = np.gradient(y, time)
         return velocity
-    if sheet.drift_rad is None and sheet.type in ("static_drift", "drift_and_rudder", "yaw_with_drift"):
+    drifts = ("static_drift", "drift_and_rudder", "steady_turn", "yaw_with_drift")
+    if sheet.drift_rad is None and sheet.type in drifts:
         raise InputError(table.path, "header", "there is no v_mps, and the campaign gives no drift", "give one of them")
     steady: Array = -speed * np.sin(sheet.drift_rad or 0.0)
     return steady
@@ -372,11 +394,10 @@ def _rate_of(table: CsvTable, psi: Array | None, time: Array) -> Array:
 
 def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
     assert form.averages is not None
-    if condition.yaw_rate_radps:
-        remedy = "reduce --model mmg takes turning tests; or leave such rows out"
-        raise InputError(form.averages.file, condition.name.rpartition(".csv ")[2], "turns steadily", remedy)
     kind: RunType = "drift_and_rudder"
-    if condition.rudder_rad == 0.0:
+    if condition.yaw_rate_radps:
+        kind = "steady_turn"
+    elif condition.rudder_rad == 0.0:
         kind = "static_drift"
     elif condition.drift_rad == 0.0:
         kind = "static_rudder"
@@ -388,11 +409,12 @@ def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
         sheet=sheet,
         time_s=np.zeros(1),
         v_mps=np.array([-condition.speed_mps * np.sin(condition.drift_rad)]),
-        r_radps=np.zeros(1),
+        r_radps=np.array([condition.yaw_rate_radps]),
         speed_mps=np.array([condition.speed_mps]),
         delta_rad=np.array([condition.rudder_rad]),
         X_N=sense * np.array([condition.X_N]),
         Y_N=sense * np.array([condition.Y_N]),
         N_Nm=sense * np.array([condition.N_Nm]),
         propeller_radps=condition.propeller_radps,
+        heel_rad=condition.heel_rad,
     )

@@ -24,7 +24,9 @@ from tank2sim.units import to_si
 
 _KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the colon of https://
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_NOT_OF_NUMBERS = re.compile(r"[^0-9eE+\-., \t\n]")
+_OF_NUMBERS = b"0123456789eE+-., \t\n"
+_BLOCK = 1 << 22
+"""Characters of a file that are read at once: memory then goes with its numbers, not with its text."""
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
 
@@ -184,8 +186,11 @@ def read_table(path: Path | str) -> CsvTable:
         no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal point.
     """
     path = Path(path)
-    all_lines = read_text(path).split("\n")
-    stripped = [line.strip() for line in all_lines]
+    text = read_text(path)
+    plain = _plain_table(path, text)
+    if plain is not None:
+        return plain
+    stripped = [line.strip() for line in text.split("\n")]
     numbers = [number for number, line in enumerate(stripped, start=1) if line and not line.startswith("#")]
     if not numbers:
         raise InputError(path, "", "there is no header", "begin with a line of column names, such as t_s,u_mps")
@@ -196,6 +201,24 @@ def read_table(path: Path | str) -> CsvTable:
     rows = [stripped[number - 1] for number in numbers[1:]]
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
     return replace(table_of_rows(path, names, rows, lines), comments=comments, remarks=remarks)
+
+
+def _plain_table(path: Path, text: str) -> CsvTable | None:
+    """The table of a text of comments, a header and rows of numbers alone; None if anything at all is unusual."""
+    begin, preamble = 0, []
+    while (end := text.find("\n", begin)) >= 0 and (line := text[begin:end].strip()).startswith("#"):
+        preamble.append(line)
+        begin = end + 1
+    if end < 0 or not line:
+        return None
+    names = _header(path, len(preamble) + 1, line)
+    values = _read_fast(text, len(names), end + 1)
+    if values is None or not values.size:
+        return None
+    first = len(preamble) + 2
+    lines = np.arange(first, first + values.shape[1], dtype=np.int64)
+    comments, remarks = _comments(preamble)
+    return CsvTable(path, dict(zip(names, values, strict=True)), lines, comments, remarks)
 
 
 def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> CsvTable:
@@ -218,11 +241,10 @@ def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: 
     """
     if not rows:
         raise InputError(path, "", "there are no rows under the header", "add the measured values")
-    values = _read_fast(rows, len(names))
+    values = _read_fast("\n".join(rows), len(names))
     if values is None:
-        values = _read_with_care(path, names, rows, lines)
-    columns = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(names)}
-    return CsvTable(path, columns, lines)
+        values = np.ascontiguousarray(_read_with_care(path, names, rows, lines).T)
+    return CsvTable(path, dict(zip(names, values, strict=True)), lines)
 
 
 def _header(path: Path, number: int, line: str) -> list[str]:
@@ -242,20 +264,36 @@ def _header(path: Path, number: int, line: str) -> list[str]:
     return names
 
 
-def _read_fast(rows: Sequence[str], width: int) -> Array | None:
-    """Values (rows, width) by numpy's compiled reader; None if anything at all is unusual."""
-    body = "\n".join(rows) + "\n"
-    if _NOT_OF_NUMBERS.search(body):
+def _read_fast(text: str, width: int, begin: int = 0) -> Array | None:
+    """Values (width, rows) of the text from `begin` by numpy's compiled reader; None if anything at all is unusual."""
+    rows = text.count("\n", begin) + (not text.endswith("\n"))
+    values, row = np.empty((width, rows)), 0
+    while begin < len(text):
+        end = text.find("\n", begin + _BLOCK) + 1 or len(text)
+        block = _numbers(text[begin:end], width)
+        if block is None:
+            return None
+        values[:, row : row + len(block)] = block.T
+        begin, row = end, row + len(block)
+    return values if row == rows and not (np.abs(values) > LARGEST).any() else None
+
+
+def _numbers(body: str, width: int) -> Array | None:
+    """Values (rows, width) of whole rows; None if anything at all is unusual."""
+    if not body.isascii() or body.encode().translate(None, _OF_NUMBERS):
         return None
+    if not body.endswith("\n"):
+        body += "\n"
     if " " in body or "\t" in body:
-        body = re.sub(r"[ \t]*([,\n])[ \t]*", r"\1", body)
+        body = re.sub(r"[ \t]*([,\n])[ \t]*", r"\1", body).lstrip(" \t")
     if ",," in body or ",\n" in body or "\n," in body or body.startswith(","):
         body = _EMPTY_CELL.sub("nan", body)
+    lines = body.splitlines()
     try:
-        values: Array = np.loadtxt(body.splitlines(), delimiter=",", ndmin=2, comments=None, dtype=np.float64)
+        values: Array = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None, dtype=np.float64)
     except ValueError:
         return None
-    return values if values.shape == (len(rows), width) and not (np.abs(values) > LARGEST).any() else None
+    return values if values.shape == (len(lines), width) else None
 
 
 def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> Array:

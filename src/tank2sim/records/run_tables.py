@@ -30,8 +30,13 @@ RUN_QUANTITIES = {
     "X": "N",
     "Y": "N",
     "N": "Nm",
+    "thrust": "N",
+    "rudder_normal_force": "N",
+    "torque": "Nm",
+    "propeller": "radps",
 }
-"""Quantities of a captive run, and the SI unit of each as the names of columns end with it."""
+"""Quantities of a captive run, and the SI unit of each as the names of columns end with it; ``propeller`` is the
+revolutions."""
 
 _SEPARATORS = {"tab": "\t", "blanks": WHITESPACE}
 
@@ -79,8 +84,8 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
 
 def _is_plain(path: Path) -> bool:
     """True for the CSV that needs no map; also for a file that :func:`read_table` explains best."""
-    lines = path.read_bytes().decode("utf-8-sig", errors="replace").splitlines()
-    head = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
     names = [name.strip() for name in head.split(",")]
     return not head or (("t_s" in names or "t_ms" in names) and "\t" not in head and ";" not in head)
 
@@ -231,9 +236,10 @@ def _quantity(name: str) -> tuple[str, float | None]:
     """Quantity and factor of ``Y_kN`` (1000), ``Y_N`` (1) or ``Y`` (None); an empty name if it is none."""
     if name in RUN_QUANTITIES:
         return name, None
-    stem, _, suffix = name.partition("_")
-    if stem not in RUN_QUANTITIES:
+    stem = next((known for known in RUN_QUANTITIES if name.startswith(f"{known}_")), "")
+    if not stem:
         return "", None
+    suffix = name.removeprefix(f"{stem}_")
     renamed, angle = to_si(name, 1.0)
     if renamed == _si_name(stem):
         return stem, angle

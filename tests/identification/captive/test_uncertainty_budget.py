@@ -111,8 +111,10 @@ def test_what_is_not_stated_is_listed_and_blockage_follows_schuster(tmp_path, st
     reduction, _ = budget_of(SOUND, tmp_path)
     assert "calibration_relative" in sources_not_stated(reduction)
     assert "force_delay_s" not in sources_not_stated(reduction)  # the oscillations show it
-    assert blockage_speed(reduction) is None
+    of = reduction.campaign
+    assert blockage_speed(of.model, of.tank, of.test) is None
     model, speed = stated[0].campaign.model, stated[0].campaign.test.speed_mps
     share = model.beam_m * model.draught_m / 50.0
     expected = share / (1 - share - speed**2 / (stated[0].campaign.test.gravity_mps2 * 5.0))
-    assert blockage_speed(stated[0]) == pytest.approx(expected)
+    of = stated[0].campaign
+    assert blockage_speed(of.model, of.tank, of.test) == pytest.approx(expected)

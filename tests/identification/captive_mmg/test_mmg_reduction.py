@@ -13,9 +13,25 @@ from tank2sim.identification.captive_mmg.card_text import estimated_masses
 from tank2sim.identification.captive_mmg.regression import ORDINARY, fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tests.cli.command_line import refused, tank2sim
-from tests.identification.captive_mmg.tank import KVLCC2, conditions, hmri_campaign, write_campaign
+from tests.identification.captive_mmg.tank import (
+    KVLCC2,
+    STATED,
+    TORQUE,
+    as_runs,
+    conditions,
+    forces,
+    hmri_campaign,
+    ship_like_the_kvlcc2,
+    with_common_errors,
+    write_campaign,
+)
 
 SEEDS = 20
+
+
+def another_ship(folder: Path, seed: int) -> dict[str, float]:
+    """A ship like the KVLCC2, its added masses off their estimate by chance."""
+    return ship_like_the_kvlcc2(seed, estimated_masses(read_steady_tests(write_campaign(folder, KVLCC2))))
 
 
 def of_the_estimate(folder: Path) -> dict[str, float]:
@@ -36,11 +52,7 @@ def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
 def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
     inside = []
     for seed in range(SEEDS):
-        random = np.random.default_rng(7000 + seed)
-        truth = {name: value * random.uniform(0.85, 1.15) for name, value in KVLCC2.items()}
-        for name, (value, error) in estimated_masses(read_steady_tests(write_campaign(tmp_path, truth))).items():
-            key = {"Xudot": "mx", "Yvdot": "my"}.get(name, "")
-            truth |= {key: -value + error * random.standard_normal()} if key else {}
+        truth = another_ship(tmp_path, 7000 + seed)
         found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed)).coefficients
         inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
     assert 0.90 <= np.mean(inside) <= 0.98
@@ -154,10 +166,15 @@ def test_a_coefficient_that_is_not_that_of_a_ship_is_named(tmp_path) -> None:
     assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).fit.at_limit == ()
 
 
-def test_turning_tests_are_not_silently_towed_straight(tmp_path) -> None:
-    """The polynomial reduction takes no steady turns: their rows are refused, with the way to reduce them."""
-    with pytest.raises(InputError, match="turns steadily"):
-        t2s.reduce(write_campaign(tmp_path, KVLCC2))
+def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(tmp_path) -> None:
+    found = t2s.reduce(write_campaign(tmp_path, KVLCC2)).reduction
+    loaded = sum(abs(n / 10.4 - 1) > 0.03 for n in conditions()[:, 4])
+    assert sum("rpm" in reason for reason in found.not_used.values()) == loaded > 0
+    assert {"steady_turn"} <= {run.run.type for run in found.runs}
+    U, step = np.full(2, 1.179), np.array([-0.05, 0.05])
+    read = forces(KVLCC2, U, 0 * step, step, 0 * step, np.full(2, 10.4))
+    slope = np.diff(read["N"] + 3270.0 * 0.25 * step * U**2 / 7.0)[0] / (0.1 * 0.5 * 1000.0 * 7.0**3 * 1.179**2)
+    assert found.derivatives["Nr"].value == pytest.approx(slope, rel=0.15)
 
 
 def test_the_command_writes_card_page_and_json(tmp_path) -> None:
@@ -180,3 +197,179 @@ def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> No
     assert found["kappa"].value == pytest.approx(0.5, abs=0.1)
     assert found["Yv"].value == pytest.approx(-0.315, rel=0.1)
     assert found["Nv"].value == pytest.approx(-0.137, rel=0.1)
+
+
+@pytest.mark.parametrize("on_model", [False, True])
+def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path, on_model) -> None:
+    path = write_campaign(tmp_path, KVLCC2, seed=4)
+    by_rows = fit_mmg(read_steady_tests(path))
+    by_runs = fit_mmg(read_steady_tests(as_runs(tmp_path, on_model=on_model)))
+    assert by_runs.names == by_rows.names
+    np.testing.assert_allclose(by_runs.values, by_rows.values, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(by_runs.errors, by_rows.errors, rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("old", "words"), [("thrust_N", "thrust_N"), ("rudder_normal_force_N", "normal"), ("propeller_rps", "revol")]
+)
+def test_a_run_without_what_the_method_needs_is_refused_by_its_name(tmp_path, old, words) -> None:
+    write_campaign(tmp_path, KVLCC2)
+    path = as_runs(tmp_path)
+    (tmp_path / "7.csv").write_text((tmp_path / "7.csv").read_text().replace(old, "temperature"))
+    with pytest.raises(InputError, match=words) as fault:
+        read_steady_tests(path)
+    assert fault.value.source == "7.csv"
+
+
+def test_oscillating_runs_are_left_out_and_named(tmp_path) -> None:
+    write_campaign(tmp_path, KVLCC2)
+    path = as_runs(tmp_path)
+    time = np.arange(0.0, 60.0, 0.2)
+    rate = 0.05 * np.cos(0.4 * time)
+    rows = np.column_stack([time, np.full_like(time, 1.179), rate, 0 * time - 9, -300 * rate, -4000 * rate])
+    np.savetxt(tmp_path / "yaw.csv", rows, delimiter=",", header="t_s,speed_mps,r_radps,X_N,Y_N,N_Nm", comments="")
+    steady = read_steady_tests(path)
+    path.write_text(path.read_text() + '[[runs]]\nfile = "yaw.csv"\ntype = "pure_yaw"\n')
+    both = read_steady_tests(path)
+    assert both.names == steady.names
+    assert any("yaw.csv" in remark for remark in both.remarks)
+
+
+@pytest.mark.slow
+def test_errors_common_to_all_conditions_are_covered_where_they_are_stated(tmp_path) -> None:
+    inside, without = [], []
+    for seed in range(SEEDS):
+        truth = another_ship(tmp_path, 8000 + seed)
+        found = t2s.reduce_to_mmg(with_common_errors(write_campaign(tmp_path, truth, seed), seed)).coefficients
+        measured = {name: value for name, value in truth.items() if found[name].origin == "measured"}
+        apart = {name: abs(found[name].value - value) for name, value in measured.items()}
+        inside += [apart[name] < 1.96 * found[name].standard_error for name in measured]
+        without += [apart[name] < 1.96 * found[name].type_a for name in measured]
+    assert 0.90 <= np.mean(inside) <= 0.98
+    assert np.mean(without) < 0.85
+
+
+def test_parts_of_the_uncertainty_add_up_and_each_has_its_own_effect(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    plain = t2s.reduce_to_mmg(path)
+    path.write_text(STATED + path.read_text())
+    result = t2s.reduce_to_mmg(path)
+    for name, entry in result.coefficients.items():
+        assert entry.standard_error == pytest.approx(np.hypot(entry.type_a, np.linalg.norm([*entry.type_b.values()])))
+        assert entry.type_a == pytest.approx(plain.coefficients[name].standard_error, rel=1e-6)
+    # K_T = T/(rho n^2 D^4) of all points: 1 % of speed is 1 % of 1 - w_P0, 1 % of thrust moves only that.
+    w = result.coefficients["w_P0"]
+    assert w.type_b["speed_relative"] == pytest.approx(0.01 * (1 - w.value), rel=0.15)
+    assert result.coefficients["k_0"].type_b["mass_relative"] < 1e-3 * result.coefficients["k_0"].type_a
+    assert result.coefficients["Yr"].type_b["mass_relative"] > 1e3 * result.coefficients["t_P"].type_b["mass_relative"]
+    assert not any("scatter alone" in notice for notice in result.notices)
+    assert any("scatter alone" in notice for notice in plain.notices)
+
+
+def test_torque_gives_the_relative_rotative_efficiency_and_leaves_the_ship_as_it_is(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5, torque=True)).coefficients
+    for name, value in (truth | TORQUE).items():
+        assert found[name].value == pytest.approx(value, rel=2e-3, abs=2e-4), name
+    plain = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, seed=3))
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, seed=3, torque=True))
+    assert result.coefficients["w_P0"].standard_error < plain.coefficients["w_P0"].standard_error
+    assert set(result.card.covariance.names) == set(plain.card.covariance.names)
+    assert result.content()["readings"]["Q"]["unit"] == "N.m"
+    for name in ("Yv", "Nr", "t_P", "eps"):
+        apart = abs(result.coefficients[name].value - plain.coefficients[name].value)
+        assert apart < plain.coefficients[name].standard_error, name
+
+
+@pytest.mark.slow
+def test_standard_errors_with_torque_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
+    inside = []
+    for seed in range(SEEDS):
+        random = np.random.default_rng(9500 + seed)
+        truth = another_ship(tmp_path, 9000 + seed)
+        truth |= {name: value * random.uniform(0.97, 1.03) for name, value in TORQUE.items()}
+        found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed, torque=True)).coefficients
+        inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("K_Q_factor = 0.1", "", "open_water.K_Q: is .*K_Q_factor"),
+        ('K_Q = "10K_Q"', "", "open_water.K_Q: is missing"),
+        ('torque = "Q"', 'torque = "T"', "Q: the MMG method leaves"),
+    ],
+)
+def test_torque_in_another_unit_sign_or_without_its_curve_is_refused(tmp_path, old, new, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2, torque=True)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError, match=words):
+        t2s.reduce_to_mmg(path)
+
+
+def test_a_torque_of_the_other_sign_is_refused(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2, torque=True)
+    rows = (tmp_path / "runs.csv").read_text().splitlines()
+    turned = [f"{row.rpartition(',')[0]},{-float(row.rpartition(',')[2])!r}" for row in rows[1:]]
+    (tmp_path / "runs.csv").write_text("\n".join([rows[0], *turned]))
+    with pytest.raises(InputError, match=r"open_water.K_Q: is .* off its curve"):
+        t2s.reduce_to_mmg(path)
+
+
+def test_blockage_of_the_tank_is_named_until_it_is_stated(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    tank = "[tank]\nlength_m = 200.0\nbreadth_m = 10.0\ndepth_m = 5.0\n"
+    path.write_text(tank + path.read_text())
+    share = 1.27 * 0.46 / 50.0
+    raised = share / (1 - share - 1.179**2 / (9.80665 * 5.0))
+    assert any("Schuster" in notice and f"{100 * raised:.2g} %" in notice for notice in t2s.reduce_to_mmg(path).notices)
+    path.write_text(STATED + path.read_text())
+    assert not any("Schuster" in notice for notice in t2s.reduce_to_mmg(path).notices)
+
+
+def test_two_propellers_and_rudders_give_the_coefficients_of_both_sides(tmp_path) -> None:
+    truth = of_the_estimate(tmp_path)
+    result = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5, y=0.05))
+    for name, value in truth.items():
+        assert result.coefficients[name].value == pytest.approx(value, rel=2e-3, abs=2e-4), name
+    assert result.card.propeller.number == result.card.rudder.number == 2
+    assert result.card.propeller.y_P == result.card.rudder.y_R == 0.05
+    assert set(result.content()["readings"]) == {"X", "Y", "N", "T", "F_N", "T_left", "F_N_left"}
+
+
+@pytest.mark.slow
+def test_standard_errors_of_two_propellers_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
+    inside = []
+    for seed in range(SEEDS):
+        truth = another_ship(tmp_path, 9900 + seed)
+        found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed, y=0.05)).coefficients
+        inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("y_P = 0.05", "", "propeller.y_P"),
+        ("y_R = 0.05", "", "rudder.y_R"),
+        ('thrust_left = "TL"', "", "averages.columns.thrust_left"),
+        ('rudder_normal_force_left = "FL"', "", "averages.columns.rudder_normal_force_left"),
+        ('rudder_normal_force_left = "FL"', 'rudder_normal_force_left = "FL"\ntorque = "T"', "averages.columns.torque"),
+    ],
+)
+def test_two_propellers_without_what_the_method_needs_are_refused(tmp_path, old, new, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2, y=0.05)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError, match=words):
+        t2s.reduce_to_mmg(path)
+
+
+def test_sides_that_are_exchanged_do_not_pass_for_the_ship(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2, y=0.05)
+    right = t2s.reduce_to_mmg(path)
+    text = path.read_text().replace('thrust = "T"', 'thrust = "TL"').replace('thrust_left = "TL"', 'thrust_left = "T"')
+    path.write_text(text)
+    exchanged = t2s.reduce_to_mmg(path)
+    assert exchanged.unexplained[3] > 3 * right.unexplained[3]

@@ -13,7 +13,7 @@ from tank2sim.identification.captive.plot_data import plots_as_json
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
-from tank2sim.identification.captive.tables import by_the_papers_order, prediction_errors
+from tank2sim.identification.captive.tables import by_the_papers_order, prediction_errors, terms_of_heel
 from tank2sim.identification.captive.uncertainty_budget import (
     BUDGET_SOURCES,
     COVERAGE_FACTOR,
@@ -25,7 +25,7 @@ from tank2sim.records.campaigns import Campaign
 
 
 def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """A complete reduction; ``derivatives`` and ``rigid_body`` are those of the card."""
+    """A complete reduction; ``derivatives`` and ``rigid_body`` are those of the card, which has none of the heel."""
     campaign = reduction.campaign
     found: dict[str, Any] = {
         "campaign": str(campaign.path),
@@ -40,6 +40,12 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         },
         "rigid_body": {"mass": card.mass, "yaw_inertia": card.yaw_inertia, "x_G": card.x_G},
         "derivatives": {name: _derivative(reduction, card, name) for name in card.entries},
+        "heel_derivatives": {
+            name: _measured(
+                reduction, name, reduction.derivatives[name].value, reduction.derivatives[name].standard_error
+            )
+            for name in terms_of_heel(reduction)
+        },
         "uncertainty_budget": _budget(reduction),
         "missing": card.missing,
         "warnings": warnings,
@@ -77,11 +83,12 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
 
 def _budget(reduction: Reduction) -> dict[str, Any]:
     """The budget after ITTC 7.5-02-06-04: standard uncertainties (prime) and shares of the variance by source."""
+    campaign = reduction.campaign
     return {
         "coverage_factor": COVERAGE_FACTOR,
         "sources": BUDGET_SOURCES,
         "not_stated": sources_not_stated(reduction),
-        "blockage_speed_relative": blockage_speed(reduction),
+        "blockage_speed_relative": blockage_speed(campaign.model, campaign.tank, campaign.test),
         "derivatives": {
             row.name: {
                 "value": row.value,
@@ -105,10 +112,15 @@ def _delay(reduction: Reduction) -> dict[str, Any] | None:
 
 def _derivative(reduction: Reduction, card: Contents, name: str) -> dict[str, Any]:
     entry = card.entries[name]
-    found: dict[str, Any] = {"value": entry.value, "standard_error": entry.standard_error}
     if name in card.estimated:
+        found = {"value": entry.value, "standard_error": entry.standard_error}
         return found | {"origin": "estimated", "source": entry.how}
+    return _measured(reduction, name, entry.value, entry.standard_error)
+
+
+def _measured(reduction: Reduction, name: str, value: float, error: float) -> dict[str, Any]:
     derivative = reduction.derivatives[name]
+    found: dict[str, Any] = {"value": value, "standard_error": error}
     found |= {"origin": "measured", "type_a": derivative.type_a, "type_b": derivative.type_b}
     if stepped := by_the_papers_order(reduction, name):
         found["paper_order"] = asdict(stepped)

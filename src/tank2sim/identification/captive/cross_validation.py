@@ -89,12 +89,14 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
     together = np.sum(scatter, axis=0) + prior.T @ prior
     found = []
     ends = [*equations.first_rows[1:], len(equations.values)]
+    blocks = [design[start:end] for start, end in zip(equations.first_rows, ends, strict=True)]
+    remaining = normal - np.array([block.T @ block for block in blocks])
+    determined = np.linalg.cond(remaining) <= 1e10
+    inverses = np.linalg.inv(np.where(determined[:, None, None], remaining, np.eye(len(norms))))
     for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
-        block, target = design[start:end], values[start:end]
-        remaining = normal - block.T @ block
-        if np.linalg.cond(remaining) > 1e10:
+        if not determined[place]:
             continue
-        inverse = np.linalg.inv(remaining)
+        block, target, inverse = blocks[place], values[start:end], inverses[place]
         without = inverse @ (right - block.T @ target)
         shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
         largest = int(np.argmax(shift))

@@ -6,7 +6,7 @@ the exact equations for any motion, without a small-amplitude expansion.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -30,9 +30,19 @@ _ACTIVE = 1e-3
 """A term is excited if its product of motions reaches this share of the product of the campaign's largest motions."""
 
 
-def candidate_terms(force: str) -> tuple[Term, ...]:
-    """Terms of (3.8) and acceleration terms of one force, in their order."""
+HEEL_TERMS = {
+    "X": ("Xphiphi",),
+    "Y": ("Yphi", "Yvvphi", "Yvphiphi", "Yrrphi", "Yrphiphi"),
+    "N": ("Nphi", "Nvvphi", "Nvphiphi", "Nrrphi", "Nrphiphi"),
+}
+"""Terms of the heel that steady tests at a heel show: those of Son and Nomoto (1982), Naval Architecture and Ocean
+Engineering 20, 73-83."""
+
+
+def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
+    """Terms of (3.8) and acceleration terms of one force, in their order; with `heeled` last those of the heel."""
     names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
+    names += HEEL_TERMS[force] if heeled else ()
     return tuple(term for term in map(parse_term, names) if term is not None)
 
 
@@ -138,31 +148,32 @@ def campaign_equations(
     """
     scales = campaign.scales
     unit = scales.force * (scales.length if force == "N" else 1.0)
-    blocks, values, zeros, gauges, roots, places = [], [], [], [], [], []
-    for place, run in enumerate(runs):
-        histories = np.column_stack([*(term_history(campaign, run.motion, name) for name in names)]) / unit
-        inertial = rigid_body_force(campaign, run.motion)[force] / unit
-        projected = run.projected(np.column_stack([histories, inertial]))
-        fit, count = run.fits[force], run.regressed
-        covariance = fit.covariance[:count, :count] / unit**2
-        root = np.linalg.cholesky(covariance)
-        gauge = fit.coefficients[:count] / unit
-        right = [gauge + projected[:, -1], np.eye(count)[:, 0], gauge]
-        weighted = np.linalg.solve(root, np.column_stack([projected[:, :-1], *right]))
-        blocks.append(weighted[:, :-3])
-        values.append(weighted[:, -3])
-        zeros.append(weighted[:, -2])
-        gauges.append(weighted[:, -1])
-        roots.append(root)
-        places += [place] * count
+    keys = _known_by(campaign, names)
+    sizes = np.array([run.regressed for run in runs])
+    ends = np.cumsum(sizes)
+    system = np.empty((ends[-1], len(names) + 3))
+    roots: list[Array] = [np.empty(0)] * len(runs)
+    for size in np.unique(sizes).tolist():  # runs of as many coefficients together
+        alike: list[int] = np.flatnonzero(sizes == size).tolist()
+        fits = [runs[place].fits[force] for place in alike]
+        covariances = np.array([fit.covariance[:size, :size] for fit in fits]) / unit**2
+        gauges = np.array([fit.coefficients[:size] for fit in fits]) / unit
+        projected = np.array([_projected_terms(campaign, runs[place], force, names, keys) for place in alike]) / unit
+        zeros = np.broadcast_to(np.eye(size)[:, 0], gauges.shape)
+        right = np.stack([gauges + projected[..., -1], zeros, gauges], axis=-1)
+        root = np.linalg.cholesky(covariances)
+        weighted = np.linalg.solve(root, np.concatenate([projected[..., :-1], right], axis=-1))
+        for place, block, its_root in zip(alike, weighted, root, strict=True):
+            system[ends[place] - size : ends[place]] = block
+            roots[place] = its_root
     return CampaignEquations(
         force=force,
         names=tuple(names),
-        design=np.vstack(blocks),
-        values=np.concatenate(values),
-        zero=np.concatenate(zeros),
-        gauge=np.concatenate(gauges),
-        run_of_row=np.array(places, dtype=np.int64),
+        design=system[:, :-3].copy(),
+        values=system[:, -3].copy(),
+        zero=system[:, -2].copy(),
+        gauge=system[:, -1].copy(),
+        run_of_row=np.repeat(np.arange(len(runs), dtype=np.int64), sizes),
         runs=tuple(runs),
         unit=unit,
         roots=tuple(roots),
@@ -186,8 +197,9 @@ def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, 
         remedy = "add the yaw inertia about midships of the body that the gauges carry"
         raise InputError(campaign.path, "model.yaw_inertia_kgm2", "is missing, and there are yaw tests", remedy)
     body = inertia(model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2 or 0.0, dict.fromkeys(ACCELERATION_TERMS, 0.0))
-    # Paper 2 has u = U in its tests (2.2, 2.3).
-    u = motion.speed_mps if campaign.test.inertia_speed == "test" else axial_speed(motion)
+    # Paper 2 has u = U in its oscillations (2.2, 2.3).
+    by_paper = campaign.test.inertia_speed == "test" and motion.periods
+    u = motion.speed_mps if by_paper else axial_speed(motion)
     surge, sway, yaw = inertial_forces(model.mass_kg, model.x_G_m, u, motion.v_mps, motion.r_radps)
     return {
         "X": -surge,
@@ -196,24 +208,60 @@ def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, 
     }
 
 
+def _known_by(campaign: Campaign, names: Sequence[str]) -> list[Hashable]:
+    """By what projections of terms are kept: all that they depend on but the motion; last the inertia of the body."""
+    model, test = campaign.model, campaign.test
+    ship = (test.water_density_kgpm3, model.length_m, test.speed_mps)
+    body = (model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2, test.inertia_speed, campaign.inertia_removed)
+    return [*((ship, name[1:]) for name in names), body]
+
+
+def _projected_terms(
+    campaign: Campaign, run: ReducedRun, force: str, names: Sequence[str], keys: Sequence[Hashable]
+) -> Array:
+    """Mean and harmonics of each term whose prime value is 1, and of :func:`rigid_body_force`; N or N m.
+
+    They are (regressed, names + 1). A term of N has those of Y with a lever of L; what is known of the motion already
+    is not projected again.
+    """
+    known = run.motion.projections
+    *of_terms, body = keys
+    histories = {
+        key: term_history(campaign, run.motion, f"Y{name[1:]}")
+        for key, name in zip(of_terms, names, strict=True)
+        if key not in known
+    }
+    if (body, force) not in known:
+        histories |= {(body, of): history for of, history in rigid_body_force(campaign, run.motion).items()}
+    if histories:
+        known |= dict(zip(histories, run.projected(np.array([*histories.values()]).T).T, strict=True))
+    found = np.array([*(known[key] for key in of_terms), known[body, force]]).T
+    if force == "N":
+        found[:, :-1] *= campaign.model.length_m
+    return found
+
+
 def term_history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
     """Force of a term whose prime value is 1, (rows,), N or N m."""
     spelt, _, trend = name.partition(" ")
     term = parse_term(spelt)
     assert term is not None
     model, u0 = campaign.model, campaign.test.speed_mps
-    scale = Scales(campaign.test.water_density_kgpm3, model.length_m, motion.speed_mps).derivative(term)
+    density, length = campaign.test.water_density_kgpm3, model.length_m
     if term.acceleration:
+        scale = Scales(density, length, u0).derivative(term)
         history = scale * (motion.vdot_mps2 if term.acceleration == "v" else motion.rdot_radps2)
     else:
-        change = axial_speed(motion) - u0 if term.u else 0.0
-        history = (
-            scale * motion.v_mps**term.v * motion.r_radps**term.r * motion.delta_rad**term.d * change**term.u
-        ) * np.ones(len(motion.time_s))
+        powers = [motion.v_mps] * term.v + [motion.r_radps] * term.r + [motion.delta_rad] * term.d
+        if term.u:
+            powers += [axial_speed(motion) - u0] * term.u
+        history = np.asarray(Scales(density, length, motion.speed_mps).derivative(term))
+        for factor in powers:
+            history = history * factor
+        history = history * motion.heel_rad**term.phi
     if trend:
-        history = history * (motion.frequency_radps * model.length_m / u0) ** 2
-    result: Array = history
-    return result
+        history = history * (motion.frequency_radps * length / u0) ** 2
+    return np.broadcast_to(history, len(motion.time_s))
 
 
 def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
@@ -229,7 +277,7 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
         )
     if term.u and not speeds_differ(campaign, runs):
         return False
-    powers = np.array([term.v, term.r, term.d, term.u])
+    powers = np.array([term.v, term.r, term.d, term.u, term.phi])
     motions = np.array([_largest_motions(run.motion, u0, length) for run in runs])
     # The largest motions of one run count as simultaneous: a coarse bound is enough to detect a missing motion.
     products, bound = np.prod(motions**powers, axis=1), np.prod(motions.max(axis=0) ** powers)
@@ -237,10 +285,10 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
 
 
 def _largest_motions(motion: CaptiveMotion, u0: float, length: float) -> list[float]:
-    """Largest v', r', rudder angle and change of speed U (a change of u by drift alone does not determine Du)."""
+    """Largest v', r', rudder angle, change of speed U (a change of u by drift alone does not determine Du), heel."""
     change = abs(motion.mean_speed_mps / u0 - 1)
     v, r, delta = motion.largest
-    return [v / u0, r * length / u0, delta, change if change > SPEED_RANGE else 0.0]
+    return [v / u0, r * length / u0, delta, change if change > SPEED_RANGE else 0.0, abs(motion.heel_rad)]
 
 
 def speeds_differ(campaign: Campaign, runs: Sequence[ReducedRun]) -> bool:

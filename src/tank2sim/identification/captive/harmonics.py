@@ -40,8 +40,6 @@ class HarmonicFit:
         In the order of :attr:`ReducedRun.labels`, N or N m, hydrodynamic sense, as measured.
     covariance : array, (columns, columns)
         Of noise within the run, without the zero error of the run.
-    residual : array, (rows,)
-        Record less fit.
     density : array, (columns,)
         Variance of white noise that would disturb each coefficient as much.
     freedom : array, (columns,)
@@ -50,7 +48,6 @@ class HarmonicFit:
 
     coefficients: Array
     covariance: Array
-    residual: Array
     density: Array
     freedom: Array
 
@@ -67,8 +64,6 @@ class ReducedRun:
         Smooth motion of the run.
     labels : tuple of str
         ``mean``, ``cos 1``, ``sin 1``, ..., and last ``trend`` (by the time over half the record's length).
-    basis : array, (rows, columns)
-        Basis of the fit of the forces.
     fits : mapping
         ``X``, ``Y``, ``N`` to its fit.
     """
@@ -76,7 +71,6 @@ class ReducedRun:
     run: CaptiveRun
     motion: CaptiveMotion
     labels: tuple[str, ...]
-    basis: Array
     fits: Mapping[str, HarmonicFit]
 
     @property
@@ -84,11 +78,37 @@ class ReducedRun:
         """Number of coefficients, from the first, that determine the derivatives."""
         return 1 + 2 * REGRESSED_HARMONICS if self.run.oscillates else 1
 
+    @property
+    def basis(self) -> Array:
+        """Basis of the fit of the forces, (rows, columns): computed, not kept, for it is larger than the record."""
+        return force_basis(self.motion)
+
+    def fitted(self, force: str) -> Array:
+        """Mean, harmonics and trend of a force as a history, (rows,), N or N m."""
+        history: Array = self.basis @ self.fits[force].coefficients
+        return history
+
+    def residual(self, force: str) -> Array:
+        """Record less fit, (rows,), N or N m."""
+        return self.run.force(force)[self.motion.kept] - self.fitted(force)
+
     def projected(self, histories: Array) -> Array:
         """Coefficients (regressed, n) of the given histories (rows, n); exactly linear."""
-        gram = self.basis.T @ self.basis
-        coefficients = np.linalg.solve(gram, self.basis.T @ histories)[: self.regressed]
+        if not self.run.oscillates:
+            means: Array = histories.mean(axis=0)[None]  # to which the trend is orthogonal
+            return means
+        basis = self.basis
+        coefficients = np.linalg.solve(basis.T @ basis, basis.T @ histories)[: self.regressed]
         return np.asarray(coefficients, dtype=np.float64)
+
+
+def force_basis(motion: CaptiveMotion) -> Array:
+    """Mean, harmonics and, except over a single period, where it is nearly a sine, trend; (rows, columns)."""
+    rows = len(motion.time_s)
+    basis = harmonic_basis(motion.time_s, motion.frequency_radps, FORCE_HARMONICS if motion.periods else 0)
+    if rows <= 2 or motion.periods == 1:
+        return basis
+    return np.vstack([basis.T, np.linspace(-1.0, 1.0, rows)]).T
 
 
 def reduced_run(run: CaptiveRun) -> ReducedRun:
@@ -100,18 +120,13 @@ def reduced_run(run: CaptiveRun) -> ReducedRun:
         As :func:`tank2sim.identification.captive.motion.run_motion`.
     """
     motion = run_motion(run)
-    rows = len(motion.time_s)
+    basis = force_basis(motion)
     harmonics = FORCE_HARMONICS if run.oscillates else 0
-    columns = [harmonic_basis(motion.time_s, motion.frequency_radps, harmonics)]
     labels = ["mean", *(f"{wave} {order}" for order in range(1, harmonics + 1) for wave in ("cos", "sin"))]
-    # Over a single period a trend is nearly a sine.
-    if rows > 2 and motion.periods != 1:
-        columns.append(np.linspace(-1.0, 1.0, rows)[:, None])
-        labels.append("trend")
-    basis = np.hstack(columns)
+    labels += ["trend"] * (basis.shape[1] - len(labels))
     inverse = np.asarray(np.linalg.inv(basis.T @ basis), dtype=np.float64)
     fits = {name: _fit(run.force(name)[motion.kept], basis, inverse, motion) for name in FORCE_COLUMNS}
-    return ReducedRun(run=run, motion=motion, labels=tuple(labels), basis=basis, fits=fits)
+    return ReducedRun(run=run, motion=motion, labels=tuple(labels), fits=fits)
 
 
 def _fit(values: Array, basis: Array, inverse: Array, motion: CaptiveMotion) -> HarmonicFit:
@@ -124,7 +139,6 @@ def _fit(values: Array, basis: Array, inverse: Array, motion: CaptiveMotion) -> 
     return HarmonicFit(
         coefficients=coefficients,
         covariance=inverse * np.outer(root, root),
-        residual=residual,
         density=density,
         freedom=freedom,
     )

@@ -24,6 +24,16 @@ _LOOP_SAMPLES = 200
 """Loops of a chart, the largest of each frequency, and samples of each. Project choice: a panel is 560 pixels wide."""
 
 
+_ACROSS = {
+    "static_drift": ("drift angle", "rad"),
+    "static_rudder": ("rudder angle", "rad"),
+    "steady_turn": ("yaw rate r'", "1"),
+}
+"""Kind of steady run to what it varies, and its unit."""
+_LETTER = {"static_drift": "v", "static_rudder": "d", "steady_turn": "r"}
+_ZERO = 1e-9
+"""Angle, rad, up to which it is zero."""
+
 Plot = dict[str, Any]
 """A chart as JSON: ``kind``, ``title`` and what the kind needs (:mod:`tank2sim.report.captive.charts`)."""
 
@@ -32,8 +42,8 @@ def plots_as_json(reduction: Reduction) -> dict[str, Plot]:
     """Return the data of the charts of a reduction by file stem, as far as the campaign has runs for them."""
     plots: dict[str, Plot] = {}
     for force in reduction.forces:
-        for kind, words in (("static_drift", "drift angle"), ("static_rudder", "rudder angle")):
-            if plot := _angle_plot(reduction, force, kind, words):
+        for kind, across in _ACROSS.items():
+            if plot := _steady_plot(reduction, force, kind, across):
                 plots[f"{kind}_{force}"] = plot
         for kind, words in (("pure_sway", "sway velocity amplitude v'"), ("pure_yaw", "yaw rate amplitude r'")):
             if force != "X" and (plot := _amplitude_plot(reduction, force, kind, words)):
@@ -46,17 +56,26 @@ def plots_as_json(reduction: Reduction) -> dict[str, Plot]:
     return plots
 
 
-def _angle_plot(reduction: Reduction, force: str, kind: str, words: str) -> Plot | None:
-    """Force coefficient of the steady runs at the test speed against the angle that they vary."""
-    runs = [run for run in reduction.runs if run.run.type == kind]
+def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tuple[str, str]) -> Plot | None:
+    """Force coefficient of the steady runs at the test speed against the one motion that they vary."""
+    runs = [run for run in reduction.runs if run.run.type == kind and not run.motion.heel_rad]
+    if kind == "steady_turn":
+        runs = [run for run in runs if abs(_motion_of(run, "v")) < _ZERO and abs(_motion_of(run, "d")) < _ZERO]
     straight_runs = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
     if len(runs) < 2:
         return None
-    found = [(_angle(run, kind), *_coefficient(reduction, force, run)) for run in (*runs, *straight_runs)]
+    letter = _LETTER[kind]
+    sign = -1.0 if letter == "v" else 1.0
+    found = [
+        (sign * _motion_of(run, letter, reduction.campaign.model.length_m), *_coefficient(reduction, force, run))
+        for run in (*runs, *straight_runs)
+    ]
     angle, value, error = (np.array(column) for column in zip(*found, strict=True))
     across = np.linspace(angle.min(), angle.max(), _SAMPLES)
-    v, rudder = (-np.sin(across), 0 * across) if kind == "static_drift" else (0 * across, across)
-    fit, width = _fitted(reduction.forces[force], _regressors(reduction.forces[force], v, 0 * across, rudder))
+    still = 0 * across
+    v = -np.sin(across) if letter == "v" else still
+    r, rudder = across if letter == "r" else still, across if letter == "d" else still
+    fit, width = _fitted(reduction.forces[force], _regressors(reduction.forces[force], v, r, rudder))
     series = {
         "label": kind.replace("_", " "),
         "x": angle,
@@ -66,30 +85,36 @@ def _angle_plot(reduction: Reduction, force: str, kind: str, words: str) -> Plot
         "fit_value": fit,
         "fit_half_width": width,
     }
-    title = f"{force}' against {words}"
-    return _force_plot([series], (words, "rad"), f"{force}'", title)
+    return _force_plot([series], across_title, f"{force}'", f"{force}' against {across_title[0]}")
 
 
 def _varies_alone(run: ReducedRun, kind: str) -> bool:
-    """A steady run in which the other angle is zero: the straight run belongs to both kinds."""
-    still = run.motion.delta_rad[0] if kind == "static_drift" else run.motion.v_mps[0]
-    return not run.run.oscillates and run.run.type.startswith("static") and abs(float(still)) < 1e-9
+    """A static run in which all but the motion of a kind is zero: the straight run belongs to all kinds."""
+    others = [letter for letter in "vd" if letter != _LETTER[kind]]
+    upright = run.run.type.startswith("static") and not run.motion.heel_rad
+    return upright and all(abs(_motion_of(run, letter)) < _ZERO for letter in others)
 
 
-def _angle(run: ReducedRun, kind: str) -> float:
+def _motion_of(run: ReducedRun, letter: str, length_m: float = 1.0) -> float:
+    """asin(v/U), r L/U or the rudder angle of a steady run."""
     motion = run.motion
-    if kind == "static_rudder":
+    if letter == "d":
         return float(motion.delta_rad[0])
-    return -math.asin(float(motion.v_mps[0]) / motion.mean_speed_mps)
+    if letter == "r":
+        return float(motion.r_radps[0]) * length_m / motion.mean_speed_mps
+    return math.asin(float(motion.v_mps[0]) / motion.mean_speed_mps)
 
 
 def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[float, float]:
-    """Mean force coefficient of a steady run, and its standard error with the run's zero error."""
+    """Mean coefficient of the water's force in a steady run, and its standard error with the run's zero error."""
     unit = _unit(reduction, force, run)
     result = reduction.forces[force].selection
     place = result.equations.runs.index(run)
     root = result.spread.run_root(result.equations, place) * result.equations.unit
-    return float(run.fits[force].coefficients[0]) / unit, float(np.linalg.norm(root[0])) / unit
+    inertia = rigid_body_force(reduction.campaign, run.motion)[force]
+    return (float(run.fits[force].coefficients[0]) + float(np.mean(inertia))) / unit, float(
+        np.linalg.norm(root[0])
+    ) / unit
 
 
 def _unit(reduction: Reduction, force: str, run: ReducedRun) -> float:
@@ -104,7 +129,7 @@ def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array
     for name in result.solution.names:
         term = parse_term(name.partition(" ")[0])
         assert term is not None
-        acts = not term.acceleration and not term.u and " " not in name
+        acts = not term.acceleration and not term.u and not term.phi and " " not in name
         value = polynomial([term.name], {term.name: 1.0}, v=v, r=r, d=rudder) if acts else 0.0
         columns.append(value * np.ones(len(v)))
     return np.column_stack(columns) if columns else np.zeros((len(v), 0))
@@ -204,7 +229,7 @@ def _loop(reduction: Reduction, run: ReducedRun) -> Plot:
     kept, velocity = run.motion.kept, _velocity(run)
     one_period = slice(0, len(run.motion.time_s) // run.motion.periods + 1)
     measured = {force: run.run.force(force)[kept] + inertia[force] for force in "YN"}
-    fitted = {force: (run.basis @ run.fits[force].coefficients + inertia[force])[one_period] for force in "YN"}
+    fitted = {force: (run.fitted(force) + inertia[force])[one_period] for force in "YN"}
     return {
         "label": run.run.name,
         "measured": drawn_columns({"motion": velocity, **measured}, _LOOP_SAMPLES),

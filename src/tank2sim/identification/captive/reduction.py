@@ -70,7 +70,7 @@ class ReductionOptions:
     keep_fast : bool
         Use runs with omega U/g of 0.1 and more, too.
     off_speed : bool
-        Use runs away from the test speed, too, and find terms in Du.
+        Use runs away from the test speed, and at other revolutions of the propeller, too, and find terms in Du.
     all_terms : bool
         Keep terms that the tests do not determine.
     test_symmetry : bool
@@ -319,7 +319,9 @@ def _used_runs(
 ) -> tuple[list[ReducedRun], dict[str, str]]:
     used: list[ReducedRun] = []
     not_used: dict[str, str] = {}
+    usual = _usual_revolutions(campaign)
     for run in runs:
+        turning = run.run.propeller_radps or 0.0
         speed, fast = run.motion.mean_speed_mps, run_frequency_parameter(campaign, run)
         if fast >= LARGEST_FREQUENCY_PARAMETER and not options.keep_fast:
             not_used[run.run.name] = (
@@ -327,9 +329,17 @@ def _used_runs(
             )
         elif abs(speed / campaign.test.speed_mps - 1) > SPEED_RANGE and not options.off_speed:
             not_used[run.run.name] = f"its speed is {speed:.4g} m/s, and the test speed {campaign.test.speed_mps:.4g}"
+        elif abs(turning - usual) > SPEED_RANGE * usual and not options.off_speed:
+            found, nominal = (f"{radps * 60 / (2 * np.pi):.4g}" for radps in (turning, usual))
+            not_used[run.run.name] = f"its propeller turns at {found} rpm, and most others at {nominal}"
         else:
             used.append(run)
     return used, not_used
+
+
+def _usual_revolutions(campaign: Campaign) -> float:
+    """Revolutions of most runs, rad/s: the polynomial has no term in them, and load-variation tests have others."""
+    return float(np.median([run.propeller_radps or 0.0 for run in campaign.runs]))
 
 
 def _force_result(

@@ -69,6 +69,8 @@ class Spread:
 
     def zeros(self, equations: CampaignEquations) -> Array:
         """Variance of the zero error of each run, (runs,)."""
+        if not self.by_type:
+            return np.full(len(equations.runs), self.zero_variance)
         return np.array([self.by_type.get(run.run.type, self.zero_variance) for run in equations.runs])
 
     def weighted(self, equations: CampaignEquations, columns: Array) -> Array:
@@ -242,13 +244,93 @@ def fitted_spread(equations: CampaignEquations, *, by_type: bool = True) -> Spre
 def _best(equations: CampaignEquations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
     """The likeliest spread without gain errors, with a zero variance for each type of run in `start` (one type, "":
     all), and -2 log of its likelihood."""
+    kinds, variances = list(start), np.array([*start.values()])
+    types = [run.run.type for run in equations.runs]
+    of_run = np.array([kinds.index(kind) if kind in start else -1 for kind in types]) if "" not in start else None
+    likelihood = _ZeroLikelihood.of(equations)
 
-    def spread(logs: Array) -> Spread:
-        variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), logs[1:], strict=True)}
-        usual = math.exp(sum(math.log(value) for value in variances.values()) / len(variances))
-        return Spread(1.0 if single else math.exp(logs[0]), usual, {} if "" in variances else variances)
+    def scatter(logs: Array) -> tuple[float, Array, Array]:
+        """Noise, zero variances by kind, and of each run; a kind with few runs has their geometric mean."""
+        found = variances * np.exp(logs[1:])
+        usual = math.exp(float(np.mean(np.log(found))))
+        if of_run is None:
+            return (1.0 if single else math.exp(logs[0])), found, np.full(len(types), found[0])
+        return (1.0 if single else math.exp(logs[0])), found, np.append(found, usual)[of_run]
 
-    return _likeliest(equations, spread, [_NOISE_RANGE] + [_ZERO_RANGE] * len(start))
+    def criterion(logs: Array) -> tuple[float, Array]:
+        noise, _, zeros = scatter(logs)
+        value, by_noise, by_zeros = likelihood(noise, zeros)
+        share = by_zeros * zeros
+        if of_run is None:
+            slopes = np.array([share.sum()])
+        else:
+            by_kind = np.bincount(of_run % (len(kinds) + 1), share, len(kinds) + 1)
+            slopes = by_kind[:-1] + by_kind[-1] / len(kinds)
+        return value, np.append(0.0 if single else by_noise * noise, slopes)
+
+    bounds = [_NOISE_RANGE] + [_ZERO_RANGE] * len(start)
+    found = minimize(criterion, np.zeros(len(bounds)), jac=True, method="L-BFGS-B", bounds=bounds)
+    noise, by_kind, _ = scatter(found.x)
+    usual = math.exp(float(np.mean(np.log(by_kind))))
+    by_type = {} if "" in start else dict(zip(kinds, map(float, by_kind), strict=True))
+    return Spread(noise, usual, by_type), float(found.fun)
+
+
+@dataclass(frozen=True, eq=False)
+class _ZeroLikelihood:
+    """-2 log of the restricted likelihood of a spread without gain errors, with its slopes.
+
+    Along the zero error the coefficients of a run have the variance s_i = noise + zero_i z_i' z_i, across it the noise
+    alone: there all runs together are one triangular system, which holds for every spread.
+
+    Parameters
+    ----------
+    along : array, (runs, columns + 1)
+        Design and right-hand side of each run along its zero error.
+    across : array, (columns + 1, columns + 1)
+        Of all runs across theirs, as a triangle.
+    prior : array, (terms, columns + 1)
+    sizes : array, (runs,)
+        z_i' z_i.
+    count : int
+        Equations across.
+    """
+
+    along: Array
+    across: Array
+    prior: Array
+    sizes: Array
+    count: int
+
+    @classmethod
+    def of(cls, equations: CampaignEquations) -> _ZeroLikelihood:
+        """That of the equations of a campaign."""
+        columns = np.column_stack([equations.design, equations.values])
+        sizes = equations.zero_sizes
+        along = equations.run_sums(equations.zero[:, None] * columns) / np.sqrt(sizes)[:, None]
+        rest = columns - equations.zero[:, None] * (along / np.sqrt(sizes)[:, None])[equations.run_of_row]
+        prior = equations.prior_rows
+        prior = np.column_stack([prior, np.zeros(len(prior))])
+        across = np.asarray(np.linalg.qr(rest, mode="r"), dtype=np.float64)
+        return cls(along, across, prior, sizes, len(columns) - len(sizes))
+
+    def __call__(self, noise: float, zeros: Array) -> tuple[float, float, Array]:
+        """Value, slope by the noise, and slopes by the zero variance of each run, (runs,)."""
+        variances = noise + zeros * self.sizes
+        runs, across = len(variances), len(self.across)
+        system = np.vstack([self.along / np.sqrt(variances)[:, None], self.across / math.sqrt(noise), self.prior])
+        design, values = system[:, :-1], system[:, -1]
+        norms = column_norms(design)
+        q, r = np.linalg.qr(design / norms)
+        residual = values - q @ (q.T @ values)
+        information = 2 * float(np.sum(np.log(np.abs(np.diag(r)) * norms + 1e-300)))
+        determinant = self.count * math.log(noise) + float(np.sum(np.log(variances)))
+        # Of each row: 1 less its leverage less its squared residual.
+        free = np.sum(q**2, axis=1) + residual**2
+        by_run = (1.0 - free[:runs]) / variances
+        rest = (self.count - float(np.sum(free[runs : runs + across]))) / noise
+        value = determinant + information + float(residual @ residual)
+        return value, rest + float(np.sum(by_run)), by_run * self.sizes
 
 
 def _with_gain(equations: CampaignEquations, base: Spread, single: bool) -> Spread:

@@ -57,16 +57,25 @@ def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
 
 
 def _test(campaign: Campaign, run: ReducedRun) -> tuple[object, ...]:
-    """Key of a test: measured steady angles and speed, or frequency and amplitude."""
+    """Key of a test: measured steady angles, yaw rate, heel and speed, or frequency and amplitude."""
     motion, length = run.motion, campaign.model.length_m
     speed = motion.mean_speed_mps
     drift = round(math.asin(max(-1.0, min(1.0, -float(motion.v_mps.mean()) / speed))) / _ANGLE_RAD)
     rudder = round(float(motion.delta_rad.mean()) / _ANGLE_RAD)
+    turn = round(float(motion.r_radps.mean()) * length / speed / _RELATIVE)
     steps = [speed / campaign.test.speed_mps]
     if run.run.oscillates:
         swing = motion.amplitude(motion.v_mps if run.run.type == "pure_sway" else motion.r_radps * length) / speed
         steps += [motion.frequency_radps * length / speed, swing]
-    return (run.run.oscillates, drift, rudder, *(round(math.log(step) / _RELATIVE) for step in steps if step > 0))
+    heel = round(motion.heel_rad / _ANGLE_RAD)
+    return (
+        run.run.oscillates,
+        drift,
+        rudder,
+        turn,
+        heel,
+        *(round(math.log(step) / _RELATIVE) for step in steps if step > 0),
+    )
 
 
 def _mean(campaign: Campaign, run: ReducedRun, force: str) -> float:

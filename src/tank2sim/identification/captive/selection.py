@@ -114,7 +114,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
     solution = selection.solution
     for place, name in enumerate(used.names):
         choices[name] = _judged(solution, place, used.prior.get(name, math.inf), all_terms=all_terms)
-    order = [term.name for term in candidate_terms(force)]
+    order = [term.name for term in candidate_terms(force, heeled=True)]
     return replace(selection, choices=tuple(sorted(choices.values(), key=lambda choice: order.index(choice.name))))
 
 
@@ -123,7 +123,7 @@ def distinguishable_equations(
 ) -> CampaignEquations:
     """The equations of all distinguishable excited terms; decisions on other terms are added to `choices`."""
     active = []
-    for term in candidate_terms(force):
+    for term in candidate_terms(force, heeled=any(run.motion.heel_rad for run in runs)):
         if excited(campaign, runs, term):
             active.append(term.name)
         else:
@@ -156,7 +156,7 @@ def _always(name: str) -> bool:
 
 
 def _order(term: Term) -> int:
-    return term.v + term.r + term.d + term.u
+    return term.v + term.r + term.d + term.u + term.phi
 
 
 def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
@@ -190,7 +190,11 @@ def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -
 def _conditions(full: CampaignEquations) -> int:
     """Number of distinct conditions: an oscillating run counts once for each of its coefficients."""
     steady = {
-        tuple(np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist())
+        (
+            *np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist(),
+            round(float(m.r_radps[0] / m.speed_mps[0]), 4),
+            round(m.heel_rad, 2),
+        )
         for m in (run.motion for run in full.runs if not run.run.oscillates)
     }
     return len(steady) + sum(run.regressed for run in full.runs if run.run.oscillates)
@@ -200,8 +204,8 @@ def _simplicity(name: str) -> tuple[int, ...]:
     """Sort key: linear terms first, then by order, and within an order terms in one motion before mixed terms."""
     term = parse_term(name)
     assert term is not None
-    mixed = sum(power > 0 for power in (term.v, term.r, term.d, term.u))
-    return (not _always(name), _order(term), term.u, mixed, term.d, term.r)
+    mixed = sum(power > 0 for power in (term.v, term.r, term.d, term.u, term.phi))
+    return (not _always(name), _order(term), term.u, term.phi, mixed, term.d, term.r)
 
 
 def usual_zero(full: CampaignEquations) -> float:

@@ -208,7 +208,7 @@ def single_run(run: CaptiveRun, campaign: Campaign | None) -> SingleRun:
         reduced=reduced,
         coefficients=tuple(coefficients),
         cycles={force: averaged_cycle(reduced, force) for force in FORCE_COLUMNS} if run.oscillates else {},
-        residual_rms={force: float(np.sqrt(np.mean(reduced.fits[force].residual ** 2))) for force in FORCE_COLUMNS},
+        residual_rms={force: float(np.sqrt(np.mean(reduced.residual(force) ** 2))) for force in FORCE_COLUMNS},
         derivatives=oscillations(campaign, [reduced])[0] if campaign is not None and run.oscillates else None,
         faults=tuple(str(fault) for fault in faults),
     )
@@ -227,15 +227,15 @@ def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
     force : str
         ``X``, ``Y`` or ``N``.
     """
-    fit = run.fits[force]
+    fit, left = run.fits[force], run.residual(force)
     waves = [place for place, label in enumerate(run.labels) if label != "trend"]
     # Phase as recorded: the time of the motion has the delay of the forces taken out, and so have the harmonics.
     phase = np.mod(run.motion.frequency_radps * run.motion.time_s, 2 * math.pi)
     place = np.minimum((phase / (2 * math.pi) * CYCLE_BINS).astype(int), CYCLE_BINS - 1)
     count = np.bincount(place, minlength=CYCLE_BINS).astype(float)
     with np.errstate(divide="ignore", invalid="ignore"):
-        residual = np.bincount(place, fit.residual, CYCLE_BINS) / count
-        square = np.bincount(place, fit.residual**2, CYCLE_BINS) / count
+        residual = np.bincount(place, left, CYCLE_BINS) / count
+        square = np.bincount(place, left**2, CYCLE_BINS) / count
         spread = np.sqrt(np.maximum(square - residual**2, 0.0) * count / (count - 1))
     middle = (np.arange(CYCLE_BINS) + 0.5) * 2 * math.pi / CYCLE_BINS
     harmonics = harmonic_basis(middle, 1.0, len(waves) // 2) @ fit.coefficients[waves]

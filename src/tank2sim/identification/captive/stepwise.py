@@ -24,8 +24,12 @@ _STEPS: tuple[tuple[RunType, str], ...] = (
     ("pure_yaw", "r"),
     ("yaw_with_drift", "vr"),
     ("drift_and_rudder", "vd"),
+    ("steady_turn", "vrd"),
 )
 """Type of run, and the motions whose terms it gives, in the order of the steps."""
+
+_ALONE = (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"))
+"""Types of run in one motion alone."""
 
 _LEAST_SPREAD = 0.5
 """Least standard error of a difference, relative to that of the regression: smaller differences do not matter."""
@@ -64,16 +68,22 @@ class Disagreement:
 def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float) -> Stepwise:
     """The terms of a force in the paper's order, with the weights of the whole campaign.
 
-    The steps use the runs at the test speed; runs at other speeds give the terms in Du, last.
+    The steps use the upright runs at the test speed; runs at other speeds give the terms in Du, and runs at a heel
+    those of the heel, last.
     """
     names: list[str] = []
     found_in: list[str] = []
     values, covariance = np.zeros(0), np.zeros((0, 0))
-    for kind, motions in (*_STEPS, ("", "vrdu")):
+    for kind, motions in (*_STEPS, ("", "vrduphi")):
         places = [
             place
             for place, run in enumerate(equations.runs)
-            if not kind or (run.run.type == kind and abs(run.motion.mean_speed_mps / test_speed_mps - 1) <= SPEED_RANGE)
+            if not kind
+            or (
+                run.run.type == kind
+                and abs(run.motion.mean_speed_mps / test_speed_mps - 1) <= SPEED_RANGE
+                and not run.motion.heel_rad
+            )
         ]
         if not places:
             continue
@@ -112,7 +122,7 @@ def scatter_within_tests(equations: CampaignEquations) -> Spread:
     """
     columns, names = [equations.design], list(equations.names)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
-    for kind, letter in (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"), ("drift_and_rudder", "v")):
+    for kind, letter in (*_ALONE, ("drift_and_rudder", "v"), ("steady_turn", "r")):
         name = equations.force + letter
         if name not in equations.names or not np.any(kinds == kind):
             continue
@@ -141,7 +151,7 @@ def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions
     for name, reached in zip(part.names, reach, strict=True):
         term = parse_term(name.partition(" ")[0])
         assert term is not None
-        letters = {letter for letter in "vrdu" if getattr(term, letter)} | set(term.acceleration)
+        letters = set("".join(term.powers)) | set(term.acceleration)
         if name in found or reached < 1e-6 or not letters <= set(motions):
             continue
         trial = part.of_terms([*new, name])

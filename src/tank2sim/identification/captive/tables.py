@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tank2sim.identification.captive.equations import HEEL_TERMS
 from tank2sim.identification.captive.reduction import Reduction
 from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice
@@ -30,7 +31,7 @@ class Stepped:
 
 @dataclass(frozen=True)
 class DerivativeRow:
-    """A derivative of the card (prime); ``stepped`` is None if the paper's order does not give it."""
+    """A derivative (prime); ``stepped`` is None if the paper's order does not give it."""
 
     name: str
     value: float
@@ -41,14 +42,24 @@ class DerivativeRow:
 
 
 def derivative_rows(reduction: Reduction, card: Contents) -> list[DerivativeRow]:
-    """The derivatives of the card, in its order."""
+    """The derivatives of the card, in its order, and those of the heel, which the card does not have."""
     rows = []
     for name, entry in card.entries.items():
         estimated = name in card.estimated
         stepped = None if estimated else by_the_papers_order(reduction, name)
         origin = "estimated" if estimated else "measured"
         rows.append(DerivativeRow(name, float(entry.value), float(entry.standard_error), stepped, origin))
+    for name in terms_of_heel(reduction):
+        found = reduction.derivatives[name]
+        stepped = by_the_papers_order(reduction, name)
+        rows.append(DerivativeRow(name, found.value, found.standard_error, stepped, "measured"))
     return rows
+
+
+def terms_of_heel(reduction: Reduction) -> list[str]:
+    """Names of the derivatives of the heel that were found."""
+    names = [name for terms in HEEL_TERMS.values() for name in terms]
+    return [name for name in names if name in reduction.derivatives]
 
 
 def by_the_papers_order(reduction: Reduction, name: str) -> Stepped | None:

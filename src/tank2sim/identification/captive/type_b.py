@@ -7,7 +7,7 @@ Different errors are independent and add in squares.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,13 +64,16 @@ def _with_altered_data(
         return _model(campaign, "yaw_inertia_kgm2", 1 + size), list(runs)
     if source == "calibration_relative":
         return campaign, [_scaled(run, 1 + size) for run in runs]
-    changes: dict[str, Callable[[CaptiveMotion], CaptiveMotion]] = {
-        "alignment_rad": lambda motion: replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size)),
-        "rudder_rad": lambda motion: replace(motion, delta_rad=motion.delta_rad + size),
-        "speed_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
-        "blockage_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
-    }
-    return campaign, [replace(run, motion=changes[source](run.motion)) for run in runs]
+    return campaign, [replace(run, motion=_erring(run.motion, source, size)) for run in runs]
+
+
+def _erring(motion: CaptiveMotion, source: str, size: float) -> CaptiveMotion:
+    if source == "alignment_rad":
+        return motion.with_error(source, size, v_mps=motion.v_mps - motion.speed_mps * np.sin(size))
+    if source == "rudder_rad":
+        return motion.with_error(source, size, delta_rad=motion.delta_rad + size)
+    assert source in ("speed_relative", "blockage_relative")
+    return motion.with_error(source, size, speed_mps=motion.speed_mps * (1 + size))
 
 
 def _model(campaign: Campaign, key: str, factor: float) -> Campaign:

@@ -17,7 +17,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.captive.reduction import Reduction
 from tank2sim.identification.captive.regression import Solution, efficient_solution
 from tank2sim.identification.captive.selection import Selection
-from tank2sim.records.campaign_form import UncertaintySection
+from tank2sim.records.campaign_form import ModelSection, TankSection, TankTest, UncertaintySection
 
 COVERAGE_FACTOR = 2.0
 """k of the expanded uncertainty: 95 % (ITTC 7.5-02-06-04)."""
@@ -140,13 +140,12 @@ def sources_not_stated(reduction: Reduction) -> tuple[str, ...]:
     return tuple(key for key in UncertaintySection.model_fields if key not in stated | shown)
 
 
-def blockage_speed(reduction: Reduction) -> float | None:
+def blockage_speed(model: ModelSection, tank: TankSection, test: TankTest) -> float | None:
     """Relative increase of the speed of the water past the model by the tank's walls; None if a number is missing.
 
     m / (1 - m - Fnh^2), the mean flow of Schuster's formula (ITTC 7.5-02-02-01), m the share of the section that the
     model fills (as a box of B x T), Fnh the Froude number by depth.
     """
-    model, tank, test = reduction.campaign.model, reduction.campaign.tank, reduction.campaign.test
     if model.beam_m is None or model.draught_m is None or tank.breadth_m is None or tank.depth_m is None:
         return None
     share = model.beam_m * model.draught_m / (tank.breadth_m * tank.depth_m)

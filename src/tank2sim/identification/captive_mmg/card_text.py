@@ -71,6 +71,9 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
     of_rudder["height_m"] = rudder.height_m
     of_rudder["f_alpha"] = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
     of_rudder["x_R"] = rudder.x_R
+    if form.propeller.number == 2:
+        propeller["number"] = of_rudder["number"] = 2
+        propeller["y_P"], of_rudder["y_R"] = form.propeller.y_P, rudder.y_R
     for name in (name for name in values if name in PROPELLER_COEFFICIENTS or name in RUDDER_COEFFICIENTS):
         (propeller if name in PROPELLER_COEFFICIENTS else of_rudder)[name] = _rounded(values[name])
         if name in errors:

@@ -1,7 +1,9 @@
 """One weighted regression of all steady captive tests on the MMG method, by the equations of the simulated ship.
 
 The readings of each condition (u, v, r, delta, n) are X, Y, N, T and F_N of :mod:`tank2sim.dynamics.mmg`; the points of
-the open-water curve are K_T = k_0 + k_1 J + k_2 J^2. All coefficients theta are found together:
+the open-water curve are K_T = k_0 + k_1 J + k_2 J^2. Torque, where it was measured, is Q = rho n^2 D^5 K_Q/eta_R with
+K_Q = q_0 + q_1 J + q_2 J^2 of the open-water test at the J of the thrust, eta_R the relative rotative efficiency (ITTC
+7.5-02-03-01.4). All coefficients theta are found together:
 
     minimise  sum_c sum_i (y_ci - f_c(theta))^2/sigma_c^2 + sum_k (theta_k - m_k)^2/s_k^2
 
@@ -9,13 +11,14 @@ The error sigma_c of a channel is estimated from what is left, sigma_c^2 = RSS_c
 of the projection (variance components: Förstner 1979). m_k and s_k are those of ordinary ships with one screw, wide
 enough that only what the tests leave open takes its value from there; such coefficients are marked. m_x' and m_y',
 which steady tests do not show, have those of a published estimate: its error is in those of Y_r' and X_vr'. The
-covariance is the inverse of the normal matrix.
+covariance is the inverse of the normal matrix, and the outer products of what errors common to all conditions, as
+``[uncertainty]`` states them, move the coefficients by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -32,7 +35,8 @@ from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses, mmg_card_text
-from tank2sim.identification.captive_mmg.steady_tests import CHANNELS, SteadyTests
+from tank2sim.identification.captive_mmg.common_errors import erring_tests
+from tank2sim.identification.captive_mmg.steady_tests import TORQUE, SteadyTests
 
 ORDINARY: dict[str, tuple[float, float]] = {
     "t_P": (0.2, 0.1),
@@ -59,9 +63,12 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "C_2_minus": (0.0, 5.0),
     "eps": (0.2, 3.0),
     "kappa": (0.0, 3.0),
+    "eta_R": (0.5, 1.5),
 }
 """Limits in which a coefficient is looked for. Project choice: beyond them it is not that of a ship; the regression
 would otherwise fit a normal force of the other sign by eps < 0."""
+OF_TORQUE = ("q_0", "q_1", "q_2", "eta_R")
+"""Coefficients of K_Q in open water, and the relative rotative efficiency; a card does not have them."""
 OPEN = 0.7
 """Standard error over that of ordinary ships from which a coefficient is called open. Project choice: the tests then
 halve the variance at best."""
@@ -69,7 +76,16 @@ OFFSETS = ("Y0", "N0", "rudder_offset")
 """Of a model that is not alike to both sides: force and moment straight ahead, and the angle of no rudder force."""
 KEPT_FROM = 3.0
 """Standard errors from which an offset is kept. Project choice: by chance in three of a thousand."""
-_QUANTITIES = ("force.X", "force.Y", "force.N", "propeller.thrust", "rudder.normal_force")
+_QUANTITIES = {
+    "X": "force.X",
+    "Y": "force.Y",
+    "N": "force.N",
+    "T": "propeller.thrust",
+    "F_N": "rudder.normal_force",
+    "T_left": "propeller.thrust_left",
+    "F_N_left": "rudder.normal_force_left",
+}
+"""Channel to the quantity of the model that it reads; with two sides that of the right ends in ``_right``."""
 _MOTION = ("motion.u", "motion.v", "motion.r", "rudder.angle", "propeller.speed")
 _START_X0 = -0.02
 """X_0' (prime II) with which the regression starts: the KVLCC2 has -0.022."""
@@ -96,11 +112,16 @@ class MmgFit:
         Coefficients; those of the hull in prime II; ``rudder_offset`` in rad.
     values : array, (k,)
     covariance : array, (k, k)
-    sigmas : array, (6,)
-        Standard deviation of what is left of :data:`CHANNELS` (N, N m) and of K_T.
-    residuals : array, (conditions, 5)
+        Of both types.
+    random : array, (k,)
+        Standard errors by the scatter alone (Type A).
+    common : mapping
+        Key of ``[uncertainty]`` to the standard errors by it (Type B), (k,).
+    sigmas : array, (channels + 1 or 2,)
+        Standard deviation of what is left of the channels (N, N m), of K_T, and with torque of K_Q.
+    residuals : array, (conditions, channels)
         Measured less computed, N and N m.
-    explained : array, (5,)
+    explained : array, (channels,)
         Share of the variance of each channel that is explained.
     not_excited : tuple of str
         Coefficients of the hull that no condition shows; zero.
@@ -110,6 +131,8 @@ class MmgFit:
     names: tuple[str, ...]
     values: Array
     covariance: Array
+    random: Array
+    common: Mapping[str, Array]
     sigmas: Array
     residuals: Array
     explained: Array
@@ -123,7 +146,7 @@ class MmgFit:
     @property
     def open(self) -> tuple[str, ...]:
         """Coefficients that the tests leave open: they are those of ordinary ships."""
-        pairs = zip(self.names, self.errors, strict=True)
+        pairs = zip(self.names, self.random, strict=True)
         return tuple(name for name, error in pairs if name in ORDINARY and error > OPEN * ORDINARY[name][1])
 
     @property
@@ -136,8 +159,8 @@ class MmgFit:
         )
 
     def in_errors(self, name: str) -> float:
-        """Size of a coefficient over its standard error."""
-        return abs(self.value(name)) / float(self.errors[self.names.index(name)])
+        """Size of a coefficient over its standard error by the scatter."""
+        return abs(self.value(name)) / float(self.random[self.names.index(name)])
 
     def value(self, name: str) -> float:
         """A coefficient; 0 if it was not fitted."""
@@ -177,7 +200,7 @@ def _refuse_poor(tests: SteadyTests) -> None:
     for column, what in ((3, "rudder angle"), (1, "drift angle")):
         if len(np.unique(np.round(tests.motion[:, column], 6))) < 3:
             raise InputError(tests.path, "averages", f"has less than three values of the {what}", remedy)
-    for channel, readings in zip(CHANNELS, tests.readings.T, strict=True):
+    for channel, readings in zip(tests.channels, tests.readings.T, strict=True):
         if not np.ptp(readings) > 0:
             raise InputError(tests.path, "averages", f"{channel} is the same in all conditions", "the gauge is dead")
 
@@ -200,7 +223,8 @@ def _fitted_names(tests: SteadyTests) -> tuple[list[str], tuple[str, ...]]:
             hull.append(name)
     turning = ("l_R", "Xudot", "Yvdot")
     others = [name for name in (*ORDINARY, "Xudot", "Yvdot") if name not in turning or np.any(r)]
-    return ["k_0", "k_1", "k_2", *others, *hull, "rudder_offset"], tuple(missing)
+    torque = OF_TORQUE if TORQUE in tests.channels else ()
+    return ["k_0", "k_1", "k_2", *others, *hull, *torque, "rudder_offset"], tuple(missing)
 
 
 def start_card(tests: SteadyTests) -> MmgCard:
@@ -216,12 +240,14 @@ def start_card(tests: SteadyTests) -> MmgCard:
 
 def _open_water(tests: SteadyTests) -> Array:
     """k_0, k_1, k_2 of the open-water points alone, with which the regression starts."""
-    J, K_T = tests.open_water.T.tolist()
+    J, K_T = tests.open_water.T[:2].tolist()
     return open_water_fit(J, K_T, str(tests.path)).coefficients
 
 
-def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Function:
-    """The readings and their slopes: (motion (5,), theta (k,)) to (readings (5,), slopes (5, k)).
+def computed_readings(model: Model, names: Sequence[str], units: Array, channels: Sequence[str]) -> ca.Function:
+    """The readings and their slopes: (motion (5,), theta (k,)) to (readings (c,), slopes (c, k)).
+
+    The torque is among the c channels if its coefficients are among the names.
 
     Parameters
     ----------
@@ -230,6 +256,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Fu
     names : sequence of str, (k,)
     units : array, (k,)
         What one of a coefficient is in the model: L/d of those of the hull.
+    channels : sequence of str, (c,)
     """
     theta, motion = ca.SX.sym("theta", len(names)), ca.SX.sym("motion", len(_MOTION))
     given = {name: motion[i] for i, name in enumerate(_MOTION)}
@@ -244,8 +271,19 @@ def computed_readings(model: Model, names: Sequence[str], units: Array) -> ca.Fu
     )
     stated = zip(model.parameter_names, model.parameter_values(), strict=True)
     parameters = ca.vertcat(*(given.get(name, value) for name, value in stated))
-    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in _QUANTITIES)))
-    forces = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
+    right = "_right" if "T_left" in channels else ""
+    read = [_QUANTITIES[channel] for channel in channels if channel != TORQUE]
+    read = [name + right * (name in (_QUANTITIES["T"], _QUANTITIES["F_N"])) for name in read]
+    quantities = model.expand(ca.vertcat(*(model.symbol(name) for name in (*read, f"propeller.inflow{right}"))))
+    found = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
+    forces = found[:-1]
+    if "eta_R" in names:
+        q_0, q_1, q_2, eta_R = (theta[names.index(name)] for name in OF_TORQUE)
+        of_ship = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+        density, diameter = of_ship["ship.water_density"], of_ship["ship.propeller_diameter"]
+        n, u_P = motion[4] / (2 * ca.pi), found[-1]
+        K_Q = q_0 * (n * diameter) ** 2 + q_1 * n * diameter * u_P + q_2 * u_P**2  # times (n D)^2
+        forces = ca.vertcat(forces, density * diameter**3 * K_Q / eta_R)
     return ca.Function("readings", [motion, theta], [forces, ca.jacobian(forces, theta)])
 
 
@@ -288,9 +326,18 @@ class _Regression:
 
     @cached_property
     def channel(self) -> NDArray[np.int_]:
-        """Channel of each equation: five of the conditions, then the open-water points."""
-        count, points = len(self.tests.names), len(self.tests.open_water)
-        return np.concatenate([np.repeat(np.arange(len(CHANNELS)), count), np.full(points, len(CHANNELS))])
+        """Channel of each equation: those of the conditions, then K_T and K_Q of the open-water points."""
+        (count, channels), (points, columns) = self.tests.readings.shape, self.tests.open_water.shape
+        curves = channels + np.repeat(np.arange(columns - 1), points)
+        return np.concatenate([np.repeat(np.arange(channels), count), curves])
+
+    def curve_slopes(self) -> Array:
+        """Of the open-water points by the coefficients, (points of K_T and K_Q, k)."""
+        blocks = []
+        for first in ("k_0", "q_0")[: self.tests.open_water.shape[1] - 1]:
+            place = self.names.index(first)
+            blocks.append(np.pad(self.powers, ((0, 0), (place, len(self.names) - 3 - place))))
+        return np.vstack(blocks)
 
     @cached_property
     def _computed(self) -> ca.Function:
@@ -298,21 +345,20 @@ class _Regression:
         assert form.model.draught_m is not None
         ratio = form.model.draught_m / form.model.length_m
         units = np.array([ratio if _variable(name).startswith("derivatives") else 1.0 for name in self.names])
-        return computed_readings(self.model, self.names, units).map(len(self.tests.names))
+        return computed_readings(self.model, self.names, units, self.tests.channels).map(len(self.tests.names))
 
     def misfit(self, theta: Array) -> Array:
         """Measured less computed, (equations,), N, N m and K_T."""
         forces, _ = self._computed(self.tests.motion.T, np.tile(theta[:, None], len(self.tests.names)))
-        curve = self.tests.open_water[:, 1] - self.powers @ theta[:3]
+        curve = self.tests.open_water[:, 1:].T.ravel() - self.curve_slopes() @ theta
         return np.concatenate([(self.tests.readings.T - np.array(forces)).ravel(), curve])
 
     def slopes(self, theta: Array) -> Array:
         """Of the misfit, (equations, k)."""
         count = len(self.tests.names)
         _, jacobian = self._computed(self.tests.motion.T, np.tile(theta[:, None], count))
-        by_condition = np.array(jacobian).reshape(len(CHANNELS), count, len(self.names))
-        curve = np.pad(self.powers, ((0, 0), (0, len(self.names) - 3)))
-        return -np.vstack([*by_condition, curve])
+        by_condition = np.array(jacobian).reshape(len(self.tests.channels), count, len(self.names))
+        return -np.vstack([*by_condition, self.curve_slopes()])
 
     def start(self) -> Array:
         """Means of ordinary ships, no hull but its resistance."""
@@ -321,12 +367,16 @@ class _Regression:
             theta[i] = mean
         theta[:3] = _open_water(self.tests)
         theta[self.names.index("X0")] = _START_X0
+        if "eta_R" in self.names:
+            place = self.names.index("q_0")
+            theta[place : place + 3] = np.linalg.lstsq(self.powers, self.tests.open_water[:, 2], rcond=None)[0]
+            theta[self.names.index("eta_R")] = 1.0
         return theta
 
     def fit(self, not_excited: tuple[str, ...]) -> MmgFit:
         """Least squares and variance components in turn until both stay."""
         tests, channel = self.tests, self.channel
-        sizes = np.append(tests.readings.std(axis=0), tests.open_water[:, 1].std())
+        sizes = np.concatenate([tests.readings.std(axis=0), tests.open_water[:, 1:].std(axis=0)])
         theta, sigmas = self.start(), _START_SIGMA * sizes
         by_prior = np.array([np.eye(len(theta))[i] / spread for i, (_, spread) in self.priors.items()])
         means = np.array([mean / spread for mean, spread in self.priors.values()])
@@ -348,13 +398,23 @@ class _Regression:
             if np.all(np.abs(sigmas / before - 1) < _SETTLED):
                 break
         inverse = np.linalg.inv(triangle)
+        covariance = inverse @ inverse.T
+        random, common = np.sqrt(np.diag(covariance)), dict[str, Array]()
+        for source, erring in erring_tests(tests):
+            change = (replace(self, tests=erring).misfit(theta) - self.misfit(theta)) * weights
+            moved = inverse @ (orthogonal[: len(channel)].T @ change)
+            covariance = covariance + np.outer(moved, moved)
+            common[source] = np.hypot(common.get(source, 0.0), moved)
         count = len(tests.names)
-        residuals = self.misfit(theta)[: count * len(CHANNELS)].reshape(len(CHANNELS), count).T
+        channels = len(tests.channels)
+        residuals = self.misfit(theta)[: count * channels].reshape(channels, count).T
         return MmgFit(
             tests=tests,
             names=self.names,
             values=theta,
-            covariance=inverse @ inverse.T,
+            covariance=covariance,
+            random=random,
+            common=common,
             sigmas=sigmas,
             residuals=residuals,
             explained=1 - residuals.var(axis=0) / tests.readings.var(axis=0),

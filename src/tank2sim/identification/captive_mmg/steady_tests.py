@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,12 +11,21 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.harmonics import reduced_run
+from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.records.averages import Condition, read_averages, read_columns
 from tank2sim.records.campaign_form import CampaignFile
-from tank2sim.records.campaigns import read_campaign_file
+from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_file, together
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
+LEFT = ("T_left", "F_N_left")
+"""Thrust and normal force on the left side of a ship with two propellers and rudders; T and F_N are of the right."""
+TORQUE = "Q"
+"""The channel of the propeller's torque (N m), which comes after the others if it was measured."""
+_K_Q_OVER_K_T = (0.03, 0.3)
+"""Range of K_Q over K_T at the lowest J. Project choice: the KVLCC2's is 0.10 at J = 0 (HMRI), and no usual screw is a
+factor of three away; 10 K_Q is."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,13 +39,13 @@ class SteadyTests:
     form : CampaignFile
         What it states.
     names : tuple of str, (conditions,)
-        File and line of each condition.
+        File of each condition, and line in a table of averages.
     motion : array, (conditions, 5)
         u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
-    readings : array, (conditions, 5)
-        :data:`CHANNELS`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
-    open_water : array, (points, 2)
-        J and K_T.
+    readings : array, (conditions, 5 to 7)
+        :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
+    open_water : array, (points, 2 or 3)
+        J, K_T, and K_Q if the torque was measured.
     remarks : tuple of str
         Of reading the files.
     """
@@ -50,6 +59,12 @@ class SteadyTests:
     remarks: tuple[str, ...]
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """:data:`CHANNELS`, and :data:`LEFT` of two sides, or :data:`TORQUE` if it was measured."""
+        others = LEFT if self.form.propeller.number == 2 else (TORQUE,)
+        return (*CHANNELS, *others)[: self.readings.shape[1]]
+
+    @property
     def speed_mps(self) -> Array:
         """U, m/s, (conditions,)."""
         return np.hypot(self.motion[:, 0], self.motion[:, 1])
@@ -61,44 +76,57 @@ class SteadyTests:
 
 
 def read_steady_tests(path: Path) -> SteadyTests:
-    """The conditions that ``[averages]`` of a campaign names, with thrust and normal force.
+    """The conditions of a campaign with thrust and normal force: rows of ``[averages]``, or means of steady runs.
 
     Raises
     ------
     InputError
-        The file or its table is at fault, or lacks what the MMG method needs: thrust, normal force, revolutions, the
+        A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force, revolutions, the
         open-water curve, and the sizes of model, propeller and rudder.
     """
     form, factors = read_campaign_file(path)
     _refuse_missing(form, path)
-    conditions, remarks = read_averages(form, factors, path)
+    conditions, remarks = read_averages(form, factors, path) if form.averages else _averaged_runs(form, path)
+    with_torque = all(condition.torque_Nm is not None for condition in conditions)
+    if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
+        first = next(condition.name for condition in conditions if condition.torque_Nm is None)
+        raise InputError(path, "runs", f"{first} has no torque, and others have", "record it in all runs, or in none")
+    if heeled := next((condition.name for condition in conditions if condition.heel_rad), ""):
+        remedy = "reduce such tests to a polynomial, without --model mmg"
+        raise InputError(
+            path, "averages.columns.heel_rad", f"{heeled} has a heel; the method is of an upright hull", remedy
+        )
     return SteadyTests(
         path=path,
         form=form,
         names=tuple(condition.name for condition in conditions),
         motion=np.array([_motion(condition) for condition in conditions]),
         readings=np.array([_readings(condition, form) for condition in conditions]),
-        open_water=_open_water(form, path),
+        open_water=_open_water(form, path, with_torque=with_torque),
         remarks=tuple(remarks),
     )
 
 
 def _refuse_missing(form: CampaignFile, path: Path) -> None:
     """Raise InputError for the first thing that the MMG method needs and the campaign does not state."""
-    if form.averages is None:
-        remedy = "give one row a condition in a table, with [averages.columns]"
+    needed: dict[str, tuple[object, str]] = {}
+    if form.averages is not None:
+        columns = form.averages.columns
+        needed |= {
+            "averages.columns.thrust": (columns.thrust, "the wake follows from the thrust: name its column"),
+            "averages.columns.rudder_normal_force": (
+                columns.rudder_normal_force,
+                "it separates the rudder from the hull: name its column",
+            ),
+            "test.propeller_radps": (
+                columns.propeller_radps or form.test.propeller_radps,
+                "give propeller_rps, or a column propeller_rps",
+            ),
+        }
+    elif not form.runs:
+        remedy = "give one row a condition in a table, with [averages.columns], or a file a condition in [[runs]]"
         raise InputError(path, "averages", "is missing: MMG takes averages of steady tests", remedy)
-    columns = form.averages.columns
-    needed: Mapping[str, tuple[object, str]] = {
-        "averages.columns.thrust": (columns.thrust, "the wake follows from the thrust: name its column"),
-        "averages.columns.rudder_normal_force": (
-            columns.rudder_normal_force,
-            "it separates the rudder from the hull: name its column",
-        ),
-        "test.propeller_radps": (
-            columns.propeller_radps or form.test.propeller_radps,
-            "give propeller_rps, or a column propeller_rps",
-        ),
+    needed |= {
         "open_water": (form.open_water, "give J and K_T of the propeller, or a file of them"),
         "rudder": (form.rudder, "give height_m, and aspect_ratio or f_alpha"),
         "model.beam_m": (form.model.beam_m, "the added masses are estimated from it: add it"),
@@ -106,6 +134,8 @@ def _refuse_missing(form: CampaignFile, path: Path) -> None:
         "model.propeller_diameter_m": (form.model.propeller_diameter_m, "add it"),
         "model.rudder_area_m2": (form.model.rudder_area_m2, "add the area of the rudder"),
     }
+    if form.propeller.number == 2:
+        needed |= _needed_of_two(form, path)
     for place, (value, remedy) in needed.items():
         if value is None:
             raise InputError(path, place, "is missing, and the MMG method needs it", remedy)
@@ -113,6 +143,83 @@ def _refuse_missing(form: CampaignFile, path: Path) -> None:
     if (form.rudder.aspect_ratio is None) == (form.rudder.f_alpha is None):
         given = "both are given" if form.rudder.f_alpha else "neither is given"
         raise InputError(path, "rudder.f_alpha", f"and aspect_ratio: {given}", "give one of the two")
+
+
+def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, str]]:
+    """What two propellers and rudders need: place to what is given there and a remedy."""
+    if form.averages is None:
+        raise InputError(path, "propeller.number", "is 2, and there are [[runs]]", "give their means in [averages]")
+    columns = form.averages.columns
+    if columns.torque is not None:
+        remedy = "leave the column out"
+        raise InputError(path, "averages.columns.torque", "is of one of two propellers", remedy)
+    return {
+        "propeller.y_P": (form.propeller.y_P, "give the place of the right propeller over L"),
+        "rudder.y_R": (form.rudder and form.rudder.y_R, "give the place of the right rudder over L"),
+        "averages.columns.thrust_left": (columns.thrust_left, "thrust is that of the right one: name both columns"),
+        "averages.columns.rudder_normal_force_left": (
+            columns.rudder_normal_force_left,
+            "rudder_normal_force is that of the right one: name both columns",
+        ),
+    }
+
+
+def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[str]]:
+    """The means of the steady runs of a campaign; runs that oscillate are left out, and named.
+
+    Raises
+    ------
+    InputError
+        Runs have faults, or lack thrust, normal force or revolutions; all such runs are reported.
+    """
+    campaign = read_campaign(path)
+    steady = [run for run in campaign.runs if not run.oscillates]
+    faults = []
+    for run in steady:
+        found = [*_lacking(run), *record_faults(campaign, run)]
+        faults += (found or [*reduced_faults(reduced_run(run))])[:1]
+    if faults:
+        raise together(faults)
+    oscillating = [run.name for run in campaign.runs if run.oscillates]
+    remarks = []
+    if oscillating:
+        remarks = [
+            f"Left out, because MMG takes steady tests: {len(oscillating)} oscillating runs, {oscillating[0]} first."
+        ]
+    return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
+
+
+def _lacking(run: CaptiveRun) -> Iterator[InputError]:
+    """What a steady run must have for the MMG method and does not."""
+    remedy = "record it, or name its column in [columns]"
+    needed = {"thrust_N": run.thrust_N, "rudder_normal_force_N": run.rudder_normal_force_N}
+    for column, values in needed.items():
+        if values is None:
+            yield InputError(run.name, "header", f"there is no column {column}, which the MMG method needs", remedy)
+    if not run.propeller_radps:
+        remedy = "give a column propeller_rps, or propeller_rps of the run or [test]"
+        yield InputError(run.name, "header", "there are no revolutions, which the MMG method needs", remedy)
+
+
+def _condition(run: CaptiveRun, form: CampaignFile) -> Condition:
+    """Means of a steady run; forces in the sense of the file again, as those of a table."""
+    assert run.thrust_N is not None and run.rudder_normal_force_N is not None
+    speed, sense = float(np.mean(run.speed_mps)), form.test.sense
+    return Condition(
+        name=run.name,
+        drift_rad=float(-np.arcsin(np.clip(np.mean(run.v_mps) / speed, -1.0, 1.0))),
+        rudder_rad=float(np.mean(run.delta_rad)),
+        speed_mps=speed,
+        X_N=sense * float(np.mean(run.X_N)),
+        Y_N=sense * float(np.mean(run.Y_N)),
+        N_Nm=sense * float(np.mean(run.N_Nm)),
+        propeller_radps=run.propeller_radps,
+        yaw_rate_radps=float(np.mean(run.r_radps)),
+        thrust_N=float(np.mean(run.thrust_N)),
+        rudder_normal_force_N=float(np.mean(run.rudder_normal_force_N)),
+        heel_rad=run.heel_rad,
+        torque_Nm=None if run.torque_Nm is None else float(np.mean(run.torque_Nm)),
+    )
 
 
 def _motion(condition: Condition) -> tuple[float, ...]:
@@ -128,25 +235,45 @@ def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
         u, v, r, _, _ = _motion(condition)
         forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)
     assert condition.thrust_N is not None and condition.rudder_normal_force_N is not None
-    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N
+    others: tuple[float, ...] = () if condition.torque_Nm is None else (condition.torque_Nm,)
+    if form.propeller.number == 2:
+        assert condition.thrust_left_N is not None and condition.rudder_normal_force_left_N is not None
+        others = condition.thrust_left_N, condition.rudder_normal_force_left_N
+    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N, *others
 
 
-def _open_water(form: CampaignFile, path: Path) -> Array:
+def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
     section = form.open_water
     assert section is not None
+    given = {"J": section.J, "K_T": section.K_T}
+    if with_torque:
+        if section.K_Q is None:
+            remedy = "give K_Q of the open-water test, or leave the torque out"
+            raise InputError(path, "open_water.K_Q", "is missing, and the torque was measured", remedy)
+        given["K_Q"] = section.K_Q
+    headings = {key: heading for key, heading in given.items() if isinstance(heading, str)}
     if section.file is None:
-        if isinstance(section.J, str) or isinstance(section.K_T, str):
-            raise InputError(path, "open_water.J", "is missing", "give lists J and K_T, or a file of them")
-        values = {"J": section.J, "K_T": section.K_T}
+        if headings:
+            raise InputError(path, f"open_water.{next(iter(headings))}", "is missing", "give lists, or a file of them")
+        values = {key: points for key, points in given.items() if not isinstance(points, str)}
     else:
-        if not (isinstance(section.J, str) and isinstance(section.K_T, str)):
-            raise InputError(path, "open_water.J", "is a list, and a file is given", "give one of the two")
-        columns = read_columns(path.parent / section.file, {"J": section.J, "K_T": section.K_T})
-        values = {key: columns[key] for key in ("J", "K_T")}
-    if len(values["J"]) != len(values["K_T"]):
-        problem = f"has {len(values['K_T'])} values and J {len(values['J'])}"
-        raise InputError(path, "open_water.K_T", problem, "give a K_T for each J")
+        if headings != given:
+            place = next(key for key in given if key not in headings)
+            raise InputError(path, f"open_water.{place}", "is a list, and a file is given", "give one of the two")
+        values = read_columns(path.parent / section.file, headings)
+    for key, points in values.items():
+        if len(points) != len(values["J"]):
+            problem = f"has {len(points)} values and J {len(values['J'])}"
+            raise InputError(path, f"open_water.{key}", problem, f"give a {key} for each J")
     if len(set(values["J"])) < 4:
         remedy = "a quadratic and its error need four"
         raise InputError(path, "open_water.J", "has less than four different values", remedy)
-    return np.column_stack([values["J"], values["K_T"]])
+    table = np.column_stack([values[key] for key in given])
+    if with_torque:
+        table[:, 2] *= section.K_Q_factor
+        first = int(np.argmin(np.abs(table[:, 0])))
+        low, high = _K_Q_OVER_K_T
+        if not low * table[first, 1] < table[first, 2] < high * table[first, 1]:
+            problem = f"is {table[first, 2]:.3g} next to K_T = {table[first, 1]:.3g} at J = {table[first, 0]:.3g}"
+            raise InputError(path, "open_water.K_Q", problem, "if the column is 10 K_Q, give K_Q_factor = 0.1")
+    return table

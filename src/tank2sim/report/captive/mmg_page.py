@@ -8,7 +8,7 @@ import altair as alt
 
 from tank2sim.report.kit.chart_parts import NUMBER, data
 from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 
 _CHANNELS = {
     "X": "surge force",
@@ -16,6 +16,9 @@ _CHANNELS = {
     "N": "yaw moment",
     "T": "thrust",
     "F_N": "normal force of the rudder",
+    "T_left": "thrust of the left propeller",
+    "F_N_left": "normal force of the left rudder",
+    "Q": "torque of the propeller",
 }
 
 
@@ -30,6 +33,28 @@ def mmg_reduction_page(found: Json) -> Page:
         [_CHANNELS[name], entry["unit"], entry["standard_deviation"], 100 * entry["unexplained"]]
         for name, entry in found["channels"].items()
     ]
+    sources = list(dict.fromkeys(source for entry in coefficients.values() for source in entry["type_b"]))
+    shares: list[list[Cell]] = [
+        [
+            name,
+            *(
+                round(100 * (part / entry["standard_error"]) ** 2, 2)
+                for part in (entry["type_a"], *(entry["type_b"].get(source, 0.0) for source in sources))
+            ),
+            entry["standard_error"],
+            2 * entry["standard_error"],
+        ]
+        for name, entry in coefficients.items()
+    ]
+    budget = PageTable(
+        caption="Shares of the variance",
+        columns=[
+            *(Column(title=""), Column(title="scatter", unit="%", digits=3)),
+            *(Column(title=source.rpartition("_")[0], unit="%", digits=3) for source in sources),
+            *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+        ],
+        rows=shares,
+    )
     left_heads = ("", "unit", "standard deviation", "% of the rms")
     return Page(
         title=f"{found['model']}: coefficients of the MMG method",
@@ -50,6 +75,12 @@ def mmg_reduction_page(found: Json) -> Page:
                 text="One weighted regression of all readings. The hull is in prime II, by 1/2 rho L d U².",
                 tables=[PageTable(caption="Coefficients", columns=[Column(title=head) for head in heads], rows=rows)],
                 notes=found["notices"],
+            ),
+            PageSection(
+                heading="Uncertainty budget",
+                text="After ITTC 7.5-02-06-04: the scatter of the tests, and errors common to all of them as "
+                "[uncertainty] of the campaign states them.",
+                tables=[budget],
             ),
             PageSection(
                 heading="Computed against measured",

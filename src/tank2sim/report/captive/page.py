@@ -46,7 +46,7 @@ def reduction_page(found: Json) -> Page:
         PageSection(
             heading="Derivatives",
             text="One weighted regression over the whole campaign, and next to it the paper's order of tests.",
-            tables=[_derivatives(derivatives)],
+            tables=[_derivatives(derivatives | found.get("heel_derivatives", {}))],
             notes=found["warnings"],
         ),
         *_budget(found.get("uncertainty_budget")),
