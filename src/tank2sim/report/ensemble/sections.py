@@ -32,6 +32,14 @@ _CHANCES = (
     "does not meet it. Where the trial of the card itself leaves the card's range no probability is reported."
 )
 
+_RARE = (
+    " Where fewer members fail than their share can be read from, the second table has the probability of not meeting "
+    "the criterion from members drawn about the ships that fail, each with its weight (importance sampling). Its "
+    "effective size is the number of failing members of the card's own errors that would say as much; without enough "
+    "there is no probability. Distance, and the probability if linear, are those of a figure that changes in "
+    "proportion to the card's numbers; the figure there shows whether it does."
+)
+
 
 def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VConcatChart:
     """Track and histories of the card itself, with the quantiles of the ensemble; those of the track across it."""
@@ -58,6 +66,23 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
     return alt.vconcat(track, history_chart(histories, signals_of(run.model, shown)))
 
 
+def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
+    """Small probabilities of not meeting a criterion, each with what it rests on."""
+    rows: list[list[Cell]] = []
+    for name, tail in rare:
+        moved = ", ".join(f"{number} {errors:+.1f}" for number, errors in tail["failing_ships"].items())
+        sizes = [None if tail[key] is None else f"{tail[key]:.2e}" for key in ("probability", "standard_error")]
+        effective = f"{tail['effective_size']:.0f} of {tail['members']}"
+        linear = f"{tail['linear_probability']:.2e}"
+        counts = f"{tail['not_shown']}, {tail['beyond_card']}, {tail['unusable']}"
+        figures = [tail["distance"], linear, tail["linear_figure"], tail["figure"]]
+        rows.append([name, *sizes, effective, *figures, counts, moved or tail["remark"]])
+    heads = ["criterion", "probability not met", "standard error", "effective size", "distance, sd", "if linear"]
+    heads += ["linear figure there", "figure there", "not shown, beyond the card, unusable", "failing ships, in errors"]
+    caption = "Too rare for the ensemble: by importance sampling."
+    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=rows)
+
+
 def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> PageSection:
     """Return the section of the page of stability: from ``ensemble`` and ``imo`` of the JSON."""
     beyond_card = {criterion["name"]: criterion["beyond_card"] for criterion in criteria}
@@ -74,17 +99,33 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
                 BEYOND_CARD_TEXT if beyond and met is not None else met,
                 f"{interval[0]:.3f} to {interval[1]:.3f}" if interval and not beyond else None,
                 chance["not_shown"],
+                chance.get("beyond_card"),
             ]
         )
-    heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
+    heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval"]
+    heads += ["not shown by", "beyond the card"]
     columns = [Column(title=head) for head in heads]
     probability = found["probability_stable"]
     stable = "" if probability is None else f" It is stable on a straight course with probability {probability:.3g}."
     criteria_table = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
+    together = found.get("imo_all")
+    if together:
+        low, high = together["interval_95"]
+        stable += (
+            f" The {len(together['criteria'])} criteria judged within the card's range are met together with "
+            f"probability {together['probability_met']:.3g} (95 % interval {low:.3f} to {high:.3f})."
+        )
+    rare = [(chance["name"], chance["tail"]) for chance in found["imo"] if chance.get("tail")]
+    if together and together["tail"]:
+        rare.append(("any of these", together["tail"]))
     return PageSection(
         heading=f"Ensemble of {found['members']}",
-        text=_TEXT + _CHANCES + stable,
-        tables=[criteria_table, _table("The straight course at the card's speed.", found["figures"])],
+        text=_TEXT + _CHANCES + stable + (_RARE if rare else ""),
+        tables=[
+            criteria_table,
+            *([_tail_table(rare)] if rare else []),
+            _table("The straight course at the card's speed.", found["figures"]),
+        ],
         charts=curve_charts(found["curves"]) if found["curves"] else (),
         notes=found["notices"],
     )
