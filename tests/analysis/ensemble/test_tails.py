@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tank2sim.analysis.ensemble.questions import BEYOND
-from tank2sim.analysis.ensemble.tails import EFFECTIVE, RARE, tails
+from tank2sim.analysis.ensemble.questions import BEYOND_CARD_MARK
+from tank2sim.analysis.ensemble.tails import EFFECTIVE, FEW_FAILING, tails
 from tank2sim.simulation.ensemble import AskTogether, BatchResult, Draws, MixtureDraws, ensemble
 
 SLOPES = np.array([3.0, -2.0, 0.5, 0.0, 1.0])
@@ -33,7 +33,7 @@ class Made:
             figures = {"a": a.copy(), "b": np.array([2.0, 3.0, 0, 0, 0]) @ x, "c": a + 0.15 * a * np.abs(a)}
             for figure in list(figures):
                 figures[figure][a > self.missing] = np.nan
-                figures[figure + BEYOND] = (figures[figure] > 5.0).astype(float)
+                figures[figure + BEYOND_CARD_MARK] = (figures[figure] > 5.0).astype(float)
             return BatchResult(figures, None, ["broken" if number > self.broken else "" for number in x[2]])
 
         return AskTogether(ask)
@@ -138,7 +138,7 @@ def test_a_limit_out_of_reach_has_no_probability_and_says_so() -> None:
 def test_nothing_is_searched_that_members_show() -> None:
     own = draws()
     found = ensemble(Made(), own, 1000)
-    often = float(np.sort(found.figures["a"])[-RARE - 1])
+    often = float(np.sort(found.figures["a"])[-FEW_FAILING - 1])
     assert tails(Made(), own, found, {"a": often})[0] == {}
     few, _, notices = tails(Made(), own, ensemble(Made(), own, 100), {"a": 4 * deviation(own)})
     assert few == {} and len(notices) == 1

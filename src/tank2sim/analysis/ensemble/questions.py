@@ -208,7 +208,7 @@ class OfFigures:
         return AskTogether(ask)
 
 
-BEYOND = ": beyond the card"
+BEYOND_CARD_MARK = ": beyond the card"
 """Ending of the name of a criterion's other entry in :class:`OfCriteria`."""
 
 
@@ -216,7 +216,7 @@ BEYOND = ": beyond the card"
 class OfCriteria:
     """Value of each IMO criterion by its name; nan where a trial does not show it.
 
-    With :data:`BEYOND` after its name: 1 where a trial left the card's range before it was known, else 0.
+    With :data:`BEYOND_CARD_MARK` after its name: 1 where a trial left the card's range before it was known, else 0.
     """
 
     ship: ShipText
@@ -237,7 +237,7 @@ class OfCriteria:
             figures: Numbers = {}
             for criterion in imo_criteria(model, given, each_step):
                 figures[criterion.name] = math.nan if criterion.found is None else criterion.found
-                figures[criterion.name + BEYOND] = float(criterion.beyond_card)
+                figures[criterion.name + BEYOND_CARD_MARK] = float(criterion.beyond_card)
             return MemberResult(figures)
 
         lanes = _lanes_of(whole)
@@ -258,7 +258,8 @@ class OfCriteria:
                 for name, figure in trial.criteria.items():
                     shown = [side.figures.get(figure, np.full(count, np.nan)) for side in sides]
                     figures[name] = np.maximum(*shown)
-                    figures[name + BEYOND] = np.any([side.outside(figure) for side in sides], axis=0).astype(float)
+                    beyond = np.any([side.outside(figure) for side in sides], axis=0)
+                    figures[name + BEYOND_CARD_MARK] = beyond.astype(float)
             if "propeller.speed" in model.input_names:
                 given = ({name: value for name, value in member.items() if name in parameters} for member in members)
                 reaches = [

@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import (
-    BEYOND,
+    BEYOND_CARD_MARK,
     OfCriteria,
     OfFigures,
     OfManoeuvre,
@@ -116,7 +116,7 @@ class Chance:
         Usable members whose trial left the card's range before it was known; they count by what was found.
     tail : Tail, optional
         The probability of not meeting it by importance sampling, where fewer than
-        :data:`tank2sim.analysis.ensemble.tails.RARE` members fail.
+        :data:`tank2sim.analysis.ensemble.tails.FEW_FAILING` members fail.
     """
 
     criterion: ImoCriterion
@@ -320,7 +320,7 @@ def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
         return Chance(criterion, None, None, found.usable, None)
     count = int(np.sum(shown <= criterion.allowed))
     met, ends = _share(count, found.usable)
-    beyond = int(np.sum(found.figures.get(criterion.name + BEYOND, np.zeros(0)) > 0))
+    beyond = int(np.sum(found.figures.get(criterion.name + BEYOND_CARD_MARK, np.zeros(0)) > 0))
     return Chance(criterion, met, ends, found.usable - len(shown), figure_bands(found)[criterion.name], beyond)
 
 

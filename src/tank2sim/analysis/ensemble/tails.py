@@ -21,13 +21,12 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tank2sim.analysis.ensemble.questions import BEYOND
-from tank2sim.arrays import Array
+from tank2sim.analysis.ensemble.questions import BEYOND_CARD_MARK
+from tank2sim.arrays import Array, Mask
 from tank2sim.simulation.ensemble import OUT_OF_BOUNDS, Draws, Ensemble, MixtureDraws, Question, ensemble
 
-RARE = 10
+FEW_FAILING = 10
 """Failing members of an ensemble below which their share is too uncertain (a third of itself and more), and the tail is
 sampled. Project choice."""
 
@@ -47,7 +46,7 @@ FOUND = 50
 LEVEL = 0.1
 """Share of a sample, of the largest figures, that is followed until enough members fail. Project choice."""
 
-FARTHEST = 6.0
+FARTHEST_LIMIT = 6.0
 """Farthest limit that is searched, in standard deviations: of a linear figure 1e-9 lie beyond it, and no card's errors
 are known to be normal so far out. Project choice."""
 
@@ -56,8 +55,6 @@ LEAST = 200
 
 NAMED = 5
 """Numbers of the card that are named as those of failing ships. Project choice."""
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ class Tail:
     linear_probability : float
         Of the figure beyond the limit, if it were linear.
     linear_figure, figure : float, and float or None
-        The figure of the ship at that distance (at most :data:`FARTHEST`), if it were linear, and as it is.
+        The figure of the ship at that distance (at most :data:`FARTHEST_LIMIT`), if it were linear, and as it is.
     failing_ships : mapping
         Number of the card (name in the model) to the mean of failing ships less the card, in standard errors: the
         largest.
@@ -114,7 +111,7 @@ class Tail:
 @dataclass(frozen=True, eq=False)
 class _Linear:
     """A figure linear in z: the direction (k,) of its increase, its slope there, its value at the card, the limit, and
-    the figure itself on the way there, at most :data:`FARTHEST` away."""
+    the figure itself on the way there, at most :data:`FARTHEST_LIMIT` away."""
 
     direction: Array
     slope: float
@@ -130,12 +127,12 @@ class _Linear:
     @property
     def point(self) -> float:
         """Distance of the ship of `figure`."""
-        return min(self.distance, FARTHEST)
+        return min(self.distance, FARTHEST_LIMIT)
 
     @property
     def searched(self) -> bool:
         """Whether the limit is near enough, or the figure passes it sooner than a linear one."""
-        return self.distance <= FARTHEST or self.figure is None or self.figure > self.allowed
+        return self.distance <= FARTHEST_LIMIT or self.figure is None or self.figure > self.allowed
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,13 +150,13 @@ class _Sample:
 
 
 def rare_names(found: Ensemble, limits: Mapping[str, float]) -> list[str]:
-    """Names of the criteria that members show and fewer than :data:`RARE` of them fail."""
+    """Names of the criteria that members show and fewer than :data:`FEW_FAILING` of them fail."""
     names = []
     for name, allowed in limits.items():
         values = found.figures.get(name, np.full(found.members, np.nan))
         with np.errstate(invalid="ignore"):
             failing = int(np.sum(~found.bad & ~(values <= allowed)))
-        if np.isfinite(values).any() and failing < RARE:
+        if np.isfinite(values).any() and failing < FEW_FAILING:
             names.append(name)
     return names
 
@@ -289,7 +286,7 @@ def _too_far(line: _Linear) -> Tail:
     """A limit that is not searched."""
     remark = (
         f"no probability: the limit is {line.distance:.3g} standard deviations from the card if the figure is linear, "
-        f"and none is searched beyond {FARTHEST:g}, where one in 1e9 ships lies"
+        f"and none is searched beyond {FARTHEST_LIMIT:g}, where one in 1e9 ships lies"
     )
     return Tail(**_of_line(line), effective_size=0.0, remark=remark)
 
@@ -313,7 +310,7 @@ def _tail(sample: _Sample, failing: Mask, of: tuple[_Linear, str], draws: Draws,
     total, squares = float(parts.sum()), float(np.sum(parts**2))
     effective = total**2 / squares if squares > 0 else 0.0
     out = found.unusable.get(OUT_OF_BOUNDS, 0)
-    beyond = found.figures.get(name + BEYOND, np.zeros(n)) > 0
+    beyond = found.figures.get(name + BEYOND_CARD_MARK, np.zeros(n)) > 0
     shift: dict[str, float] = {}
     if total > 0:
         mean = parts @ sample.standard / total

@@ -9,6 +9,7 @@ from typing import Any
 
 import altair as alt
 import numpy as np
+from altair.utils.schemapi import debug_mode
 from numpy.typing import ArrayLike
 
 from tank2sim.arrays import Array
@@ -51,7 +52,10 @@ def records(label: str, columns: Mapping[str, Array]) -> list[ChartRecord]:
 
 def data(rows: Sequence[ChartRecord]) -> alt.InlineData:
     """Records as the data of a chart."""
-    return alt.InlineData(values=list(rows))
+    # Altair would validate thousands of numbers, and copy what is a list with each change of the chart: that takes
+    # four times as long as all else of a page.
+    with debug_mode(False):
+        return alt.InlineData(values=tuple(rows))
 
 
 def every(rows: Sequence[ChartRecord], limit: int) -> list[ChartRecord]:
