@@ -326,18 +326,18 @@ def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
 
 def _counted(chances: Sequence[Chance], usable: int) -> list[str]:
     """Notices on members without a figure, and on those beyond the card's range."""
-    shown = [one for one in chances if one.met is not None]
-    lines = [
-        f"{one.criterion.name}: {one.undecided} of {usable} members do not show it: they count as not meeting it"
-        for one in shown
-        if one.undecided
-    ]
-    return lines + [
-        f"{one.criterion.name}: {one.beyond} of {usable} members left the card's range before it was known: they count "
-        "by what was found"
-        for one in shown
-        if one.beyond
-    ]
+    lost, left = (
+        ", ".join(f"{one.criterion.name} {count} of {usable}" for one, count in counts if one.met is not None and count)
+        for counts in ([(one, one.undecided) for one in chances], [(one, one.beyond) for one in chances])
+    )
+    lines = [f"members that do not show a figure count as not meeting its criterion: {lost}"] if lost else []
+    if left:
+        lines.append(f"members that left the card's range before a figure was known count by what was found: {left}")
+    if any(one.met is not None for one in chances) and all(
+        one.criterion.beyond_card for one in chances if one.met is not None
+    ):
+        lines.append("no probability of the criteria together: the trials of the card itself leave its range")
+    return lines
 
 
 def all_chances(limits: Mapping[str, float], found: Ensemble) -> ChanceOfAll | None:

@@ -207,18 +207,20 @@ def tails(
             lines[name] = replace(line, figure=_figure_at(question, draws, line, name))
     searched = {name: line for name, line in lines.items() if line.searched}
     one = {name: _too_far(line) for name, line in lines.items() if name not in searched}
+    unknown = [name for name in names if name not in lines]
+    about = [f"no probability below what the members show: {', '.join(unknown)} by too few members"] if unknown else []
     if not searched:
-        return one, None, []
+        return one, None, about
     mixture = _search(question, draws, searched, found.members, executor)
     sample = _sampled(question, mixture, found.members, executor)
     kept = (found.usable / found.members) * (1 - found.redrawn.members / found.members)
     masks = {name: sample.failing(name, limits[name]) for name in names}
     one |= {name: _tail(sample, masks[name], (line, name), draws, kept) for name, line in searched.items()}
     if set(names) != set(limits):
-        return one, None, []
+        return one, None, about
     nearest = min(searched, key=lambda name: searched[name].distance)
     of_any = np.any(list(masks.values()), axis=0)
-    return one, _tail(sample, of_any, (searched[nearest], nearest), draws, kept), []
+    return one, _tail(sample, of_any, (searched[nearest], nearest), draws, kept), about
 
 
 def _linear(standard: Array, values: Array, allowed: float) -> _Linear | None:
@@ -285,8 +287,8 @@ def _figure_at(question: Question, draws: Draws, line: _Linear, name: str) -> fl
 def _too_far(line: _Linear) -> Tail:
     """A limit that is not searched."""
     remark = (
-        f"no probability: the limit is {line.distance:.3g} standard deviations from the card if the figure is linear, "
-        f"and none is searched beyond {FARTHEST_LIMIT:g}, where one in 1e9 ships lies"
+        f"no probability: if the figure is linear the limit is farther than {FARTHEST_LIMIT:g} standard deviations "
+        "from the card, where one in 1e9 ships lies, and none is searched there"
     )
     return Tail(**_of_line(line), effective_size=0.0, remark=remark)
 

@@ -70,17 +70,30 @@ def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
     """Small probabilities of not meeting a criterion, each with what it rests on."""
     rows: list[list[Cell]] = []
     for name, tail in rare:
-        moved = ", ".join(f"{number} {errors:+.1f}" for number, errors in tail["failing_ships"].items())
-        sizes = [None if tail[key] is None else f"{tail[key]:.2e}" for key in ("probability", "standard_error")]
-        effective = f"{tail['effective_size']:.0f} of {tail['members']}"
-        linear = f"{tail['linear_probability']:.2e}"
-        counts = f"{tail['not_shown']}, {tail['beyond_card']}, {tail['unusable']}"
-        figures = [tail["distance"], linear, tail["linear_figure"], tail["figure"]]
-        rows.append([name, *sizes, effective, *figures, counts, moved or tail["remark"]])
-    heads = ["criterion", "probability not met", "standard error", "effective size", "distance, sd", "if linear"]
-    heads += ["linear figure there", "figure there", "not shown, beyond the card, unusable", "failing ships, in errors"]
+        keys = ("distance", "linear_probability", "linear_figure", "figure")
+        sizes = [tail["probability"], tail["standard_error"], round(tail["effective_size"])]
+        rows.append([name, *sizes, *(tail[key] for key in keys)])
+    heads = ["criterion", "probability not met", "standard error", "effective size", "distance", "if linear"]
+    heads += ["linear figure there", "figure there"]
     caption = "Too rare for the ensemble: by importance sampling."
     return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=rows)
+
+
+def _tail_notes(rare: Sequence[tuple[str, Json]]) -> list[str]:
+    """Why there is no probability; where the failing ships are, and what of the members drawn there."""
+    remarks: dict[str, list[str]] = {}
+    notes = []
+    for name, tail in rare:
+        if tail["remark"]:
+            remarks.setdefault(tail["remark"], []).append(name)
+            continue
+        moved = ", ".join(f"{number} {errors:+.1f}" for number, errors in tail["failing_ships"].items())
+        notes.append(
+            f"{name}: of {tail['members']} members drawn about the failing ships {tail['failing']} fail, of these "
+            f"{tail['not_shown']} do not show the figure and {tail['beyond_card']} left the card's range before; "
+            f"{tail['unusable']} cannot be used; the mean of failing ships, in standard errors: {moved}"
+        )
+    return notes + [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
 
 
 def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> PageSection:
@@ -127,7 +140,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
             _table("The straight course at the card's speed.", found["figures"]),
         ],
         charts=curve_charts(found["curves"]) if found["curves"] else (),
-        notes=found["notices"],
+        notes=[*found["notices"], *_tail_notes(rare)],
     )
 
 
