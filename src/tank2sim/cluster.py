@@ -43,11 +43,11 @@ again is back in a few seconds (project choice)."""
 LOOKS_EVERY_S = 1.0
 """How often the cluster is asked whether it has workers (project choice)."""
 
-_COMPUTING = ("numpy", "scipy", "casadi", "numba")
+_COMPUTING = ("numpy", "scipy", "casadi")
 """Packages on whose version the digits of a result depend."""
 
-_NOT_SENT = ("cli/", "demo/", "report/")
-"""Parts of tank2sim that compute nothing, and may differ."""
+_NOT_SENT = ("_bundled/", "cli/", "demo/", "report/")
+"""Parts of tank2sim that compute nothing, and may differ; a checkout has what is bundled in another place."""
 
 
 @cache
@@ -55,7 +55,8 @@ def installed() -> dict[str, str]:
     """What results depend on and what must be the same on every worker, to its version."""
     digest = hashlib.sha256()
     folder = Path(__file__).parent
-    sources = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*.py")}
+    code = (path for path in folder.rglob("*") if path.suffix in (".py", ".c"))
+    sources = {path.relative_to(folder).as_posix(): path for path in code}
     for name in sorted(sources):
         if not name.startswith(_NOT_SENT):
             digest.update(name.encode() + sources[name].read_bytes().replace(b"\r\n", b"\n"))

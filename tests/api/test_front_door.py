@@ -28,7 +28,7 @@ def test_importing_the_package_loads_no_library() -> None:
 
 def test_a_simulation_loads_neither_control_nor_plots_nor_tables() -> None:
     code = "import tank2sim; tank2sim.load('mariner').zigzag(20, 20).figures"
-    assert not loaded_by(code) & {"control", "matplotlib", "pandas", "altair", "numba", "statsmodels", "fmpy"}
+    assert not loaded_by(code) & {"control", "matplotlib", "pandas", "altair", "statsmodels", "fmpy"}
 
 
 def test_every_name_is_there_with_a_docstring() -> None:

@@ -67,6 +67,31 @@ def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
     assert np.std(found) < 0.5 * np.std(middle)
 
 
+def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_motion(tmp_path: Path) -> None:
+    card, trials, _ = written(tmp_path, "model", 1)
+    replayer = Replayer(card, trials.driven_by, list(noise_of("model")))
+    p, record = replayer.model.parameter_values(), input_record(replayer, trials.trials[0])
+    order = record.inputs[:, replayer.model.input_names.index("rudder.command")]
+    rows = np.flatnonzero(np.abs(np.diff(order)) > 0.01) + 1
+    start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
+    shares, reach = np.linspace(0.3, 0.7, len(rows)), np.append(np.full(len(start), 1e-4), np.full(len(rows), 0.05))
+    found = replayer._slopes_of_motion(record, rows, shares, start, p, reach)
+
+    def moved(place: int) -> np.ndarray:
+        values = np.append(start, shares)
+        values[place] += reach[place]
+        instants = np.full(len(record.inputs), 0.5)
+        instants[rows] = values[len(start) :]
+        return replayer.motion(replace(record, instants=instants), values[: len(start)], p)
+
+    instants = np.full(len(record.inputs), 0.5)
+    instants[rows] = shares
+    still = replayer.motion(replace(record, instants=instants), start, p)
+    for place, step in enumerate(reach):
+        np.testing.assert_allclose(found[..., place], (moved(place) - still) / step, rtol=1e-6, atol=1e-6)
+    assert np.abs(found).max(axis=(0, 1)).min() > 1e-3
+
+
 @pytest.mark.parametrize("hertz", [1, 2])
 def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz: int) -> None:
     """The true delay follows the zigzags to the noise; half an interval more or less does not."""

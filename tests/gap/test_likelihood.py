@@ -269,11 +269,18 @@ def test_about_an_explanation_the_heading_turns_with_the_yaw_rate_that_nobody_mo
     assert np.median(np.ptp(inside, axis=1)) < 0.1 * 0.04 * moved.block_s
 
 
-def test_what_is_read_of_a_covariance_is_that_of_the_signals_that_were_seen() -> None:
+def test_the_gain_of_one_measurement_is_that_of_the_signals_that_were_seen() -> None:
     rng = np.random.default_rng(2)
-    root = rng.standard_normal((13, 13))
-    P, reading, known = root @ root.T, rng.standard_normal((4, 6)), np.array([True, False, True, True])
-    expected = np.where(known, P[:, :6] @ reading.T + P[:, 9:13], 0.0)
-    found = kalman_kernels._read(P, reading, known)
-    assert found.shape == (13, 4)
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    start, reading, known = rng.uniform(0.5, 2.0, 13), rng.standard_normal((4, 6)), np.array([True, False, True, True])
+    white_noise = rng.uniform(0.1, 1.0, 4)
+    H = np.hstack([reading, np.zeros((4, 3)), np.eye(4)])[known]
+    S = H @ np.diag(start) @ H.T + np.diag(white_noise[known])
+    expected = np.zeros((13, 4))
+    expected[:, known] = np.diag(start) @ H.T @ np.linalg.inv(S)
+    seeing = np.where(known[:, None], reading, 0.0)[None, None], known[None, None], white_noise
+    nothing = (np.zeros((1, 0, *shape)) for shape in ((6, 6), (6, 3), (13, 13)))
+    transition, push, added = nothing
+    gain, white, filtered = kalman_kernels.covariances(start, transition, push, np.ones(7), added, seeing)
+    assert gain[0, 0] == pytest.approx(expected, abs=1e-12)
+    assert (white[0, 0].T @ white[0, 0])[np.ix_(known, known)] == pytest.approx(np.linalg.inv(S))
+    assert filtered[0, 0] == pytest.approx(np.diag(start) - expected[:, known] @ S @ expected[:, known].T)

@@ -33,7 +33,7 @@ from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.refit import refit_coefficients
 from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
-from tank2sim.gap.proof.replay import replay_trials, with_black_box
+from tank2sim.gap.proof.replay import Replays
 from tank2sim.gap.result import (
     AMBIGUOUS,
     COEFFICIENTS,
@@ -201,7 +201,10 @@ def _search_once(
     found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
     decision = decide(found, options.false_discovery)
     progress("proving")
-    return _assemble_gap(card, trials, found, decision, progress, options.false_discovery)
+    replays = Replays({name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, pool)
+    judged = _judge_by_simulation(card, trials, found, decision, replays, options.false_discovery)
+    progress("where and how much")
+    return _assemble_gap(card, trials, found, judged, replays.noise)
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
@@ -249,16 +252,13 @@ def _assemble_gap(
     card: ManoeuvringCard,
     trials: tuple[Measured, Measured],
     found: Search,
-    decision: Decision,
-    progress: StageReport,
-    share: float,
+    judged: _Judged,
+    sigmas: Mapping[str, float],
 ) -> tuple[Gap, tuple[Measured, Measured]]:
     """The results that follow from the decision, and the trials with the winds and currents that were found."""
     fitted, held = trials
-    noise = _noise(found, decision.best, fitted)
-    sigmas = {name: sigma for name, (sigma, _) in noise.items()}
-    judged = _judge_by_simulation(card, trials, found, decision, sigmas, share)
     decision, estimated, proof = judged.decision, judged.estimated, judged.proof
+    noise = _noise(found, decision.best, fitted)
     if decision.verdict == NO_EFFECT_MISSING:
         before, after = (_misfit_of(proof.results, version) for version in ("before", "after"))
         if (
@@ -272,7 +272,6 @@ def _assemble_gap(
             decision = replace(decision, verdict=OUTSIDE_LIBRARY)
     improved, results = proof.improved, proof.results
     sensors = _sensor_faults(estimated)
-    progress("where and how much")
     force = force_lacking(found.likelihood, found.none)
     every = (*fitted.trials, *held.trials)
     agreement = each_trial(found.likelihood, decision.best) if estimated else {}
@@ -319,7 +318,7 @@ def _judge_by_simulation(
     trials: tuple[Measured, Measured],
     found: Search,
     decision: Decision,
-    sigmas: Mapping[str, float],
+    replays: Replays,
     share: float,
 ) -> _Judged:
     """The decision after free-running simulations with what it names.
@@ -340,23 +339,23 @@ def _judge_by_simulation(
         by_formula = remaining.likelihood.by_formula(current.best)
         estimated = estimates(by_formula)
         by_trial = surroundings_by_trial(by_formula, remaining.likelihood.motion.names)
-        proof = _prove(card, trials, _NamedEffects(estimated, by_trial), sigmas, remaining, current.best)
+        proof = _prove(card, trials, _NamedEffects(estimated, by_trial), replays, remaining, current.best)
         unknown = current.verdict == OUTSIDE_LIBRARY
         closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
         if closes and found.none.score - current.best.score < DECISIVE:
-            alone = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+            alone = alone or _prove(card, trials, _NamedEffects([], {}), replays, found, found.none)
             with_effects, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, alone))
             closes = with_effects < max((1 + BETTER) * without, NEAR_NOISE)
         if closes:
             verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
-            boxed = replace(proof, results=_with_black_box(card, proof, estimated, sigmas))
+            boxed = replace(proof, results=_with_black_box(card, proof, estimated, replays))
             return _Judged(replace(current, verdict=verdict), estimated, boxed, tuple(withheld))
         if not unknown:
             withheld.append(" and ".join(current.best.hypothesis.effects))
         kept = tuple(fit for fit in remaining.fits if fit is not current.best)
         remaining = replace(remaining, fits=kept)
         current = decide(remaining, share)
-    proof = alone or _prove(card, trials, _NamedEffects([], {}), sigmas, found, found.none)
+    proof = alone or _prove(card, trials, _NamedEffects([], {}), replays, found, found.none)
     if decision.best.hypothesis.effects:
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
@@ -396,7 +395,7 @@ def _prove(
     card: ManoeuvringCard,
     given: tuple[Measured, Measured],
     named: _NamedEffects,
-    sigmas: Mapping[str, float],
+    replays: Replays,
     found: Search,
     best: ExplanationFit,
 ) -> _Proof:
@@ -407,16 +406,16 @@ def _prove(
     """
     estimated, by_trial = named.estimated, named.by_trial
     alone = add_effects_to_card(card, estimated)
-    trials, by_trial = _in_surroundings(alone, given, by_trial, sigmas)
+    trials, by_trial = _in_surroundings(alone, given, by_trial, replays.noise)
     sensors = _sensor_faults(estimated)
-    results = _replay_all(card, alone, trials, sensors, sigmas)
+    results = _replay_all(card, alone, trials, sensors, replays)
     proof = _Proof(trials, by_trial, card, alone, results)
     if _misfit_of(results, "after", held_out=False) > BETTER_FROM:
         estimates_with = found.likelihood.coefficients_with(best)
         refitted, base = refit_coefficients(card, found.likelihood.none.model, estimates_with)
         joint = add_effects_to_card(base, estimated)
-        trials, by_trial = _in_surroundings(joint, given, by_trial, sigmas)
-        joint_results = _replay_all(card, joint, trials, sensors, sigmas)
+        trials, by_trial = _in_surroundings(joint, given, by_trial, replays.noise)
+        joint_results = _replay_all(card, joint, trials, sensors, replays)
         misfits = [_misfit_of(group, "after", held_out=False) for group in (results, joint_results)]
         if misfits[1] < (1 - BETTER) * misfits[0] and _most_are_closer(results, joint_results):
             keys = {"fit": False, "holdout": True} if trials[1].trials else {"fit": False}
@@ -425,15 +424,13 @@ def _prove(
     return proof
 
 
-def _with_black_box(
-    card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], sigmas: Mapping[str, float]
-) -> list[Passed]:
+def _with_black_box(card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], replays: Replays) -> list[Passed]:
     """The replays of a proof, and by a black box with as many coefficients as the named effects have parameters."""
-    box = black_box(card, proof.trials[0], sigmas, max(sum(len(errors) for *_, errors in estimated), 1))
+    box = black_box(card, proof.trials[0], replays.noise, max(sum(len(errors) for *_, errors in estimated), 1))
     boxed: list[Passed] = []
     for group, held_out in zip(proof.trials, (False, True), strict=True):
         of_group = [result for result in proof.results if result.held_out == held_out]
-        boxed += with_black_box(of_group, box.card, group, sigmas) if of_group else []
+        boxed += replays.with_black_box(of_group, box.card, group) if of_group else []
     return boxed
 
 
@@ -453,14 +450,14 @@ def _replay_all(
     improved: ManoeuvringCard,
     trials: tuple[Measured, Measured],
     sensors: Sequence[Found],
-    sigmas: Mapping[str, float],
+    replays: Replays,
 ) -> list[Passed]:
     """All trials replayed by both cards."""
     results: list[Passed] = []
     for group, held_out in zip(trials, (False, True), strict=True):
         if group.trials:
             corrected = _corrected(group, sensors)
-            results += replay_trials(card, improved, group, sigmas, held_out, corrected)
+            results += replays.by_cards(card, improved, group, held_out, corrected)
     return results
 
 

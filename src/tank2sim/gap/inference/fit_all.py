@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from threading import Lock
@@ -91,6 +91,7 @@ class _LikelihoodParts:
     motion: MeasuredBatch
     coefficients: NuisanceParameters
     belief: Belief
+    scale: Array
 
 
 class Fitting:
@@ -104,16 +105,23 @@ class Fitting:
         Called with the name of each explanation that is fitted.
     executor : Executor, optional
         Fits several explanations at once; the result does not depend on it.
+    found : mapping, optional
+        Fits to begin with, by their effects.
     """
 
     def __init__(
-        self, likelihood: Likelihood, hypotheses: HypothesisCache, progress: StageReport, executor: Executor | None
+        self,
+        likelihood: Likelihood,
+        hypotheses: HypothesisCache,
+        progress: StageReport,
+        executor: Executor | None,
+        found: Mapping[tuple[str, ...], ExplanationFit] | None = None,
     ):
         self.likelihood, self.hypotheses, self.progress, self.executor = likelihood, hypotheses, progress, executor
-        self.found: dict[tuple[str, ...], ExplanationFit] = {}
+        self.found: dict[tuple[str, ...], ExplanationFit] = dict(found or {})
         none = likelihood.none
-        parts = none.card, none.driven_by, likelihood.motion, likelihood.coefficients, likelihood.belief
-        self._parts = _LikelihoodParts(uuid4().hex, *parts)
+        parts = likelihood.motion, likelihood.coefficients, likelihood.belief, likelihood.scale
+        self._parts = _LikelihoodParts(uuid4().hex, none.card, none.driven_by, *parts)
 
     def fit(self, proposals: Sequence[Proposal]) -> None:
         """Fit the proposals, and keep the better of each and of any earlier fit of the same effects."""
@@ -191,7 +199,7 @@ def _fit_in_worker(sent: _LikelihoodParts, proposal: Proposal) -> ExplanationFit
             hypotheses = next((cache for _, cache in _LIKELIHOODS.values() if _same_trials(cache, ship, sent)), None)
             none = hypotheses.none if hypotheses else Hypothesis(*ship)
             _LIKELIHOODS.clear()
-            likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief)
+            likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief, sent.scale)
             _LIKELIHOODS[sent.token] = likelihood, hypotheses or HypothesisCache(none, sent.motion)
         likelihood_and_hypotheses = _LIKELIHOODS[sent.token]
     found = _fit(*likelihood_and_hypotheses, proposal)

@@ -105,7 +105,14 @@ def linear_filter(by_state: Array, reading: Array, known: _Truths, block_s: floa
     for _ in range(DOUBLINGS):
         spreading = 0.5 * (spreading + transition @ spreading)
         transition = transition @ transition
-    return Linear(transition, spreading, np.ascontiguousarray(reading), known, block_s, wide)
+    return Linear(
+        np.ascontiguousarray(transition),
+        np.ascontiguousarray(spreading),
+        np.ascontiguousarray(reading),
+        np.ascontiguousarray(known),
+        block_s,
+        wide,
+    )
 
 
 @dataclass(frozen=True, eq=False)

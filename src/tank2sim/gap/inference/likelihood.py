@@ -11,7 +11,7 @@ smaller T holds, by more than chance if T differs by some 10.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -60,6 +60,13 @@ is estimated (project choice); the score includes all."""
 LEAST_GAIN = 0.1
 """Gauss-Newton stops where the predicted decrease of the score is less than this."""
 
+LEAST_DECREASE = 0.02
+"""The search for the noise stops where a step lowers the score by less than this (project choice): explanations are
+compared by differences of some units."""
+
+QUOTIENT = 1e-3
+"""Step of the logarithms of the noise in a difference quotient of slopes (project choice: a thousandth of a level)."""
+
 WIDTHS = (0.02, 2.5)
 """Factor on the standard errors of the card's coefficients: 2 % where a card states none, and hardly above 5 %."""
 
@@ -76,10 +83,21 @@ class Likelihood:
     coefficients : NuisanceParameters
     belief : Belief
         Of the noise and of the coefficients' width.
+    scale : array, optional
+        Of each logarithm of the noise and of the width, in which the search for the noise takes its steps
+        (:meth:`noise_scale`); by default 1.
     """
 
-    def __init__(self, motion: MeasuredBatch, none: Hypothesis, coefficients: NuisanceParameters, belief: Belief):
+    def __init__(
+        self,
+        motion: MeasuredBatch,
+        none: Hypothesis,
+        coefficients: NuisanceParameters,
+        belief: Belief,
+        scale: Array | None = None,
+    ):
         self.motion, self.none, self.coefficients, self.belief = motion, none, coefficients, belief
+        self.scale = np.ones(len(belief.logs)) if scale is None else scale
         self._residuals: dict[tuple[tuple[str, ...], tuple[str, ...], bytes], tuple[Array, Array]] = {}
         nothing = np.zeros(0)
         self._unmeasured = none.unmeasured_states(motion, nothing)
@@ -205,7 +223,7 @@ class Likelihood:
         added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
         moved = motion.shift(states[..., :6], seen.linear.transition, between, added)
-        return Likelihood(moved, self.none, self.coefficients, self.belief)
+        return Likelihood(moved, self.none, self.coefficients, self.belief, self.scale)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
         """An explanation with the parameters that fit the measurements best without form errors.
@@ -323,6 +341,51 @@ class Likelihood:
 
     def _noise(self, fit: ExplanationFit, linear: Linear, coefficients: Array, count: int) -> ExplanationFit:
         """Noise and width for the columns as they are; the parameters follow linearly unless one is at a bound."""
+        cost, scale = self._cost_of_noise(fit, linear, coefficients), self.scale
+
+        def scaled(steps: Array) -> tuple[float, Array]:
+            value, slope = cost(steps * scale)
+            return value, slope * scale
+
+        low, high = self.belief.bounds
+        low[-1], high[-1] = np.log(WIDTHS[0]), np.log(WIDTHS[1])
+        found = minimize(
+            scaled,
+            fit.logs / scale,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=list(zip(low / scale, high / scale, strict=True)),
+            options={"maxiter": count, "maxfun": count + 3, "ftol": LEAST_DECREASE / max(abs(fit.score), 1.0)},
+        )
+        best = self._parameters(replace(fit, logs=np.clip(found.x * scale, low, high)), linear, coefficients, 3)
+        return best if best.score < fit.score else fit  # the parameters may be nonlinear over so large a change
+
+    def noise_scale(self, fit: ExplanationFit) -> Array:
+        """Change of each logarithm of the noise, and of the width, that raises the cost by a half: one over the root of
+        its curvature at a fit (a difference quotient of the slopes), at most what its prior allows.
+
+        The cost is many times more curved along the white noise of a sensor than along the time constant of a force.
+        In these units all directions are about equally curved, and some ten steps of the search suffice.
+        """
+        cost = self._cost_of_noise(
+            fit, self.linear(fit.hypothesis, fit.theta), self.of_coefficients(fit.hypothesis, fit.theta)
+        )
+        slope = cost(fit.logs)[1]
+        steps = QUOTIENT * np.eye(len(slope))
+        curvature = np.array([(cost(fit.logs + step)[1] - slope)[place] / QUOTIENT for place, step in enumerate(steps)])
+        scale: Array = 1 / np.sqrt(np.maximum(curvature, 2 / self.belief.spread**2))
+        return scale
+
+    def with_scale(self, scale: Array) -> Likelihood:
+        """The same likelihood, with other steps of the search for the noise."""
+        other = copy(self)
+        other.scale = scale
+        return other
+
+    def _cost_of_noise(
+        self, fit: ExplanationFit, linear: Linear, coefficients: Array
+    ) -> Callable[[Array], tuple[float, Array]]:
+        """Cost of the logarithms of noise and width and its slope, for the columns of a fit as they are."""
         least, largest = fit.hypothesis.bounds
         free = bool(np.all((fit.theta > least) & (fit.theta < largest)))
         columns = self._informative(fit, linear, self.columns(fit.hypothesis, fit.theta, coefficients))
@@ -332,8 +395,8 @@ class Likelihood:
             seen = observer(linear, noisy.noise)
             wide = columns.scaled(noisy.width)
             solved = self._solved(fit.hypothesis, fit.theta, seen, wide, free=free)
-            weights = solved.weights
-            by_noise = slopes(seen, wide.driving @ weights, wide.shown @ weights, solved.whitened @ weights)
+            counted = (_mixed(part, solved.weights) for part in (wide.driving, wide.shown, solved.whitened))
+            by_noise = slopes(seen, *counted)
             coefficients_change = solved.change[: columns.coefficient_count]
             by_width = 2 * (
                 len(coefficients_change) - solved.coefficient_variance - coefficients_change @ coefficients_change
@@ -342,18 +405,7 @@ class Likelihood:
             # Without the penalty of the parameters: its dependence on the noise is negligible, and not in the slopes.
             return seen.log_det + solved.reduced_cost + belief, np.append(by_noise, by_width) + by_belief
 
-        low, high = self.belief.bounds
-        low[-1], high[-1] = np.log(WIDTHS[0]), np.log(WIDTHS[1])
-        found = minimize(
-            cost,
-            fit.logs,
-            jac=True,
-            method="L-BFGS-B",
-            bounds=list(zip(low, high, strict=True)),
-            options={"maxiter": count, "maxfun": count + 3},
-        )
-        best = self._parameters(replace(fit, logs=found.x), linear, coefficients, 3)
-        return best if best.score < fit.score else fit  # the parameters may be nonlinear over so large a change
+        return cost
 
     def _informative(self, fit: ExplanationFit, linear: Linear, columns: FilterColumns) -> FilterColumns:
         """The columns with only those combinations of the coefficients that the trials determine better than the prior.
@@ -434,6 +486,12 @@ class Likelihood:
             weights,
             whitened,
         )
+
+
+def _mixed(columns: Array, weights: Array) -> Array:
+    """Combinations of columns, the last axis: one product of matrices."""
+    mixed: Array = (columns.reshape(-1, columns.shape[-1]) @ weights).reshape(*columns.shape[:-1], weights.shape[1])
+    return mixed
 
 
 @dataclass(frozen=True, eq=False)

@@ -170,8 +170,10 @@ class Replayer:
 
     def motion(self, record: InputRecord, start: Array, p: Array) -> Array:
         """Readings of the sensors (m, ny) at the compared instants of a record."""
-        states = self.states(record, start, p)[:: record.every]
-        return self._shown(states, record.inputs[:: record.every], p)[0]
+        return self._readings(record, self.states(record, start, p), p)
+
+    def _readings(self, record: InputRecord, states: Array, p: Array) -> Array:
+        return self._shown(states[:: record.every], record.inputs[:: record.every], p)[0]
 
     def fit_record(self, record: InputRecord, sigma: Array, p: Array) -> tuple[InputRecord, Array]:
         """The record with the instants at which its orders were given, and its initial state, that fit it best.
@@ -242,22 +244,34 @@ class Replayer:
         reach = np.append(1e-4 * self._nominal, np.full(len(rows), 2.0 / self._parts(record)))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
-            last = rows[count] if count < len(rows) else len(record.inputs)
-            compared = known & (np.arange(len(known)) * record.every < last)[:, None]
+            last = int(rows[count]) if count < len(rows) else len(record.inputs)
+            part, moved = _beginning_of(record, last), rows[:count]
+            compared = known[: len(part.readings)]
             free = np.arange(size + count)
 
-            def misfit(values: Array, compared: NDArray[np.bool_] = compared) -> Array:
-                each = unknown.copy()
-                each[: len(values)] = values
-                begun, shares = each[:size], each[size:]
-                shown = self.motion(self._given_at(record, rows, shares), begun, p)
-                away = ((shown - record.readings) / sigma)[compared]
+            def misfit(
+                values: Array,
+                part: InputRecord = part,
+                moved: NDArray[np.intp] = moved,
+                compared: NDArray[np.bool_] = compared,
+            ) -> Array:
+                begun, shares = values[:size], values[size:]
+                shown = self.motion(self._given_at(part, moved, shares), begun, p)
+                away = ((shown - part.readings) / sigma)[compared]
                 return np.concatenate([away, (begun - guess) / spread, (shares - middle) * math.sqrt(12.0)])
 
-            def slopes(values: Array, misfit: Callable[[Array], Array] = misfit, size: int = size) -> Array:
+            def slopes(
+                values: Array,
+                part: InputRecord = part,
+                moved: NDArray[np.intp] = moved,
+                compared: NDArray[np.bool_] = compared,
+            ) -> Array:
                 inward = np.where(values > middle, -1.0, 1.0)  # of an instant, away from the nearer bound
                 inward[:size] = 1.0
-                return difference_slopes(misfit, values, misfit(values), inward * reach[: len(values)])
+                begun, shares = values[:size], values[size:]
+                by_value = self._slopes_of_motion(part, moved, shares, begun, p, inward * reach[: len(values)])
+                of_prior = np.diag(np.append(1 / spread, np.full(len(shares), math.sqrt(12.0))))
+                return np.concatenate([(by_value / sigma[:, None])[compared], of_prior])
 
             low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
             low[size:], high[size:] = middle - 0.5, middle + 0.5
@@ -270,6 +284,43 @@ class Replayer:
             unknown[free] = found.x
         left = float(np.sqrt(np.mean(found.fun[: int(known.sum())] ** 2)))
         return self._given_at(record, rows, unknown[size:]), unknown[:size], left
+
+    def _slopes_of_motion(
+        self,
+        record: InputRecord,
+        rows: NDArray[np.intp],
+        shares: Array,
+        start: Array,
+        p: Array,
+        reach: Array,
+    ) -> Array:
+        """Derivatives (m, ny, nx + len(rows)) of the compared readings in the initial state and in the instants of the
+        steps of the order at `rows`, by forward differences of `reach`; a step changes nothing before it."""
+        timed = self._given_at(record, rows, shares)
+        states = self.states(timed, start, p)
+        shown = self._readings(timed, states, p)
+        slopes = np.zeros((*shown.shape, len(reach)))
+        for place, step in enumerate(reach[: len(start)]):
+            moved = start.copy()
+            moved[place] += step
+            slopes[..., place] = (self.motion(timed, moved, p) - shown) / step
+        for place, (row, step) in enumerate(zip(rows, reach[len(start) :], strict=True)):
+            moved_shares = shares.copy()
+            moved_shares[place] += step
+            begin = self._unmoved_before(record, int(row))
+            rest = _from(self._given_at(record, rows, moved_shares), begin)
+            after = shown[begin // record.every :]
+            change = (self.motion(rest, states[begin], p) - after) / step
+            slopes[begin // record.every :, :, len(start) + place] = change
+        return slopes
+
+    def _unmoved_before(self, record: InputRecord, row: int) -> int:
+        """The last compared row before a step of the order at `row` around which no order changes, or 0."""
+        order = record.inputs[:, self._order]
+        for begin in range((row - 2) // record.every * record.every, 0, -record.every):
+            if order[begin - 1] == order[begin] == order[begin + 1]:
+                return begin
+        return 0
 
     @staticmethod
     def _given_at(record: InputRecord, rows: NDArray[np.intp], shares: Array) -> InputRecord:
@@ -348,10 +399,27 @@ class Replayer:
         return start, whole if np.isfinite(whole) else np.inf
 
 
+def _beginning_of(record: InputRecord, rows: int) -> InputRecord:
+    """The first `rows` rows of a record."""
+    return replace(record, inputs=record.inputs[:rows], readings=record.readings[: -(-rows // record.every)])
+
+
+def _from(record: InputRecord, row: int) -> InputRecord:
+    """A record with instants from a compared row on."""
+    assert record.instants is not None
+    return replace(
+        record,
+        begin_s=record.begin_s + row * record.step_s,
+        inputs=record.inputs[row:],
+        readings=record.readings[row // record.every :],
+        instants=record.instants[row:],
+    )
+
+
 def _orders_in_steps(order: Array, instants: Array, parts: int) -> Array:
     """The order in each of `parts` steps of every interval, (n - 1) * parts: each value of `order` (n,) holds from the
     step next to the share `instants` (n,) of the interval before its reading on."""
-    given = np.round((np.arange(1, len(order)) - 1 + instants[1:]) * parts).astype(np.intp)
+    given = np.floor((np.arange(1, len(order)) - 1 + instants[1:]) * parts + 0.5).astype(np.intp)
     given = np.maximum.accumulate(np.clip(given, 0, len(order) * parts))
     edges = np.concatenate([[0], given, [len(order) * parts]])
     return np.repeat(order, np.diff(edges))[: (len(order) - 1) * parts]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -20,6 +21,65 @@ from tank2sim.records.trials import Trial
 
 _LEAST_NOISE = 1e-6
 """Noise of a record without any, SI: all its signals then weigh alike. Project choice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replays:
+    """How trials are replayed.
+
+    Parameters
+    ----------
+    noise : mapping
+        Variable to the standard deviation of one reading, SI; others are not compared.
+    executor : Executor, optional
+        Follows several trials at once; the result does not depend on it.
+    """
+
+    noise: Mapping[str, float]
+    executor: Executor | None = None
+
+    def by_cards(
+        self,
+        card: ManoeuvringCard,
+        improved: ManoeuvringCard,
+        measured: Measured,
+        held_out: bool,
+        corrected: Measured | None = None,
+    ) -> tuple[Passed, ...]:
+        """Each trial as measured and as both cards' models simulate it; see :func:`replay_trials`."""
+        given = self._followed(card, measured)
+        same = improved is card and corrected is None
+        after = given if same else self._followed(improved, corrected or measured)
+        results = []
+        for old, new in zip(given, after, strict=True):
+            simulated = new.simulated + np.nan_to_num(old.record.readings - new.record.readings)
+            results.append(_passed(old.record, old.seen, self.noise, held_out, (old.simulated, simulated)))
+        return tuple(results)
+
+    def with_black_box(self, results: Sequence[Passed], box: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
+        """The same replays with the simulation of each trial by a black box's card."""
+        followed = {each.record.name: each for each in self._followed(box, measured)}
+        boxed = []
+        for result in results:
+            simulated = followed[result.name]
+            columns = dict(zip(simulated.seen, simulated.simulated.T, strict=True))
+            boxed.append(replace(result, black_box={name: columns[name] for name in result.noise}))
+        return tuple(boxed)
+
+    def _followed(self, card: ManoeuvringCard, measured: Measured) -> list[_Followed]:
+        """Each trial as the card's model simulates it, from the initial state that fits it best."""
+        noise, driven_by = dict(self.noise), measured.driven_by
+        key = card.text, driven_by, tuple(noise.items())
+        known = [_FOLLOWED.setdefault(trial, {}) for trial in measured.trials]
+        waiting = [trial for trial, found in zip(measured.trials, known, strict=True) if key not in found]
+        if self.executor is None or len(waiting) < 2:
+            new = [_follow(card, driven_by, noise, trial) for trial in waiting]
+        else:
+            futures = [self.executor.submit(_follow, card, driven_by, noise, trial) for trial in waiting]
+            new = [future.result() for future in futures]
+        for trial, followed in zip(waiting, new, strict=True):
+            _FOLLOWED[trial][key] = followed
+        return [found[key] for found in known]
 
 
 def replay_trials(
@@ -55,13 +115,7 @@ def replay_trials(
     InputError
         A trial is too short, or has none of the signals in `noise`.
     """
-    given = _followed(card, measured, noise)
-    after = given if improved is card and corrected is None else _followed(improved, corrected or measured, noise)
-    results = []
-    for old, new in zip(given, after, strict=True):
-        simulated = new.simulated + np.nan_to_num(old.record.readings - new.record.readings)
-        results.append(_passed(old.record, old.seen, noise, held_out, (old.simulated, simulated)))
-    return tuple(results)
+    return Replays(noise).by_cards(card, improved, measured, held_out, corrected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,22 +132,25 @@ _FOLLOWED: WeakKeyDictionary[Trial, dict[_Key, _Followed]] = WeakKeyDictionary()
 """What was simulated of each trial that still exists: each explanation is compared with the same simulation before."""
 
 
-def _followed(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]) -> list[_Followed]:
-    """Each trial as the card's model simulates it, from the initial state that fits it best."""
-    key = card.text, measured.driven_by, tuple(noise.items())
-    known = [_FOLLOWED.setdefault(trial, {}) for trial in measured.trials]
-    if all(key in found for found in known):
-        return [found[key] for found in known]
-    model = driven_model(card, measured.driven_by)
-    seen = [name for name in OBSERVED_SIGNALS.values() if name in noise and name in model]
-    replayer = Replayer(card, measured.driven_by, seen)
-    p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in seen])
-    for trial, found in zip(measured.trials, known, strict=True):
-        if key not in found:
-            record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
-            simulated = replayer.motion(record, start, p)
-            found[key] = _Followed(record, replayer.seen, simulated)
-    return [found[key] for found in known]
+def _follow(card: ManoeuvringCard, driven_by: str, noise: Mapping[str, float], trial: Trial) -> _Followed:
+    replayer = _replayer(card, driven_by, tuple(noise))
+    p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in replayer.seen])
+    record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
+    return _Followed(record, replayer.seen, replayer.motion(record, start, p))
+
+
+_REPLAYERS: dict[tuple[str, str, tuple[str, ...]], Replayer] = {}
+"""The last replayer of this process, by the card's text, what drives the rudder and the variables with noise."""
+
+
+def _replayer(card: ManoeuvringCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
+    key = card.text, driven_by, known
+    if key not in _REPLAYERS:
+        model = driven_model(card, driven_by)
+        seen = [name for name in OBSERVED_SIGNALS.values() if name in known and name in model]
+        _REPLAYERS.clear()
+        _REPLAYERS[key] = Replayer(card, driven_by, seen)
+    return _REPLAYERS[key]
 
 
 def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
@@ -113,19 +170,6 @@ def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, .
                 squares.setdefault(OBSERVED_SIGNALS[signal], []).append(deviation**2)
     noise = {name: max(float(np.sqrt(np.mean(values))), _LEAST_NOISE) for name, values in squares.items()}
     return replay_trials(card, card, measured, noise, held_out=True)
-
-
-def with_black_box(
-    results: Sequence[Passed], box: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]
-) -> tuple[Passed, ...]:
-    """The same replays with the simulation of each trial by a black box's card; `noise` weighs its initial states."""
-    followed = {each.record.name: each for each in _followed(box, measured, noise)}
-    boxed = []
-    for result in results:
-        simulated = followed[result.name]
-        columns = dict(zip(simulated.seen, simulated.simulated.T, strict=True))
-        boxed.append(replace(result, black_box={name: columns[name] for name in result.noise}))
-    return tuple(boxed)
 
 
 def _passed(

@@ -39,9 +39,9 @@ _FAR = 300.0
 """The noise of an explanation this far behind the best, at the noise of the best, is not estimated, and it is not tried
 again (project choice)."""
 
-ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 10), (20,)
-"""Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. A score
-is known to some 100 after 6, to 20 after 15, to a few after 25."""
+ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 8), (15,)
+"""Most iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. In
+steps of its scale a score is known to some 3 after 5, to 1 after 8, to 0.1 after 12."""
 
 SAME_NOISE = (0,)
 """Rounds that estimate the parameters alone, at the best of the given noises."""
@@ -100,6 +100,8 @@ def search(
     believed = likelihood.belief.logs
     rough = Fitting(likelihood, hypotheses, progress, executor)
     rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
+    likelihood = likelihood.with_scale(likelihood.noise_scale(rough.best()))
+    rough = Fitting(likelihood, hypotheses, progress, executor, rough.found)
     chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
     every = tuple(variant for name in chosen for variant in _variants(likelihood, hypotheses, name))
     none = rough.best()
