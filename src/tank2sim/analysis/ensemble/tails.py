@@ -150,7 +150,7 @@ class _Sample:
 
 
 def rare_names(found: Ensemble, limits: Mapping[str, float]) -> list[str]:
-    """Names of the criteria that members show and fewer than :data:`FEW_FAILING` of them fail."""
+    """Names of the criteria in `limits` that members show and fewer than :data:`FEW_FAILING` of them fail."""
     names = []
     for name, allowed in limits.items():
         values = found.figures.get(name, np.full(found.members, np.nan))
