@@ -52,10 +52,8 @@ def records(label: str, columns: Mapping[str, Array]) -> list[ChartRecord]:
 
 def data(rows: Sequence[ChartRecord]) -> alt.InlineData:
     """Records as the data of a chart."""
-    # Altair would validate thousands of numbers, and copy what is a list with each change of the chart: that takes
-    # four times as long as all else of a page.
-    with debug_mode(False):
-        return alt.InlineData(values=tuple(rows))
+    with debug_mode(False):  # validating thousands of numbers takes as long as all else of a page
+        return alt.InlineData(values=list(rows))
 
 
 def every(rows: Sequence[ChartRecord], limit: int) -> list[ChartRecord]:
