@@ -118,6 +118,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "simulate a short run": lambda _: t2s.load("mariner").turn(35, duration_s=20.0),
     "stability": lambda _: t2s.load("esso-osaka-estimated").stability(),
     "stability of an ensemble": lambda _: t2s.load("kvlcc2-captive").stability(spirals=False, members=3),
+    "stability with small probabilities": lambda _: t2s.load("mariner").stability(spirals=False, members=200),
     "steer": lambda _: t2s.load("mariner").steering_page(),
     "tow": lambda _: _tow(),
     "tow of one term": lambda _: _tow(terms="B3", length_m=3.8, start_delay=True),

@@ -1,4 +1,4 @@
-"""The JSON of results follows its schema, and a wrong key, type or command does not."""
+"""The JSON of results follows its schema, a wrong key, type or command does not, and a page is made of it alone."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import copy
 import functools
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -14,7 +15,7 @@ import tank2sim as t2s
 from tank2sim.api.result import Result
 from tank2sim.api.schemas import KEYS
 from tank2sim.report.results.result_types import kind_of
-from tests.made_results import RESULTS, marked
+from tests.made_results import OWN_DOCUMENTS, RESULTS, marked
 
 
 def commands(kind: type[Result] = Result) -> set[str]:
@@ -26,14 +27,15 @@ def holds(result: dict[str, object], command: str) -> bool:
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, object]]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Result]:
+    """The result of a name; made once."""
+    return functools.cache(lambda name: RESULTS[name](tmp_path_factory.mktemp("made")))
+
+
+@pytest.fixture(scope="module")
+def result(made: Callable[[str], Result]) -> Callable[[str], dict[str, object]]:
     """The JSON of the result of a name, as it is read from a file; made once."""
-
-    @functools.cache
-    def made(name: str) -> dict[str, object]:
-        return json.loads(RESULTS[name](tmp_path_factory.mktemp("made")).to_json())
-
-    return made
+    return functools.cache(lambda name: json.loads(made(name).to_json()))
 
 
 @pytest.mark.parametrize("name", marked(RESULTS))
@@ -45,6 +47,14 @@ def test_results_follow_their_schemas_and_no_others(result, name) -> None:
     assert not holds({**found, "not_declared": 1}, command) and not holds(without, command)
     assert command in kind_of(found, "r.json").commands.split()
     assert command in kind_of(without, "r.json").commands.split()
+
+
+@pytest.mark.parametrize("name", [name for name in RESULTS if name.split()[0] not in OWN_DOCUMENTS])
+def test_the_command_and_report_give_the_same_page(made, name: str, tmp_path: Path) -> None:
+    found = made(name)
+    found.to_json(tmp_path / "result.json")
+    assert t2s.make_report(tmp_path / "result.json").page() == found.page()
+    assert all(section.heading for section in found.layout().sections)
 
 
 def test_every_command_but_those_with_long_searches_has_a_result_here() -> None:

@@ -60,3 +60,13 @@ def test_faults_in_a_model_are_refused() -> None:
 def test_unknown_names_in_changed_values_are_refused() -> None:
     with pytest.raises(KeyError, match=r"decay\.z"):
         decay().parameter_values({"decay.z": 1.0})
+
+
+def test_constants_in_place_of_parameters_change_no_rate(mariner: Model) -> None:
+    names = [name for name in mariner.parameter_names if name.startswith("derivatives.")]
+    fixed = mariner.with_constants(names)
+    assert set(mariner.parameter_names) - set(fixed.parameter_names) == set(names)
+    x, u = np.array([0.0, 0.0, 0.2, 7.0, 0.3, 0.01, 0.1]), mariner.input_values()
+    rates = [np.array(model.rhs(x, u, model.parameter_values())).ravel() for model in (mariner, fixed)]
+    np.testing.assert_allclose(rates[1], rates[0], rtol=1e-13)
+    assert np.abs(rates[0]).min() > 0 and mariner.with_constants([]) is mariner

@@ -12,6 +12,7 @@ import pytest
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
@@ -66,6 +67,24 @@ def test_figures_in_lanes_are_those_of_single_runs(name: str, manoeuvre, duratio
         for place, state in enumerate(model.state_names):
             values = np.interp(times, run.trajectory.t, run.trajectory[state])
             np.testing.assert_allclose(found.states[number, :, place], values, rtol=1e-11, atol=1e-10)
+
+
+@pytest.mark.parametrize(("manoeuvre", "slowest"), [(Turn(LARGE), 0.79), (Zigzag(TWENTY, TWENTY), 0.87)])
+def test_figures_outside_the_cards_range_are_those_of_single_runs(mariner_card, manoeuvre, slowest) -> None:
+    speed = mariner_card.model.speed_mps
+    narrow = build(revised(mariner_card, {}, {"model.valid_speed_mps": [slowest * speed, 1.2 * speed]}))
+    members, p = ships(mariner_card, narrow, 4)
+    found = LaneManoeuvres(narrow).run(manoeuvre, p)
+    marked = []
+    for number, member in enumerate(members):
+        reading = simulate(narrow, manoeuvre, parameters=member).reading
+        assert reading.exit_s is not None and found.left_s[number] == pytest.approx(reading.exit_s, rel=1e-12)
+        outside = {name for name in reading.figures if found.outside(name)[number]}
+        assert outside == set(reading.outside_names)
+        marked += [len(outside), len(reading.figures) - len(outside)]
+    assert min(marked) > 0
+    calm = LaneManoeuvres(build(mariner_card)).run(Zigzag(TEN, TEN), p)
+    assert np.isinf(calm.left_s).all() and not calm.outside("overshoot_1_deg").any()
 
 
 @pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])

@@ -77,11 +77,55 @@ class ManoeuvreEnsembleKeys(EnsembleKeys):
     track: dict[str, list[list[Number]]] | None
 
 
+class TailKeys(_Part):
+    """A small probability of not meeting a criterion, by importance sampling."""
+
+    distance: float
+    linear_probability: float
+    linear_figure: float
+    figure: Number
+    effective_size: float
+    remark: str
+    probability: Number
+    standard_error: Number
+    members: int
+    failing: int
+    not_shown: int
+    unusable: int
+    beyond_card: int
+    unusable_probability: float
+    failing_ships: dict[str, float]
+
+
+class ChanceKeys(_Part):
+    """The probability of an IMO criterion over the members."""
+
+    name: str
+    allowed: float
+    unit: str
+    probability_met: Number
+    interval_95: list[float] | None
+    not_shown: int
+    beyond_card: int
+    band: BandKeys | None
+    tail: TailKeys | None
+
+
+class ChanceOfAllKeys(_Part):
+    """The probability of all IMO criteria that are judged within the card's range."""
+
+    criteria: list[str]
+    probability_met: float
+    interval_95: list[float]
+    tail: TailKeys | None
+
+
 class StabilityEnsembleKeys(EnsembleKeys):
-    """Bands of the straight course, and the probability of each IMO criterion."""
+    """Bands of the straight course, and the probability of each IMO criterion and of all together."""
 
     probability_stable: Number
-    imo: list[dict[str, Any]]
+    imo: list[ChanceKeys]
+    imo_all: ChanceOfAllKeys | None
     curves: dict[str, Any] | None
 
 

@@ -101,6 +101,7 @@ class StabilityResult(PagedResult):
             course,
             *_turning_text(self.study),
             *([] if chance is None else [f"Stable on a straight course with probability {chance:.3g}"]),
+            *_together_text(self.bands),
         )
 
     @property
@@ -128,7 +129,8 @@ class StabilityResult(PagedResult):
         tables = (eigenvalues, nomoto, influences, _criteria(self.study.imo))
         if self.bands is None:
             return tables
-        return *tables, band_table(self.bands.figures, self.bands.asked), _chances(self.bands)
+        found_tails = [_tails(self.bands)] if any(one.tail for one in self.bands.chances) else []
+        return *tables, band_table(self.bands.figures, self.bands.asked), _chances(self.bands), *found_tails
 
 
 def judge_stability(
@@ -159,8 +161,42 @@ def _chances(found: StabilityBands) -> ResultTable:
                 None if beyond or not chance.between else f"{chance.between[0]:.3f} to {chance.between[1]:.3f}",
             ]
         )
+    together = found.all_met
+    if together:
+        interval = f"{together.between[0]:.3f} to {together.between[1]:.3f}"
+        name = f"the {len(together.names)} within the card's range together"
+        rows.append([name, None, None, None, f"{together.met:.3g}", interval])
     columns = ("criterion", "5 %", "95 %", "allowed", "P(met)", "interval of P")
     return ResultTable("IMO MSC.137(76), worse side, over the ensemble", columns, rows)
+
+
+def _tails(found: StabilityBands) -> ResultTable:
+    """Small probabilities of not meeting a criterion, by importance sampling."""
+    named = [(one.criterion.name, one.tail) for one in found.chances if one.tail]
+    if found.all_met and found.all_met.tail:
+        named.append(("any of these", found.all_met.tail))
+    remarks = list(dict.fromkeys(tail.remark for _, tail in named if tail.remark))
+    rows: list[list[object]] = []
+    for name, tail in named:
+        number = f" ({remarks.index(tail.remark) + 1})" if tail.remark else ""
+        found_texts = [None if value is None else f"{value:.2e}" for value in (tail.probability, tail.standard_error)]
+        rows.append([name + number, *found_texts, f"{tail.effective_size:.0f}", f"{tail.distance:.3g}"])
+    columns = ("criterion", "P(not met)", "standard error", "effective size", "distance (sd)")
+    notes = tuple(f"({number}) {text}" for number, text in enumerate(remarks, 1))
+    return ResultTable("Too rare for the ensemble: by importance sampling", columns, rows, notes)
+
+
+def _together_text(found: StabilityBands | None) -> list[str]:
+    together = found.all_met if found else None
+    if together is None:
+        return []
+    rare = together.tail
+    low, high = together.between
+    probability = f"probability {together.met:.3g} ({low:.3f} to {high:.3f})"
+    text = f"{len(together.names)} IMO criteria together are met with {probability}"
+    if rare and rare.probability is not None:
+        text += f"; not met {rare.probability:.2e} (standard error {rare.standard_error:.1e})"
+    return [text]
 
 
 def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import pickle
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
 from tank2sim.cards.form import EffectEntry
-from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects import EFFECTS, Effect
 from tank2sim.dynamics.glider import glider_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
@@ -14,9 +16,15 @@ from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.units import from_si
 
+KEPT_MODELS = 16
+"""Models of cards, and functions made of models, that are kept for when they are asked for again, the last ones of each
+kind: a command works with one to five cards (project choice)."""
+
 
 def build(card: Card) -> Model:
     """Build the model that a card describes; its messages name the card's file.
+
+    Equal cards have the same model, with all that it has worked out.
 
     Raises
     ------
@@ -24,7 +32,27 @@ def build(card: Card) -> Model:
         The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
         singular; the message names the key.
     """
-    return replace(_model(card), source=card.source)
+    entries = card.effects if isinstance(card, ManoeuvringCard) else ()
+    effects = tuple(EFFECTS.get(entry.name) for entry in entries)
+    content = pickle.dumps(replace(card, covariance=None))
+    return _built(_Described(content, tuple(map(id, effects)), card, effects))
+
+
+@dataclass(frozen=True)
+class _Described:
+    """A card by its content, and the effects that it names by their identity: they hold mappings, which have no hash.
+
+    The effects are held, so that no other one gets their identity."""
+
+    content: bytes
+    identities: tuple[int, ...]
+    card: Card = field(compare=False)
+    effects: tuple[Effect | None, ...] = field(compare=False)
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _built(described: _Described) -> Model:
+    return replace(_model(described.card), source=described.card.source)
 
 
 def _model(card: Card) -> Model:

@@ -278,6 +278,22 @@ class Model:
         `value` may hold the old symbol. A parameter that it does not hold acts on nothing any more, and is dropped.
         """
         old = self.symbol(name)
+        kept = tuple(parameter for parameter in self.parameters if parameter.name != name or ca.depends_on(value, old))
+        return self._substituted(old, value, kept)
+
+    def with_constants(self, names: Iterable[str]) -> Model:
+        """A model without the parameters of these names: their start values are numbers in its equations."""
+        given = set(names)
+        constants = [parameter for parameter in self.parameters if parameter.name in given]
+        if not constants:
+            return self
+        symbols = ca.vertcat(*(parameter.symbol for parameter in constants))
+        starts = ca.SX(ca.vertcat(*(parameter.start for parameter in constants)))
+        kept = tuple(parameter for parameter in self.parameters if parameter.name not in given)
+        return self._substituted(symbols, starts, kept)
+
+    def _substituted(self, old: ca.SX, value: ca.SX, parameters: tuple[Parameter, ...]) -> Model:
+        """The model with `value` in place of the symbols `old`, and with `parameters`."""
 
         def changed(expression: ca.SX | float) -> ca.SX:
             return ca.substitute(ca.SX(expression), old, value)
@@ -292,15 +308,7 @@ class Model:
             )
             for state in self.states
         )
-        kept = tuple(parameter for parameter in self.parameters if parameter.name != name or ca.depends_on(value, old))
-        return replace(self, quantities=quantities, states=states, parameters=kept)
-
-    def with_constants(self, names: Iterable[str]) -> Model:
-        """A model without the parameters of these names: their start values are numbers in its equations."""
-        model, given = self, set(names)
-        for parameter in [parameter for parameter in self.parameters if parameter.name in given]:
-            model = model.substitute(parameter.name, ca.SX(parameter.start))
-        return model
+        return replace(self, quantities=quantities, states=states, parameters=parameters)
 
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""

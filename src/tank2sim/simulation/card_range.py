@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -81,16 +82,22 @@ def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) 
     """The figures of a run with their times; `parameters` are all of the model, by name."""
     row = range_exit_row(run)
     exit_s = None if row is None else float(run.t[row])
-    settled: Numbers = {}
+    numbers, settled = single_figures(figures), {}
+    for name in numbers:
+        times = read_with(name)
+        if times and all(time in numbers for time in times):
+            settled[name] = sum(numbers[time] for time in times)
+    return CardRangeReading(numbers, settled, exit_s, "" if exit_s is None else _how(run, parameters))
+
+
+def read_with(name: str) -> tuple[str, ...]:
+    """Names of the figures whose sum is the time at which a figure is known, s; empty: at the end of the run."""
     for names, last in ((_QUARTER, "time_90_s"), (_HALF, "time_180_s"), (_FIRST_HEADING, "initial_turning_time_s")):
-        if isinstance(time := figures.get(last), float):
-            settled |= dict.fromkeys(names, time)
-    executes, waits = (figures.get(name) or [] for name in ("execute_times_s", "overshoot_times_s"))
-    if isinstance(executes, list) and isinstance(waits, list):
-        for place, (begun, later) in enumerate(zip(executes, waits, strict=False), start=1):
-            settled[f"overshoot_{place}_deg"] = settled[f"overshoot_time_{place}_s"] = begun + later
-        settled |= {f"execute_time_{place}_s": time for place, time in enumerate(executes, start=1)}
-    return CardRangeReading(single_figures(figures), settled, exit_s, "" if exit_s is None else _how(run, parameters))
+        if name in names:
+            return (last,)
+    if found := re.fullmatch(r"overshoot(?:_time)?_(\d+)_(?:deg|s)", name):
+        return f"execute_time_{found[1]}_s", f"overshoot_time_{found[1]}_s"
+    return (name,) if re.fullmatch(r"execute_time_\d+_s", name) else ()
 
 
 def single_figures(figures: Figures) -> Numbers:

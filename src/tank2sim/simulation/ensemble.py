@@ -76,25 +76,73 @@ class Draws:
         beyond: tuple[str, ...] = ()
         for draw in range(DRAWS):
             # Summed by NumPy, row by row: the order of sums in a linear algebra library depends on the processor.
-            values = self.mean + (self.root * stream.standard_normal(len(self.names))).sum(axis=1)
+            standard = stream.standard_normal(len(self.names))
+            values = self.at(standard)
             if self.samples is not None:
                 values[self.sampled] = self.samples[stream.integers(len(self.samples))]
             outside = (values < self.lowest) | (values > self.highest)
             if not outside.any():
-                return Drawn(dict(zip(self.names, values.tolist(), strict=True)), beyond)
+                return Drawn(dict(zip(self.names, values.tolist(), strict=True)), beyond, standard=standard)
             if draw == 0:
                 beyond = tuple(name for name, out in zip(self.names, outside, strict=True) if out)
         held = np.clip(values, self.lowest, self.highest)
-        return Drawn(dict(zip(self.names, held.tolist(), strict=True)), beyond, trouble=NOT_WITHIN)
+        return Drawn(dict(zip(self.names, held.tolist(), strict=True)), beyond, trouble=NOT_WITHIN, standard=standard)
+
+    def at(self, standard: Array) -> Array:
+        """Parameters (k,) at standard normal values (k,)."""
+        values: Array = self.mean + (self.root * standard).sum(axis=1)
+        return values
 
 
 class Drawn(NamedTuple):
-    """Parameters of a member by name; names beyond a bound in the first draw; and, if every draw was beyond, the reason
-    that it is unusable (with the values of the last draw, clipped)."""
+    """Parameters of a member by name; names beyond a bound in the first draw; if every draw was beyond, the reason
+    that it is unusable (with the values of the last draw, clipped); and the standard normal values (k,) of the draw."""
 
     values: dict[str, float]
     beyond: tuple[str, ...] = ()
     trouble: str = ""
+    standard: Array | None = None
+
+
+OUT_OF_BOUNDS = "a number is beyond its bounds"
+
+
+@dataclass(frozen=True, eq=False)
+class MixtureDraws(Draws):
+    """Members about other centres than the card, for importance sampling: those beyond a bound are not drawn again.
+
+    A member takes a centre with the probability in `shares`, and standard normal values about it.
+
+    Parameters
+    ----------
+    centres : array (c, k)
+        In standard normal values, zero at the card.
+    shares : array (c,)
+        They sum to 1.
+    round : int
+        Number of the sample: each has random streams of its own.
+    """
+
+    centres: Array = field(default_factory=lambda: np.zeros((1, 0)))
+    shares: Array = field(default_factory=lambda: np.ones(1))
+    round: int = 0
+
+    def drawn(self, number: int) -> Drawn:
+        """A member, from numpy's ``SeedSequence(seed, spawn_key=(round, number))``."""
+        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.round, number)))
+        centre = self.centres[int(np.searchsorted(np.cumsum(self.shares)[:-1], stream.random(), side="right"))]
+        standard = centre + stream.standard_normal(len(self.names))
+        values = self.at(standard)
+        within = bool(((values >= self.lowest) & (values <= self.highest)).all())
+        held = np.clip(values, self.lowest, self.highest).tolist()
+        trouble = "" if within else OUT_OF_BOUNDS
+        return Drawn(dict(zip(self.names, held, strict=True)), (), trouble, standard)
+
+    def weights(self, standard: Array) -> Array:
+        """Density of the card's distribution over that of this mixture (n,), at standard normal values (n, k)."""
+        exponents = standard @ self.centres.T - 0.5 * np.sum(self.centres**2, axis=1)
+        largest = exponents.max(axis=1)
+        return np.asarray(np.exp(-largest) / (np.exp(exponents - largest[:, None]) @ self.shares))
 
 
 class MemberResult(NamedTuple):
@@ -182,6 +230,8 @@ class Ensemble:
     unusable : mapping
         Reason of unusable members, to their number.
     redrawn : Redrawn
+    bad : array (members,)
+        True for unusable members.
     """
 
     members: int
@@ -190,6 +240,7 @@ class Ensemble:
     histories: Histories | None = None
     unusable: Mapping[str, int] = field(default_factory=dict)
     redrawn: Redrawn = field(default_factory=lambda: Redrawn(0, {}))
+    bad: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     @property
     def usable(self) -> int:
@@ -214,10 +265,12 @@ def ensemble(
     histories: Histories | None = None
     unusable: Counter[str] = Counter()
     beyond: list[tuple[str, ...]] = []
+    bad = np.zeros(members, dtype=np.bool_)
     for task, answer in zip(tasks, _in_order(tasks, executor), strict=True):
         rows = slice(task.first, task.first + task.count)
         beyond += answer.beyond.values()
         unusable.update(trouble for trouble in answer.troubles if trouble)
+        bad[rows] = [bool(trouble) for trouble in answer.troubles]
         for name, values in answer.figures.items():
             if name not in figures:
                 figures[name] = np.full(members, np.nan)
@@ -226,7 +279,8 @@ def ensemble(
             if histories is None:
                 histories = np.full((min(members, KEPT), *answer.histories.shape[1:]), np.nan, dtype=np.float32)
             histories[rows] = answer.histories[: KEPT - task.first]
-    return Ensemble(members, draws.seed, figures, histories, dict(sorted(unusable.items())), Redrawn.of(beyond))
+    redrawn = Redrawn.of(beyond)
+    return Ensemble(members, draws.seed, figures, histories, dict(sorted(unusable.items())), redrawn, bad)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
@@ -83,7 +85,7 @@ class Integrator:
         self.compiled = find_compiler() is not None if compiled is None else compiled
         if self.compiled:
             try:
-                self._rollout, self._outputs = self._in_machine_code()
+                self._rollout, self._outputs = _in_machine_code(self.model)
                 return
             except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
                 if compiled:
@@ -112,26 +114,6 @@ class Integrator:
         self._outputs(len(x), np.ascontiguousarray(u), p, np.ascontiguousarray(x), y)
         return y
 
-    def _in_machine_code(self) -> tuple[Loop, Loop]:
-        step, constants = step_and_constants(self.model)
-        functions = (step, constants, self.model.output)
-        sizes = {
-            name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")
-        }
-        lengths = {
-            "nx": step.size1_in(0),
-            "nu": step.size1_in(1),
-            "nc": max(1, constants.size1_out(0)),
-            "ny": self.model.output.size1_out(0),
-        }
-        source = generate_c(functions, "model") + _LOOP.format(export=EXPORT, **sizes, **lengths)
-        library = ctypes.CDLL(str(cached_library({"model.c": source})))
-        array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
-        library.rollout.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, array, array, array]
-        library.outputs.argtypes = [ctypes.c_long, array, array, array, array]
-        library.rollout.restype = library.outputs.restype = None
-        return library.rollout, library.outputs
-
     def _in_casadi(self) -> tuple[Loop, Loop]:
         loops: dict[int, ca.Function] = {}
         step = runge_kutta_step(self.model)
@@ -152,3 +134,23 @@ class Integrator:
             y[:] = np.array(self.model.output(x.T, u.T, ca.repmat(p, 1, n))).T
 
         return rollout, outputs
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _in_machine_code(model: Model) -> tuple[Loop, Loop]:
+    step, constants = step_and_constants(model)
+    functions = (step, constants, model.output)
+    sizes = {name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")}
+    lengths = {
+        "nx": step.size1_in(0),
+        "nu": step.size1_in(1),
+        "nc": max(1, constants.size1_out(0)),
+        "ny": model.output.size1_out(0),
+    }
+    source = generate_c(functions, "model") + _LOOP.format(export=EXPORT, **sizes, **lengths)
+    library = ctypes.CDLL(str(cached_library({"model.c": source})))
+    array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    library.rollout.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, array, array, array]
+    library.outputs.argtypes = [ctypes.c_long, array, array, array, array]
+    library.rollout.restype = library.outputs.restype = None
+    return library.rollout, library.outputs

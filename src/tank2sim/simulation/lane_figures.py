@@ -18,7 +18,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.native.lanes import NoLanesError
-from tank2sim.simulation.card_range import entry_name, single_figures
+from tank2sim.simulation.card_range import entry_name, read_with, single_figures
 from tank2sim.simulation.figures import REST_SPEED, STEADY_SHARE
 from tank2sim.simulation.lane_runs import CROSSINGS, FINE, UNKNOWN, LanePlan, LaneResults, LaneRunner
 from tank2sim.simulation.manoeuvres import (
@@ -51,11 +51,21 @@ class LaneFigures:
         States at the requested times; nan after the end.
     fine : array (n,)
         False for a ship whose motion left all bounds.
+    left_s : array (n,)
+        Time at which a ship first left the range of its card, s; inf if it did not, nan if it is not `fine`.
     """
 
     figures: Mapping[str, Array]
     states: Array
     fine: NDArray[np.bool_]
+    left_s: Array
+
+    def outside(self, name: str) -> NDArray[np.bool_]:
+        """True (n,) for ships that had left the card's range before this figure was known, as
+        :meth:`tank2sim.simulation.card_range.CardRangeReading.outside`."""
+        times = [self.figures[time] for time in read_with(name) if time in self.figures]
+        known = np.sum(times, axis=0) if times else np.full(len(self.left_s), np.nan)
+        return np.isfinite(self.left_s) & (np.where(np.isnan(known), np.inf, known) >= self.left_s)
 
 
 def runs_in_lanes(manoeuvre: Manoeuvre) -> bool:
@@ -141,11 +151,12 @@ class LaneManoeuvres:
         else:
             figures = self._zigzag(found, (u, p), starts, (manoeuvre, plan.limit))
         fine = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
+        left = np.where(fine, found.left, np.nan)
         for number in np.flatnonzero(found.ended == UNKNOWN).tolist():
-            fine[number] = self._by_itself((manoeuvre, duration_s, inputs), p[number], figures, number)
+            fine[number], left[number] = self._by_itself((manoeuvre, duration_s, inputs), p[number], figures, number)
         for values in figures.values():
             values[~fine] = np.nan
-        return LaneFigures(figures, found.states, fine)
+        return LaneFigures(figures, found.states, fine, left)
 
     def _by_itself(
         self,
@@ -153,8 +164,9 @@ class LaneManoeuvres:
         p: Array,
         figures: dict[str, Array],
         number: int,
-    ) -> bool:
-        """The figures of a single ship with more events than lanes keep; whether it could be run."""
+    ) -> tuple[bool, float]:
+        """The figures of a single ship with more events than lanes keep; whether it could be run, and when it left the
+        card's range, s."""
         (manoeuvre, duration, inputs), model = asked, self.model
         parameters = dict(zip(model.parameter_names, p.tolist(), strict=True))
         count = len(next(iter(figures.values())))
@@ -163,10 +175,10 @@ class LaneManoeuvres:
         try:
             run = simulate(model, manoeuvre, duration_s=duration, inputs=inputs, parameters=parameters)
         except InputError:
-            return False
+            return False, math.nan
         for name, value in single_figures(run.figures).items():
             figures.setdefault(name, np.full(count, np.nan))[number] = value
-        return True
+        return True, math.inf if run.reading.exit_s is None else run.reading.exit_s
 
     def _column(self, rows: Array, name: str) -> Array:
         values: Array = rows[..., self.model.state_names.index(name)]

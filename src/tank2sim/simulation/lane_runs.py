@@ -20,6 +20,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
 from tank2sim.native.library import cached_library
+from tank2sim.simulation.card_range import INSIDE
 from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.scheme import step_and_constants
 from tank2sim.simulation.trajectory import TIMES_BEYOND
@@ -49,7 +50,7 @@ typedef struct {{
   const double *inputs, *limits, *at;
 }} Plan;
 typedef struct {{
-  double *end, *last, *then, *speeds, *order_times, *order_states, *windows, *states;
+  double *end, *last, *then, *speeds, *left, *order_times, *order_states, *windows, *states;
   int *ended, *orders, *crossings;
 }} Found;
 typedef struct {{
@@ -60,12 +61,11 @@ static void take(Group *g, V *to) {{
   V *const res[1] = {{to}};
   step(arg, res);
 }}
-static V speed_at(const Group *g, const V *x) {{
-  V speed[1];
+/* The speed, and 1 within the card's range. */
+static void look(const Group *g, const V *x, V *speed, V *valid) {{
   const V *const arg[3] = {{x, g->u, g->p}};
-  V *const res[1] = {{speed}};
-  speed_of(arg, res);
-  return speed[0];
+  V *const res[2] = {{speed, valid}};
+  speed_and_validity(arg, res);
 }}
 /* The states of a lane after a step of a length; by how much it is beyond the goal. */
 static double beyond_after(Group *g, V *to, int lane, double length, double side, double goal) {{
@@ -109,7 +109,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
     Group g;
     long member[LANES], due[LANES], events[LANES], open[LANES][2][2];
     V goal, sides = all(side), end, level[2] = {{all(0), all(0)}}, steps = all(0), soon = all(INFINITY);
-    V approach, slowest, fastest;
+    V approach, slowest, fastest, speed, valid, left;
     M active = ~none, waiting = none;
     g.before = g.states[0]; g.x = g.states[1]; g.next = g.states[2];
     for (int l = 0; l < LANES; ++l) {{
@@ -128,7 +128,9 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
     {{ const V *const arg[1] = {{g.p}}; V *const res[1] = {{g.c}}; constants(arg, res); }}
     g.t = g.t_before = all(0);
     goal = g.x[PSI] + sides * all(plan->heading);
-    approach = slowest = fastest = speed_at(&g, g.x);
+    look(&g, g.x, &speed, &valid);
+    approach = slowest = fastest = speed;
+    left = WHERE(LT(valid, all({inside!r})), all(0), all(INFINITY));
     rates[0] = g.x[R]; velocities[0] = slowest;
     for (long n = 1; some(active); ++n) {{
       const V grid = steps * all(h);
@@ -159,7 +161,8 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       }}
       for (int i = 0; i < NX; ++i) bad |= ~LE(lane_fabs(g.next[i]), all(plan->limits[i]));
       bad &= active;
-      const V speed = speed_at(&g, g.next);
+      look(&g, g.next, &speed, &valid);
+      left = WHERE(active & LT(valid, all({inside!r})) & LT(g.t_next, left), g.t_next, left);
       slowest = WHERE(active & LT(speed, slowest), speed, slowest);
       fastest = WHERE(active & LT(fastest, speed), speed, fastest);
       rates[n & (REMEMBERED - 1)] = g.next[R];
@@ -223,6 +226,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           found->end[k] = t_next;
           for (int i = 0; i < NX; ++i) found->last[k * NX + i] = LANE(g.next[i], l);
           found->orders[k] = (int) events[l];
+          found->left[k] = LANE(left, l);
           found->speeds[k * 4] = LANE(approach, l);
           found->speeds[k * 4 + 1] = LANE(slowest, l);
           found->speeds[k * 4 + 2] = LANE(fastest, l);
@@ -265,6 +269,7 @@ _FOUND = (
     "last",
     "then",
     "speeds",
+    "left",
     "order_times",
     "order_states",
     "windows",
@@ -323,6 +328,8 @@ class LaneResults:
         Yaw rate (rad/s) and speed (m/s) two lengths before the end.
     speeds : array (n, 4)
         First, lowest, highest and last speed, m/s.
+    left : array (n,)
+        Time at which the card's range (the output ``validity``) was first left, s; inf if it was not.
     order_times, order_states : arrays (n, :data:`CROSSINGS`), (n, :data:`CROSSINGS`, nx)
         Times and states at the changes of order.
     windows : array (n, watches, :data:`CROSSINGS`, :data:`SAMPLES`, 2 + nx)
@@ -341,6 +348,7 @@ class LaneResults:
     last: Array
     then: Array
     speeds: Array
+    left: Array
     order_times: Array
     order_states: Array
     windows: Array
@@ -393,6 +401,7 @@ class LaneRunner:
             last=np.full((n, nx), np.nan),
             then=np.full((n, 2), np.nan),
             speeds=np.full((n, 4), np.nan),
+            left=np.full(n, np.nan),
             order_times=np.full((n, CROSSINGS), np.nan),
             order_states=np.full((n, CROSSINGS, nx), np.nan),
             windows=np.full((*shape, CROSSINGS, SAMPLES, 2 + nx), np.nan),
@@ -424,10 +433,12 @@ class LaneRunner:
         model = self.model
         step, constants = step_and_constants(model)
         arguments = [model.x, model.u, model.p]
-        speed = ca.Function("speed", arguments, [model.expand(model.symbol("motion.speed"))], {"cse": True})
+        valid = model.expand(model.symbol("validity")) if "validity" in model else ca.SX(1.0)
+        seen = [model.expand(model.symbol("motion.speed")), valid]
+        looked = ca.Function("looked", arguments, seen, {"cse": True})
         codes = [
             lane_function(function, name)
-            for function, name in ((step, "step"), (constants, "constants"), (speed, "speed_of"))
+            for function, name in ((step, "step"), (constants, "constants"), (looked, "speed_and_validity"))
         ]
         runs = _RUNS.format(
             export=EXPORT,
@@ -443,6 +454,7 @@ class LaneRunner:
             remembered=_REMEMBERED,
             runaway=RUNAWAY_LANE,
             unknown=UNKNOWN,
+            inside=INSIDE,
         )
         try:
             library = _library([VECTORS, *codes, runs], self.lanes)

@@ -7,11 +7,13 @@ of motion of the same length are integrated together: each step is a product of 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
@@ -32,14 +34,7 @@ class Sensitivity:
 
     def __init__(self, model: Model, free: Sequence[str], seen: Sequence[str]):
         self.model, self.free, self.seen = model, tuple(free), tuple(seen)
-        theta = ca.vcat([model.symbol(name) for name in free])
-        arguments, cse = [model.x, model.u, model.p], {"cse": True}
-        slopes = [model.rates, *(ca.jacobian(model.rates, by) for by in (model.x, theta))]
-        seen_values = model.expand(ca.vcat([model.symbol(name) for name in seen]))
-        shown = [seen_values, *(ca.jacobian(seen_values, by) for by in (model.x, theta))]
-        self._steps = Chain(runge_kutta_step(model))
-        self._slopes = RowFunction(ca.Function("slopes", arguments, [ca.densify(value) for value in slopes], cse))
-        self._shown = RowFunction(ca.Function("shown", arguments, [ca.densify(value) for value in shown], cse))
+        self._steps, self._slopes, self._shown = _functions(model, self.free, self.seen)
 
     def motion(self, start: Array, inputs: Array, p: Array, h: float) -> Array:
         """States (n + 1, nx) from `start` (nx,), each row of `inputs` (n, nu) held for `h` s."""
@@ -107,3 +102,18 @@ class Sensitivity:
             total += (h / 6 * weight)[..., None] * tangent
             at, by = states + reach * slope, start + reach[..., None] * tangent
         return total
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _functions(model: Model, free: tuple[str, ...], seen: tuple[str, ...]) -> tuple[Chain, RowFunction, RowFunction]:
+    """A step; the rates, and the observed values, each with its derivatives by states and free parameters."""
+    theta = ca.vcat([model.symbol(name) for name in free])
+    arguments, cse = [model.x, model.u, model.p], {"cse": True}
+    slopes = [model.rates, *(ca.jacobian(model.rates, by) for by in (model.x, theta))]
+    seen_values = model.expand(ca.vcat([model.symbol(name) for name in seen]))
+    shown = [seen_values, *(ca.jacobian(seen_values, by) for by in (model.x, theta))]
+    return (
+        Chain(runge_kutta_step(model)),
+        RowFunction(ca.Function("slopes", arguments, [ca.densify(value) for value in slopes], cse)),
+        RowFunction(ca.Function("shown", arguments, [ca.densify(value) for value in shown], cse)),
+    )

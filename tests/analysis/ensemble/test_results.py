@@ -11,9 +11,10 @@ import pytest
 
 from tank2sim.analysis.ensemble import results
 from tank2sim.analysis.ensemble.draws import by_file_name, draws_of
-from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.questions import BEYOND_CARD_MARK, ENSEMBLE_SIGNALS, OfCriteria, OfManoeuvre, ShipText
 from tank2sim.analysis.ensemble.results import (
     EnsembleRequest,
+    all_chances,
     bands_without_poles,
     chance,
     manoeuvre_bands,
@@ -23,6 +24,7 @@ from tank2sim.analysis.ensemble.results import (
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
+from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.ensemble import Ensemble, ensemble
@@ -176,6 +178,31 @@ def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_car
     for one in imo_criteria(mariner, draws.member(0)):
         if one.found is not None:
             assert found.figures[one.name][0] == pytest.approx(one.found, rel=1e-4), one.name
+
+
+def test_members_beyond_the_card_are_those_whose_own_trials_left_its_range(mariner_card) -> None:
+    card = revised(mariner_card, {}, {"model.valid_speed_mps": [6.19, 9.3]})
+    assert isinstance(card, ManoeuvringCard)
+    draws, _ = draws_of(card, 4)
+    found = ensemble(OfCriteria(ShipText.of(card)), draws, 6)
+    model = build(card)
+    expected: dict[str, list[bool]] = {}
+    for number in range(6):
+        for one in imo_criteria(model, draws.member(number)):
+            expected.setdefault(one.name, []).append(one.beyond_card)
+    for name, beyond in expected.items():
+        if name + BEYOND_CARD_MARK in found.figures:
+            assert (found.figures[name + BEYOND_CARD_MARK] > 0).tolist() == beyond, name
+    assert 0 < sum(expected["advance"]) < 6
+    assert chance(ImoCriterion("advance", 1.0, 9.0, "L"), found).beyond == sum(expected["advance"])
+
+
+def test_all_criteria_together_are_met_by_members_that_meet_each() -> None:
+    figures = {"a": np.array([1.0, 1, 3, np.nan, 1]), "b": np.array([1.0, 5, 1, 1, np.nan])}
+    found = all_chances({"a": 2.0, "b": 2.0}, Ensemble(5, 0, figures, None, {"x": 1}))
+    assert found is not None and found.met == pytest.approx(1 / 4)
+    assert found.between == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of Wilson, 1 of 4
+    assert all_chances({}, Ensemble(5, 0, figures)) is None
 
 
 def test_figures_over_a_criterion_of_both_signs_have_no_band() -> None:

@@ -208,9 +208,16 @@ class OfFigures:
         return AskTogether(ask)
 
 
+BEYOND_CARD_MARK = ": beyond the card"
+"""Ending of the name of a criterion's other entry in :class:`OfCriteria`."""
+
+
 @dataclass(frozen=True)
 class OfCriteria:
-    """Value of each IMO criterion by its name; nan where a trial does not show it."""
+    """Value of each IMO criterion by its name; nan where a trial does not show it.
+
+    With :data:`BEYOND_CARD_MARK` after its name: 1 where a trial left the card's range before it was known, else 0.
+    """
 
     ship: ShipText
 
@@ -227,10 +234,11 @@ class OfCriteria:
             given = {name: value for name, value in values.items() if name in parameters}
             if fault := mass_fault(parameters | given):
                 return MemberResult({}, trouble=fault)
-            criteria = imo_criteria(model, given, each_step)
-            return MemberResult(
-                {criterion.name: math.nan if criterion.found is None else criterion.found for criterion in criteria}
-            )
+            figures: Numbers = {}
+            for criterion in imo_criteria(model, given, each_step):
+                figures[criterion.name] = math.nan if criterion.found is None else criterion.found
+                figures[criterion.name + BEYOND_CARD_MARK] = float(criterion.beyond_card)
+            return MemberResult(figures)
 
         lanes = _lanes_of(whole)
         if lanes is None:
@@ -240,8 +248,9 @@ class OfCriteria:
         def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
             members = _members_of(count, values)
             p, troubles = _ships(model, count, values)
-            rudders = {largest_trial_rudder(parameters | member) for member in members}
-            if rudders != {largest_trial_rudder(parameters)}:  # the gear's stops are uncertain
+            stops = values.get("steering.max_angle", np.zeros(0))
+            rudders = {largest_trial_rudder({"steering.max_angle": stop}) for stop in stops.tolist()}
+            if rudders - {largest_trial_rudder(parameters)}:  # the gear's stops are uncertain
                 return gathered([ask_one(member) for member in members])
             figures: dict[str, Array] = {}
             for trial in trials:
@@ -249,6 +258,8 @@ class OfCriteria:
                 for name, figure in trial.criteria.items():
                     shown = [side.figures.get(figure, np.full(count, np.nan)) for side in sides]
                     figures[name] = np.maximum(*shown)
+                    beyond = np.any([side.outside(figure) for side in sides], axis=0)
+                    figures[name + BEYOND_CARD_MARK] = beyond.astype(float)
             if "propeller.speed" in model.input_names:
                 given = ({name: value for name, value in member.items() if name in parameters} for member in members)
                 reaches = [

@@ -5,13 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.ensemble.questions import OfCriteria, OfFigures, OfManoeuvre, ShipText, signals_with_bands
+from tank2sim.analysis.ensemble.questions import (
+    BEYOND_CARD_MARK,
+    OfCriteria,
+    OfFigures,
+    OfManoeuvre,
+    ShipText,
+    signals_with_bands,
+)
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
+from tank2sim.analysis.ensemble.tails import Tail, tails
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
 from tank2sim.arrays import Array
@@ -104,6 +112,11 @@ class Chance:
         Usable members whose trial does not show it; they count as not meeting it.
     band : Band or None
         Of what was found.
+    beyond : int
+        Usable members whose trial left the card's range before it was known; they count by what was found.
+    tail : Tail, optional
+        The probability of not meeting it by importance sampling, where fewer than
+        :data:`tank2sim.analysis.ensemble.tails.FEW_FAILING` members fail.
     """
 
     criterion: ImoCriterion
@@ -111,6 +124,8 @@ class Chance:
     between: tuple[float, float] | None
     undecided: int
     band: Band | None
+    beyond: int = 0
+    tail: Tail | None = None
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
@@ -122,19 +137,50 @@ class Chance:
             "probability_met": self.met,
             "interval_95": self.between,
             "not_shown": self.undecided,
+            "beyond_card": self.beyond,
             "band": self.band and self.band.as_json(),
+            "tail": self.tail and self.tail.as_json(),
+        }
+
+
+@dataclass(frozen=True)
+class ChanceOfAll:
+    """Probability that all criteria are met that have a probability and are judged within the card's range.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of these criteria.
+    met, between, tail
+        As of :class:`Chance`.
+    """
+
+    names: tuple[str, ...]
+    met: float
+    between: tuple[float, float]
+    tail: Tail | None = None
+
+    def as_json(self) -> dict[str, object]:
+        """The JSON form."""
+        return {
+            "criteria": list(self.names),
+            "probability_met": self.met,
+            "interval_95": self.between,
+            "tail": self.tail and self.tail.as_json(),
         }
 
 
 @dataclass(frozen=True, eq=False)
 class StabilityBands:
-    """Bands of the straight course at the card's speed, and the probabilities of stability and of each criterion."""
+    """Bands of the straight course at the card's speed, and the probabilities of stability, of each criterion and of
+    all criteria together."""
 
     asked: Members
     figures: Mapping[str, Band]
     stable: float | None
     chances: tuple[Chance, ...]
     curves: SteeringBands | None = None
+    all_met: ChanceOfAll | None = None
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
@@ -143,6 +189,7 @@ class StabilityBands:
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "probability_stable": self.stable,
             "imo": [chance.as_json() for chance in self.chances],
+            "imo_all": self.all_met and self.all_met.as_json(),
             "curves": self.curves and self.curves.as_json(),
         }
 
@@ -198,7 +245,8 @@ def stability_bands(
     """Bands of the straight course at the card's speed, the probabilities of the IMO `criteria`, and on request bands
     of `curves`: at a speed (None: the card's), on a grid."""
     draws, messages = draws_of(card, request.seed)
-    trials = ensemble(OfCriteria(ShipText.of(card)), draws, request.members, executor)
+    question = OfCriteria(ShipText.of(card))
+    trials = ensemble(question, draws, request.members, executor)
     messages.append("an ensemble is judged at the card's speed")
     try:
         straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
@@ -206,6 +254,16 @@ def stability_bands(
         straight = Ensemble(request.members, request.seed, {})
         messages.append(f"no bands of the straight course: {error.problem}")
     chances = tuple(chance(criterion, trials) for criterion in criteria)
+    limits = {
+        one.criterion.name: one.criterion.allowed
+        for one in chances
+        if one.met is not None and not one.criterion.beyond_card
+    }
+    each, of_any, about = tails(question, draws, trials, limits, executor)
+    messages += about
+    chances = tuple(replace(one, tail=each.get(one.criterion.name)) for one in chances)
+    messages += _counted(chances, trials.usable)
+    together = all_chances(limits, trials)
     unseen = answering_states(build(card))
     if unseen:
         messages.append(
@@ -217,7 +275,8 @@ def stability_bands(
     messages += through
     drawn = steering_bands(ShipText.of(card), draws, request.members, curves, executor) if curves else None
     messages += drawn.notices if drawn else ()
-    return StabilityBands(_members(trials, messages), bands, stable, chances, drawn)
+    together = together and replace(together, tail=of_any)
+    return StabilityBands(_members(trials, messages), bands, stable, chances, drawn, together)
 
 
 def named_bands(
@@ -259,12 +318,43 @@ def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
     shown = values[np.isfinite(values)]
     if not len(shown):
         return Chance(criterion, None, None, found.usable, None)
+    count = int(np.sum(shown <= criterion.allowed))
+    met, ends = _share(count, found.usable)
+    beyond = int(np.sum(found.figures.get(criterion.name + BEYOND_CARD_MARK, np.zeros(0)) > 0))
+    return Chance(criterion, met, ends, found.usable - len(shown), figure_bands(found)[criterion.name], beyond)
+
+
+def _counted(chances: Sequence[Chance], usable: int) -> list[str]:
+    """Notices on members without a figure, and on those beyond the card's range."""
+    lost, left = (
+        ", ".join(f"{one.criterion.name} {count} of {usable}" for one, count in counts if one.met is not None and count)
+        for counts in ([(one, one.undecided) for one in chances], [(one, one.beyond) for one in chances])
+    )
+    lines = [f"members that do not show a figure count as not meeting its criterion: {lost}"] if lost else []
+    if left:
+        lines.append(f"members that left the card's range before a figure was known count by what was found: {left}")
+    if any(one.met is not None for one in chances) and all(
+        one.criterion.beyond_card for one in chances if one.met is not None
+    ):
+        lines.append("no probability of the criteria together: the trials of the card itself leave its range")
+    return lines
+
+
+def all_chances(limits: Mapping[str, float], found: Ensemble) -> ChanceOfAll | None:
+    """The probability that members meet all of the criteria with these limits; None without one."""
+    if not limits:
+        return None
+    with np.errstate(invalid="ignore"):
+        met = np.all([found.figures[name] <= allowed for name, allowed in limits.items()], axis=0)
+    return ChanceOfAll(tuple(limits), *_share(int(np.sum(met)), found.usable))
+
+
+def _share(count: int, of: int) -> tuple[float, tuple[float, float]]:
+    """The share of `of` members, and Wilson's interval of 95 %."""
     from scipy.stats import binomtest  # slow to load
 
-    count = int(np.sum(shown <= criterion.allowed))
-    between = binomtest(count, found.usable).proportion_ci(0.95, method="wilson")
-    met, ends = count / found.usable, (float(between.low), float(between.high))
-    return Chance(criterion, met, ends, found.usable - len(shown), figure_bands(found)[criterion.name])
+    between = binomtest(count, of).proportion_ci(0.95, method="wilson")
+    return count / of, (float(between.low), float(between.high))
 
 
 def _stable(straight: Ensemble) -> float | None:

@@ -32,6 +32,14 @@ _CHANCES = (
     "does not meet it. Where the trial of the card itself leaves the card's range no probability is reported."
 )
 
+_RARE = (
+    " Where fewer members fail than their share can be read from, the second table has the probability of not meeting "
+    "the criterion from members drawn about the ships that fail, each with its weight (importance sampling). Its "
+    "effective size is the number of failing members of the card's own errors that would say as much; without enough "
+    "there is no probability. Distance, and the probability if linear, are those of a figure that changes in "
+    "proportion to the card's numbers; the figure there shows whether it does."
+)
+
 
 def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VConcatChart:
     """Track and histories of the card itself, with the quantiles of the ensemble; those of the track across it."""
@@ -58,6 +66,36 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
     return alt.vconcat(track, history_chart(histories, signals_of(run.model, shown)))
 
 
+def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
+    """Small probabilities of not meeting a criterion, each with what it rests on."""
+    rows: list[list[Cell]] = []
+    for name, tail in rare:
+        keys = ("distance", "linear_probability", "linear_figure", "figure")
+        sizes = [tail["probability"], tail["standard_error"], round(tail["effective_size"])]
+        rows.append([name, *sizes, *(tail[key] for key in keys)])
+    heads = ["criterion", "probability not met", "standard error", "effective size", "distance", "if linear"]
+    heads += ["linear figure there", "figure there"]
+    caption = "Too rare for the ensemble: by importance sampling."
+    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=rows)
+
+
+def _tail_notes(rare: Sequence[tuple[str, Json]]) -> list[str]:
+    """Why there is no probability; where the failing ships are, and what of the members drawn there."""
+    remarks: dict[str, list[str]] = {}
+    notes = []
+    for name, tail in rare:
+        if tail["remark"]:
+            remarks.setdefault(tail["remark"], []).append(name)
+            continue
+        moved = ", ".join(f"{number} {errors:+.1f}" for number, errors in tail["failing_ships"].items())
+        notes.append(
+            f"{name}: of {tail['members']} members drawn about the failing ships {tail['failing']} fail, of these "
+            f"{tail['not_shown']} do not show the figure and {tail['beyond_card']} left the card's range before; "
+            f"{tail['unusable']} cannot be used; the mean of failing ships, in standard errors: {moved}"
+        )
+    return notes + [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
+
+
 def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> PageSection:
     """Return the section of the page of stability: from ``ensemble`` and ``imo`` of the JSON."""
     beyond_card = {criterion["name"]: criterion["beyond_card"] for criterion in criteria}
@@ -74,19 +112,35 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
                 BEYOND_CARD_TEXT if beyond and met is not None else met,
                 f"{interval[0]:.3f} to {interval[1]:.3f}" if interval and not beyond else None,
                 chance["not_shown"],
+                chance.get("beyond_card"),
             ]
         )
-    heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
+    heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval"]
+    heads += ["not shown by", "beyond the card"]
     columns = [Column(title=head) for head in heads]
     probability = found["probability_stable"]
     stable = "" if probability is None else f" It is stable on a straight course with probability {probability:.3g}."
     criteria_table = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
+    together = found.get("imo_all")
+    if together:
+        low, high = together["interval_95"]
+        stable += (
+            f" The {len(together['criteria'])} criteria judged within the card's range are met together with "
+            f"probability {together['probability_met']:.3g} (95 % interval {low:.3f} to {high:.3f})."
+        )
+    rare = [(chance["name"], chance["tail"]) for chance in found["imo"] if chance.get("tail")]
+    if together and together["tail"]:
+        rare.append(("any of these", together["tail"]))
     return PageSection(
         heading=f"Ensemble of {found['members']}",
-        text=_TEXT + _CHANCES + stable,
-        tables=[criteria_table, _table("The straight course at the card's speed.", found["figures"])],
+        text=_TEXT + _CHANCES + stable + (_RARE if rare else ""),
+        tables=[
+            criteria_table,
+            *([_tail_table(rare)] if rare else []),
+            _table("The straight course at the card's speed.", found["figures"]),
+        ],
         charts=curve_charts(found["curves"]) if found["curves"] else (),
-        notes=found["notices"],
+        notes=[*found["notices"], *_tail_notes(rare)],
     )
 
 

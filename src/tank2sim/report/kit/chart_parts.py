@@ -9,6 +9,7 @@ from typing import Any
 
 import altair as alt
 import numpy as np
+from altair.utils.schemapi import debug_mode
 from numpy.typing import ArrayLike
 
 from tank2sim.arrays import Array
@@ -51,7 +52,8 @@ def records(label: str, columns: Mapping[str, Array]) -> list[ChartRecord]:
 
 def data(rows: Sequence[ChartRecord]) -> alt.InlineData:
     """Records as the data of a chart."""
-    return alt.InlineData(values=list(rows))
+    with debug_mode(False):  # validating thousands of numbers takes as long as all else of a page
+        return alt.InlineData(values=list(rows))
 
 
 def every(rows: Sequence[ChartRecord], limit: int) -> list[ChartRecord]:

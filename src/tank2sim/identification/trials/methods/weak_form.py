@@ -11,6 +11,7 @@ differences of q (Messenger and Bortz 2021, Multiscale Model. Simul. 19; the mod
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import casadi as ca
@@ -18,6 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Input, Model
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, MeasuredMotion, measured_motion
@@ -77,18 +79,7 @@ class WeakForm:
 
     def __init__(self, problem: Problem, width: float = WIDTH):
         self.problem = problem
-        self._hidden = _hidden_model(problem.model)
-        theta = ca.vcat([problem.model.symbol(name) for name in problem.free])
-        accelerations = problem.model.expand(ca.vcat([problem.model.symbol(name) for name in WEAK_EQUATIONS]))
-        derivatives = [ca.jacobian(accelerations, theta), ca.jacobian(accelerations, self._hidden.x)]
-        self.seen = tuple(not derivatives[0][:, place].is_zero() for place in range(len(problem.free)))
-        rates = self._hidden.rates
-        self._moves_hidden = bool(len(self._hidden.states)) and bool(ca.depends_on(rates, theta))
-        if self._moves_hidden:
-            self.seen = tuple(True for _ in problem.free)
-        values = [ca.densify(value) for value in (accelerations, *derivatives)]
-        arguments = [self._hidden.x, self._hidden.u, self._hidden.p]
-        self._accelerations = RowFunction(ca.Function("accelerations", arguments, values, {"cse": True}))
+        self._hidden, self._moves_hidden, self.seen, self._accelerations = _functions(problem.model, problem.free)
         states = self._hidden.state_names
         self._sensitivity = Sensitivity(self._hidden, problem.free, states) if states else None
         self.half = width * problem.ship_time / 2
@@ -171,3 +162,18 @@ def _hidden_model(model: Model) -> Model:
         known.append(copy)
     hidden = tuple(state for state in model.states if state.name not in MEASURED_STATES)
     return replace(model, states=hidden, inputs=(*model.inputs, *known), outputs=())
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _functions(model: Model, free: tuple[str, ...]) -> tuple[Model, bool, tuple[bool, ...], RowFunction]:
+    """The model of the unmeasured states; whether free parameters move these; which of them show in the accelerations;
+    the accelerations with their derivatives by free parameters and unmeasured states."""
+    hidden = _hidden_model(model)
+    theta = ca.vcat([model.symbol(name) for name in free])
+    accelerations = model.expand(ca.vcat([model.symbol(name) for name in WEAK_EQUATIONS]))
+    derivatives = [ca.jacobian(accelerations, theta), ca.jacobian(accelerations, hidden.x)]
+    moves = bool(len(hidden.states)) and bool(ca.depends_on(hidden.rates, theta))
+    seen = tuple(moves or not derivatives[0][:, place].is_zero() for place in range(len(free)))
+    values = [ca.densify(value) for value in (accelerations, *derivatives)]
+    function = ca.Function("accelerations", [hidden.x, hidden.u, hidden.p], values, {"cse": True})
+    return hidden, moves, seen, RowFunction(function)

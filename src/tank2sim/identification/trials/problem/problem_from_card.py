@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,7 @@ from tank2sim.cards.reading import revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.kinematics import earth_velocity
@@ -114,7 +116,12 @@ def slowest_speed(trial: Trial, ship_time: float) -> float:
 
 def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
     """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order."""
-    model = with_ground_velocities(build(card))
+    return _driven(build(card), driven_by)
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _driven(ship: Model, driven_by: str) -> Model:
+    model = with_ground_velocities(ship)
     return driven_by_angle(model) if driven_by == "angle" else model
 
 
