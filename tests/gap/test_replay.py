@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.gap.proof.open_loop import later
-from tank2sim.gap.proof.replay import replay_trials, with_black_box
+from tank2sim.gap.proof.replay import TrialReplays, replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.manoeuvres import Zigzag
@@ -134,9 +135,26 @@ def test_a_motion_that_runs_away_has_no_finite_misfit(record: Trial) -> None:
 def test_a_black_box_is_next_to_both(record: Trial) -> None:
     given_card = card(changes={"Nr = -0.0022": "Nr = -0.0015"})
     results = replay_trials(given_card, given_card, together(record), NOISE, held_out=False)
-    (replay,) = with_black_box(results, card(), together(record), NOISE)
+    (replay,) = TrialReplays(NOISE).with_black_box(results, card(), together(record))
     assert replay.misfit("before") > 5
     assert replay.misfit("black_box") == pytest.approx(1.0, abs=0.06)
+
+
+def test_trials_that_are_followed_at_once_are_followed_alike(record: Trial) -> None:
+    given_card = card(changes={"Nr = -0.0022": "Nr = -0.0015"})
+
+    def both() -> Measured:  # other objects: what was simulated of a trial is kept with it
+        return Measured((replace(record, path=Path("a.csv")), replace(record, path=Path("b.csv"))), "angle", ())
+
+    alone = TrialReplays(NOISE).by_cards(given_card, card(), both(), held_out=False)
+    with ThreadPoolExecutor(2) as pool:
+        at_once = TrialReplays(NOISE, pool).by_cards(given_card, card(), both(), held_out=False)
+    assert [replay.name for replay in at_once] == ["a", "b"]
+    for one, other in zip(alone, at_once, strict=True):
+        assert one.misfit("before") > 5 > one.misfit("after")
+        for name in NOISE:
+            np.testing.assert_array_equal(one.after[name], other.after[name])
+            np.testing.assert_array_equal(one.before[name], other.before[name])
 
 
 def test_an_order_that_a_gear_with_a_largest_rate_follows_keeps_its_time(mariner_card: ManoeuvringCard) -> None:

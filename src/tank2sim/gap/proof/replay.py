@@ -145,12 +145,14 @@ _REPLAYERS: dict[tuple[str, str, tuple[str, ...]], Replayer] = {}
 
 def _replayer(card: ManoeuvringCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
     key = card.text, driven_by, known
-    if key not in _REPLAYERS:
+    found = _REPLAYERS.get(key)
+    if found is None:
         model = driven_model(card, driven_by)
         seen = [name for name in OBSERVED_SIGNALS.values() if name in known and name in model]
+        found = Replayer(card, driven_by, seen)
         _REPLAYERS.clear()
-        _REPLAYERS[key] = Replayer(card, driven_by, seen)
-    return _REPLAYERS[key]
+        _REPLAYERS[key] = found
+    return found
 
 
 def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
