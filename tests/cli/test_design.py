@@ -73,3 +73,18 @@ def test_bad_options_are_refused_in_a_line(tmp_path, arguments, words):
     result = tank2sim("design", "esso-osaka", *FAST, *arguments, "-o", "plan.csv", cwd=tmp_path)
     refused(result, *words)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--campaign", "--json"])
+def test_one_file_for_two_outputs_is_refused_and_not_written(tmp_path, option):
+    result = tank2sim("design", "esso-osaka", *FAST, "--hours", "2", "-o", "p.csv", option, "p.csv", cwd=tmp_path)
+    refused(result, "p.csv", "two outputs")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plan_in_the_place_of_orders_is_refused(tmp_path):
+    (tmp_path / "orders").mkdir()
+    trial = ("--figures", "steady_radius_m@20", "--trial", "--minutes", "8", "--orders", "orders")
+    result = tank2sim("design", "esso-osaka", *trial, "-o", "orders/orders_01.csv", cwd=tmp_path)
+    refused(result, "orders_01.csv", "two outputs")
+    assert list((tmp_path / "orders").iterdir()) == []
