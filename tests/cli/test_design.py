@@ -88,3 +88,16 @@ def test_a_plan_in_the_place_of_orders_is_refused(tmp_path):
     result = tank2sim("design", "esso-osaka", *trial, "-o", "orders/orders_01.csv", cwd=tmp_path)
     refused(result, "orders_01.csv", "two outputs")
     assert list((tmp_path / "orders").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("sensors", "words"),
+    [
+        (("psi_deg=0.0000000001",), ("psi_deg", "0.0002 to 200")),
+        (("x_m=1e9",), ("x_m", "0.001 to 1e+03")),
+        (("r_degps=0.02", "r_degps=0.03"), ("r_degps", "once")),
+    ],
+)
+def test_sensors_that_are_none_or_given_twice_are_refused(tmp_path, sensors, words):
+    result = tank2sim("design", "esso-osaka", *FAST[:2], "--trial", "--sensors", *sensors, cwd=tmp_path)
+    refused(result, "--sensors", *words)

@@ -33,8 +33,12 @@ DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/1
 
 _GAUGE_KEYS = ("noise", "zero")
 _MOST_HOURS = 1000.0
+_SENSOR_BOUNDS = (1e-3, 1e3)
+"""Least and largest standard deviation of a sensor, over that which is assumed where none is stated. Project choice: a
+thousandth is beyond any sensor aboard, and with much less the sums lose their digits; a thousand times shows nothing."""
 _TABLE_ROWS = 12
-"""Coefficients in the printed table. Project choice: the page and JSON have all."""
+"""Least and largest standard deviation of a sensor, over the assumed one. Project choice: a thousandth is beyond any
+sensor aboard, and with much less the sums lose their digits; a thousand times as much shows nothing."""
 
 
 class CampaignDesignResult(PagedResult):
@@ -268,7 +272,7 @@ def design_campaign(
     True
     """
     if hours is not None and not 0 < hours <= _MOST_HOURS:
-        raise InputError("--hours", f"{hours:g}", "is out of bounds", f"give hours up to {_MOST_HOURS:g}")
+        raise InputError("--hours", f"{hours:g}", "is out of bounds", f"give hours above 0 and up to {_MOST_HOURS:g}")
     if not 0 <= draws <= 1000:
         raise InputError("--draws", f"{draws}", "is out of bounds", "give 0 to 1000")
     ship = as_ship(card)
@@ -278,7 +282,9 @@ def design_campaign(
     limits = with_tank_values(limits, "carriage", length_m=carriage_length_m)
     limits = with_tank_values(limits, "model", length_m=model_length_m)
     reach = range_of_figures(polynomial, asked) if largest is None else _tested_range(largest)
-    own = None if usual is None else runs_of_campaign(Path(usual), tank_runs(polynomial, limits, reach))
+    source = "tank" if tank is None or isinstance(tank, TankFile) else str(tank)
+    runs = tank_runs(polynomial, limits, reach, source)
+    own = None if usual is None else runs_of_campaign(Path(usual), runs)
     settings = CaptiveDesignSettings(
         hours=hours,
         usual=own,
@@ -287,6 +293,7 @@ def design_campaign(
         one_side=one_side,
         draws=draws,
         seed=seed,
+        source=source,
     )
     design = CaptiveDesigner(polynomial, limits, asked, settings).design()
     return CampaignDesignResult(ship, design, (*_notices(design, limits), *converted))
@@ -469,7 +476,8 @@ def design_trial(
     True
     """
     if minutes is not None and not 0 < minutes <= 60 * _MOST_HOURS:
-        raise InputError("--minutes", f"{minutes:g}", "is out of bounds", f"give minutes up to {60 * _MOST_HOURS:g}")
+        remedy = f"give minutes above 0 and up to {60 * _MOST_HOURS:g}"
+        raise InputError("--minutes", f"{minutes:g}", "is out of bounds", remedy)
     ship = as_ship(card)
     polynomial, converted = _polynomial(ship)
     found = SENSORS if sensors is None else _sensors(sensors)
@@ -503,14 +511,20 @@ def _by_column(sensors: Mapping[str, float]) -> dict[str, float]:
 
 def _sensors(given: Mapping[str, float]) -> dict[str, float]:
     """Variable to standard deviation, SI, from columns of a trial."""
-    found = {}
+    found: dict[str, float] = {}
     for column, size in given.items():
         signal, value = to_si(column, size)
         if signal not in OBSERVED_SIGNALS:
             raise InputError("--sensors", column, "is not measured", f"there are: {', '.join(_SENSOR_COLUMNS)}")
-        if not (math.isfinite(value) and value > 0):
-            raise InputError("--sensors", f"{column}={size:g}", "is not a standard deviation", "give a number above 0")
-        found[OBSERVED_SIGNALS[signal]] = value
+        variable = OBSERVED_SIGNALS[signal]
+        least, most = (SENSORS[variable] * factor for factor in _SENSOR_BOUNDS)
+        if not least <= value <= most:
+            low, high = (from_si(column, bound) for bound in (least, most))
+            remedy = f"give {low:.3g} to {high:.3g}"
+            raise InputError("--sensors", f"{column}={size:g}", "is no standard deviation of a sensor", remedy)
+        if variable in found:
+            raise InputError("--sensors", column, "is given twice", "give each sensor once")
+        found[variable] = value
     if not found:
         raise InputError("--sensors", "", "has no sensor", "give at least one, as r_degps=0.02")
     return found

@@ -174,11 +174,14 @@ def _parsed_range(text: str) -> tuple[float, float, float]:
 
 
 def _parsed_sensors(given: Sequence[str]) -> dict[str, float]:
-    found = {}
+    found: dict[str, float] = {}
     for text in (part for each in given for part in each.split(",") if part.strip()):
         column, _, number = text.partition("=")
+        column = column.strip()
         try:
-            found[column.strip()] = float(number)
+            size = float(number)
         except ValueError:
             raise InputError("--sensors", text, "cannot be read", "give COLUMN=SD, as r_degps=0.02") from None
+        if found.setdefault(column, size) != size:
+            raise InputError("--sensors", text, f"is given before as {found[column]:g}", "give each sensor once")
     return found

@@ -17,7 +17,7 @@ from tank2sim.design.allocation import Allocation, InformationBlock, target_matr
 from tank2sim.design.captive_information import GaugeErrors, PlannedCampaign
 from tank2sim.design.captive_runs import PlannedRun, RunGroup, TankRuns, time_of
 from tank2sim.design.figure_slopes import FigureSlopes, figure_slopes, hydrodynamic_derivatives, range_of_figures
-from tank2sim.design.tank_form import TankFile
+from tank2sim.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.equations import candidate_terms
 from tank2sim.identification.captive.tank_conditions import SHORTEST_MODEL_M
@@ -30,6 +30,10 @@ the same within its rounding."""
 
 _BEYOND = 1.25
 """Range of a gauge over the largest force of the usual matrix, where the tank does not state it. Project choice."""
+
+_LEAST_ERROR = 1e-4
+"""Least noise and zero error of a gauge together, over its range. Project choice: the best gauges have as much; with a
+tenth of it runs without force have so much more information than others that the sums lose their digits."""
 
 _HOURS = (0.4, 0.6, 0.8, 1.0)
 """Shares of the hours at which certainty is drawn."""
@@ -139,6 +143,8 @@ class CaptiveDesignSettings:
         Figures to the side of the given rudder, in place of the mean over both sides.
     draws, seed : int
         Ships drawn from the errors of the card.
+    source : str
+        File of the tank, which messages name.
     """
 
     hours: float | None = None
@@ -148,6 +154,7 @@ class CaptiveDesignSettings:
     one_side: bool = False
     draws: int = DRAWN_SHIPS
     seed: int = 0
+    source: str = "tank"
 
 
 class CaptiveDesigner:
@@ -179,10 +186,13 @@ class CaptiveDesigner:
         self.slopes = figure_slopes(
             card, figures, terms, draws=settings.draws, seed=settings.seed, one_side=settings.one_side
         )
-        self.tank_runs = tank_runs(card, tank, settings.largest or range_of_figures(card, figures))
+        reach = settings.largest or range_of_figures(card, figures)
+        self.tank_runs = tank_runs(card, tank, reach, settings.source)
         usual = self.tank_runs.usual_matrix() if settings.usual is None else settings.usual
         if not any(run.oscillates for group in usual for run in group) and settings.usual is None:
-            raise InputError("tank", "mechanism", "allows no oscillation", "widen its limits of amplitude or frequency")
+            raise InputError(
+                settings.source, "mechanism", "allows no oscillation", "widen its limits of amplitude or frequency"
+            )
         self.planned = self._with_gauges(usual)
         self.usual = self._within_gauges(usual)
         every = self.tank_runs.candidates()
@@ -197,7 +207,8 @@ class CaptiveDesigner:
             "usual": len(candidates) + len(checks) + np.arange(len(self.usual)),
         }
         if not len(candidates) or not self.usual:
-            raise InputError("tank", "gauges", "allow no run: every force exceeds their ranges", "state wider ranges")
+            remedy = "state wider ranges"
+            raise InputError(settings.source, "gauges", "allow no run: every force exceeds their ranges", remedy)
         self.information = self.planned.information(self.groups)
 
     def _with_gauges(self, usual: Sequence[RunGroup]) -> PlannedCampaign:
@@ -228,6 +239,12 @@ class CaptiveDesigner:
             span = stated or _BEYOND * max(forces[force] for forces in largest)
             noise = getattr(tank.gauges, f"{force}_noise_{unit}") or tank.gauges.noise_share * span
             zero = getattr(tank.gauges, f"{force}_zero_{unit}") or tank.gauges.zero_share * span
+            if math.hypot(noise, zero) < _LEAST_ERROR * span:
+                problem = (
+                    f"states no error of {force}: noise {noise:.2g} and zero {zero:.2g} {unit} of {span:.3g} {unit}"
+                )
+                remedy = f"give noise or zero of at least {_LEAST_ERROR:g} of the range"
+                raise InputError(self.settings.source, "gauges", problem, remedy)
             gauges[force] = GaugeErrors(noise=max(noise, 1e-9 * span), zero=zero, largest=span if stated else math.inf)
         return replace(bare, gauges=gauges)
 
@@ -431,16 +448,25 @@ class CaptiveDesigner:
         )
 
 
-def tank_runs(card: ManoeuvringCard, tank: TankFile, largest: TestedRange) -> TankRuns:
+def tank_runs(card: ManoeuvringCard, tank: TankFile, largest: TestedRange, source: str = "tank") -> TankRuns:
     """The runs of a ship's model in a tank, at the stated length and speed, or at the card's Froude number.
 
     Raises
     ------
     InputError
-        The carriage is too slow or too short.
+        The carriage is too slow or too short, or the tank contradicts itself (then `source` is named).
     """
     model = tank.model
     length = model.length_m or min(SHORTEST_MODEL_M, card.ship.length_m)
     ratio = length / card.ship.length_m * model.gravity_mps2 / card.environment.gravity_mps2
     speed = model.speed_mps or card.model.speed_mps * math.sqrt(ratio)
+    beam, draught = card.ship.beam_m, card.ship.draught_m
+    scale = length / card.ship.length_m
+    refuse_contradictions(
+        tank,
+        source,
+        length,
+        None if beam is None else beam * scale,
+        None if draught is None else draught * scale,
+    )
     return TankRuns(tank=tank, length_m=length, speed_mps=speed, largest=largest)
