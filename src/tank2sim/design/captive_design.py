@@ -77,7 +77,11 @@ class CaptiveDesign:
     usual : tuple of RunGroup
         The usual matrix, once.
     standard_errors, usual_standard_errors : array (m,)
-        Of each figure, by the plan and by the usual matrix in the same hours.
+        Of each figure, by the plan and by the usual matrix in the same hours, but at least once.
+    gauge_shares : mapping
+        Gauge (X, Y, N) to the share (m,) of each figure's variance by the plan that is in its coefficients.
+    beyond_use : mapping
+        Gauge to its stated range over the largest force of the usual matrix.
     ratios : array (m,)
         Variance of each figure by the plan over that by the usual matrix, mean over the ships that the card may be.
     curve : mapping
@@ -101,6 +105,8 @@ class CaptiveDesign:
     usual: tuple[RunGroup, ...]
     standard_errors: Array
     usual_standard_errors: Array
+    gauge_shares: Mapping[str, Array]
+    beyond_use: Mapping[str, float]
     ratios: Array
     curve: Mapping[str, object]
     hours_needed: float | None
@@ -118,6 +124,11 @@ class CaptiveDesign:
     def hours_used(self) -> float:
         """Time in the tank, h."""
         return sum(run.tank_s for run in self.runs) / 3600
+
+    @property
+    def compared_hours(self) -> float:
+        """Hours of the usual matrix with which the plan is compared: the same, or its own where those are fewer."""
+        return max(self.hours, self.usual_hours)
 
     @property
     def usual_hours(self) -> float:
@@ -233,10 +244,12 @@ class CaptiveDesigner:
             rate_hz=tank.gauges.rate_hz,
         )
         largest = [bare.largest_forces(run) for group in usual for run in group]
-        gauges = {}
+        gauges, self.beyond_use = {}, {}
         for force, unit in (("X", "N"), ("Y", "N"), ("N", "Nm")):
             stated = getattr(tank.gauges, f"{force}_range_{unit}")
-            span = stated or _BEYOND * max(forces[force] for forces in largest)
+            used = max(forces[force] for forces in largest)
+            span = stated or _BEYOND * used
+            self.beyond_use[force] = span / used if stated and used > 0 else 1.0
             noise = getattr(tank.gauges, f"{force}_noise_{unit}") or tank.gauges.noise_share * span
             zero = getattr(tank.gauges, f"{force}_zero_{unit}") or tank.gauges.zero_share * span
             if math.hypot(noise, zero) < _LEAST_ERROR * span:
@@ -338,12 +351,17 @@ class CaptiveDesigner:
         return self.usual_s if self.settings.hours is None else 3600 * self.settings.hours
 
     @cached_property
+    def _usual(self) -> Array:
+        """Counts of the usual matrix in the hours of the plan: there is no part of a matrix."""
+        return self.usual_counts * max(self._budget / self.usual_s, 1.0)
+
+    @cached_property
     def _targets(self) -> Allocation:
-        return self._over_usual(self.usual_counts * self._budget / self.usual_s)
+        return self._over_usual(self._usual)
 
     def design(self) -> CaptiveDesign:
         """The plan and what it is worth."""
-        usual = self.usual_counts * self._budget / self.usual_s
+        usual = self._usual
         counts, relaxed = self.plan(self._budget)
         plans = {1.0: counts}
         for share in _HOURS[:-1]:
@@ -363,6 +381,8 @@ class CaptiveDesigner:
             usual=self.usual,
             standard_errors=np.sqrt(self._at_card.variances(counts)),
             usual_standard_errors=np.sqrt(self._at_card.variances(usual)),
+            gauge_shares=self._gauge_shares(counts),
+            beyond_use=self.beyond_use,
             ratios=ratios[count:],
             curve=self._curve(plans),
             hours_needed=self._needed(plans, relaxed),
@@ -378,16 +398,21 @@ class CaptiveDesigner:
             for place in np.flatnonzero(counts)
         )
 
+    def _gauge_shares(self, counts: Array) -> dict[str, Array]:
+        """Share of each figure's variance in the coefficients of each force."""
+        total = self._at_card.variances(counts)
+        blocks = zip(self.information, self._at_card.blocks, strict=True)
+        return {force: Allocation((block,), self._at_card.cost).variances(counts) / total for force, block in blocks}
+
     def _curve(self, plans: Mapping[float, Array]) -> dict[str, object]:
         shares = sorted(plans)
         design = np.sqrt([self._at_card.variances(plans[share]) for share in shares])
-        usual = np.sqrt(
-            [self._at_card.variances(self.usual_counts * share * self._budget / self.usual_s) for share in shares]
-        )
+        usual_s = sorted({max(share * self._budget, self.usual_s) for share in shares})
+        usual = np.sqrt([self._at_card.variances(self.usual_counts * each / self.usual_s) for each in usual_s])
         cost = self._targets.cost
         return {
             "hours": [float(plans[share] @ cost) / 3600 for share in shares],
-            "usual_hours": [share * self._budget / 3600 for share in shares],
+            "usual_hours": [each / 3600 for each in usual_s],
             "design": {figure.text: design[:, row].tolist() for row, figure in enumerate(self.slopes.figures)},
             "usual": {figure.text: usual[:, row].tolist() for row, figure in enumerate(self.slopes.figures)},
         }

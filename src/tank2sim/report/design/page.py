@@ -18,9 +18,9 @@ from tank2sim.units import in_words
 
 _FIGURES = (
     "Standard errors of the figures of the ship that the reduction of the tests will give, from the errors of the "
-    "gauges alone, by the plan and by the usual matrix in the same time. The ratio of variances is a mean over the "
-    "ships that the card may be.\n\nErrors common to the whole campaign (calibration, alignment, scale) are the same "
-    "in both."
+    "gauges alone, by the plan and by the usual matrix in the same time, but at least once. The ratio of variances is "
+    "a mean over the ships that the card may be.\n\nErrors common to the whole campaign (calibration, alignment, "
+    "scale) are the same in both."
 )
 _RUNS = (
     "The area of a point is the number of runs. Runs marked as checks are there to show whether a polynomial of third "
