@@ -36,8 +36,8 @@ _MOST_HOURS = 1000.0
 _LISTED = 6
 """Names in a notice at most. Project choice: more are no longer read."""
 _HARDLY_CERTAIN = 0.1
-"""Standard error of a figure over its value from which the result is marked. Project choice: criteria of IMO are missed
-or met by some tenths of their limits, and an error of a tenth (20 % to either side at 95 %) no longer tells which."""
+"""Standard error of a figure over its value from which the result is marked. Project choice: its 95 % interval is then
+a fifth of the value wide in each direction, as wide as the margins of many ships to the limits of IMO."""
 _FAR_BEYOND_USE = 100.0
 """Range of a gauge over the largest force of the usual matrix from which it is named. Project choice: its errors are
 then more than a tenth of every force, as those of a usual gauge are stated (0.1 % of the range)."""
@@ -535,7 +535,7 @@ def _sensors(given: Mapping[str, float]) -> dict[str, float]:
         if not least <= value <= most:
             low, high = (from_si(column, bound) for bound in (least, most))
             remedy = f"give {low:.3g} to {high:.3g}"
-            raise InputError("--sensors", f"{column}={size:g}", "is no standard deviation of a sensor", remedy)
+            raise InputError("--sensors", f"{column}={size:g}", "is not a standard deviation that a sensor has", remedy)
         if variable in found:
             raise InputError("--sensors", column, "is given twice", "give each sensor once")
         found[variable] = value

@@ -81,7 +81,7 @@ def figure_table(found: Json) -> PageTable:
     heads = ("figure", "value", "design", "usual", "ratio", "ratio of variances")
     return PageTable(
         caption="Figures and their standard errors",
-        columns=[Column(title=head, digits=3 if place > 1 else 4) for place, head in enumerate(heads)],
+        columns=[Column(title=head, digits=4) for place, head in enumerate(heads)],
         rows=rows,
     )
 
@@ -103,8 +103,8 @@ def coefficient_table(found: Json) -> PageTable:
         columns=[
             Column(title=""),
             Column(title="value"),
-            Column(title="design", digits=2),
-            Column(title="usual", digits=2),
+            Column(title="design", digits=3),
+            Column(title="usual", digits=3),
             *(Column(title=figure, unit="%", digits=2) for figure in names),
         ],
         rows=rows,
