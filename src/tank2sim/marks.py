@@ -13,6 +13,12 @@ ASSUMED = "ASSUMED standard errors"
 LINEARISED = "LINEARISED standard errors"
 """Predicted errors of a ship whose motion is not linear in its coefficients within their errors."""
 
+ASSUMED_TANK = "ASSUMED of the tank"
+"""Lengths and times of a tank that none has stated."""
+
+CHECK = "CHECK:"
+"""A result that needs a second look: it is hardly certain, or compared under other conditions than were asked for."""
+
 FORCED = "FORCED"
 """A refusal was overridden."""
 
@@ -26,6 +32,8 @@ def marked(messages: Iterable[str]) -> list[str]:
         dict.fromkeys(
             text
             for text in messages
-            if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, LINEARISED, FORCED, UNCONFIRMED))
+            if any(
+                mark in text for mark in (EXTRAPOLATED, ASSUMED, ASSUMED_TANK, CHECK, LINEARISED, FORCED, UNCONFIRMED)
+            )
         )
     )

@@ -33,7 +33,9 @@ def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     rows = list(csv.DictReader((tmp_path / "plan.csv").open(encoding="utf-8")))
     assert len(rows) == len(found["runs"]) and found["hours_used"] <= 4
     assert [float(row["drift_deg"]) for row in rows] == [run["drift_deg"] for run in found["runs"]]
-    assert result.stdout.startswith("ASSUMED")
+    assert (
+        result.stdout.startswith("CHECK: the hours, 4 h") and "\nASSUMED standard errors of the gauges" in result.stdout
+    )
     assert "<html" in (tmp_path / "p.html").read_text(encoding="utf-8")
     assert found["range"] == pytest.approx({"drift_deg": 12.0, "rudder_deg": 25.0, "yaw_rate_prime": 0.6})
     assert max(abs(run["drift_deg"]) for run in found["runs"]) <= 12.0 + 1e-6
@@ -73,3 +75,31 @@ def test_bad_options_are_refused_in_a_line(tmp_path, arguments, words):
     result = tank2sim("design", "esso-osaka", *FAST, *arguments, "-o", "plan.csv", cwd=tmp_path)
     refused(result, *words)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--campaign", "--json"])
+def test_one_file_for_two_outputs_is_refused_and_not_written(tmp_path, option):
+    result = tank2sim("design", "esso-osaka", *FAST, "--hours", "2", "-o", "p.csv", option, "p.csv", cwd=tmp_path)
+    refused(result, "p.csv", "two outputs")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plan_in_the_place_of_orders_is_refused(tmp_path):
+    (tmp_path / "orders").mkdir()
+    trial = ("--figures", "steady_radius_m@20", "--trial", "--minutes", "8", "--orders", "orders")
+    result = tank2sim("design", "esso-osaka", *trial, "-o", "orders/orders_01.csv", cwd=tmp_path)
+    refused(result, "orders_01.csv", "two outputs")
+    assert list((tmp_path / "orders").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("sensors", "words"),
+    [
+        (("psi_deg=0.0000000001",), ("psi_deg", "0.0002 to 200")),
+        (("x_m=1e9",), ("x_m", "0.001 to 1e+03")),
+        (("r_degps=0.02", "r_degps=0.03"), ("r_degps", "once")),
+    ],
+)
+def test_sensors_that_are_none_or_given_twice_are_refused(tmp_path, sensors, words):
+    result = tank2sim("design", "esso-osaka", *FAST[:2], "--trial", "--sensors", *sensors, cwd=tmp_path)
+    refused(result, "--sensors", *words)

@@ -78,3 +78,8 @@ def test_reduce_writes_the_covariance_and_simulate_draws_from_it(data, tmp_path)
     assert result.returncode == 0 and "as the covariance next to the card says" in " ".join(result.stdout.split())
     (tmp_path / "ship.covariance.json").unlink()
     refused(tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path), "is missing")
+
+
+def test_a_seed_without_an_ensemble_and_a_word_for_its_size_are_refused(tmp_path) -> None:
+    refused(tank2sim("stability", "mariner", "--seed", "3", cwd=tmp_path), "--seed", "--ensemble")
+    refused(tank2sim("stability", "mariner", "--ensemble", "abc", cwd=tmp_path), "--ensemble", "abc", "whole number")

@@ -1,12 +1,13 @@
 """Designed campaigns: never worse than the usual matrix, within the hours, and for the figures that were asked for."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.design import design_campaign
+from tank2sim.api.design import _assumptions, design_campaign
 from tank2sim.cards import read_card
 from tank2sim.design.figure_slopes import (
     both_sides,
@@ -15,7 +16,9 @@ from tank2sim.design.figure_slopes import (
     hydrodynamic_derivatives,
     range_of_figures,
 )
+from tank2sim.design.tank_form import TankFile
 from tank2sim.errors import InputError
+from tank2sim.marks import CHECK, marked
 from tank2sim.records.campaigns import read_campaign_form
 
 FIGURES = "steady_radius_m@20,K_prime"
@@ -27,16 +30,17 @@ def plan(**options):
 
 
 def test_the_plan_keeps_the_hours_and_makes_every_figure_more_certain_than_the_usual_matrix():
-    found = plan()
-    assert 7.5 < found.design.hours_used <= 8.0
+    found = plan(hours=None)
+    hours = found.design.usual_hours
+    assert 0.95 * hours < found.design.hours_used <= hours
     assert found.runs["tank_min"].sum() / 60 == pytest.approx(found.design.hours_used, rel=1e-4)
     assert (found.figures["design"] < 0.95 * found.figures["usual"]).all()
-    assert 0 < found.design.hours_needed < 8.0
+    assert 0 < found.design.hours_needed < hours
 
 
 @pytest.mark.slow
 def test_the_usual_matrix_in_twice_the_hours_has_half_the_variance():
-    short, long = plan(), plan(hours=16.0)
+    short, long = plan(hours=24.0), plan(hours=48.0)
     ratio = (short.figures["usual"] / long.figures["usual"]) ** 2
     assert ratio.to_numpy() == pytest.approx(2.0, rel=0.03)
     assert (long.figures["design"] < short.figures["design"]).all()
@@ -166,3 +170,56 @@ def test_drawn_ships_count_as_much_as_the_one_of_the_card():
     found = plan(draws=3)
     assert len(found.design.slopes.drawn) > 1
     assert (found.figures["variance_ratio"] < 1).all()
+
+
+def test_few_hours_are_compared_with_one_whole_usual_matrix_and_marked():
+    few = plan(hours=1.0)
+    once = plan(hours=few.design.usual_hours)
+    assert few.figures["usual"].to_numpy() == pytest.approx(once.figures["usual"].to_numpy(), rel=1e-9)
+    assert few.content()["usual_matrix"]["repeats"] == 1.0
+    assert few.design.curve["usual_hours"] == [few.design.usual_hours]
+    assert any(text.startswith(CHECK) and "hours" in text for text in marked(few.notices))
+    assert not any("too few" in text for text in once.notices)
+
+
+def test_a_hardly_certain_figure_is_marked_with_the_gauge_at_fault():
+    wide = TankFile.model_validate({"gauges": {"N_range_Nm": 1e9}})
+    found = plan(tank=wide)
+    shares = found.design.gauge_shares
+    assert sum(share[0] for share in shares.values()) == pytest.approx(1.0) and shares["N"][0] > 0.5
+    checks = [text for text in marked(found.notices) if text.startswith(CHECK)]
+    assert any("steady_radius_m@20" in text and "gauge N" in text for text in checks)
+    assert any("range of gauge N" in text for text in checks) and not any("gauge X" in text for text in checks)
+    certain = plan(hours=40.0)
+    assert not any(text.startswith(CHECK) for text in certain.notices)
+
+
+def test_what_is_assumed_is_marked_item_by_item():
+    def texts(gauges, **more):
+        tank = TankFile.model_validate({"gauges": gauges, **more})
+        design = plan().design
+        changed = replace(design, tank_runs=replace(design.tank_runs, tank=tank))
+        return " ".join(marked(_assumptions(changed, 0)))
+
+    only_zero = texts({"zero_share": 0.0})
+    assert "noise of X, Y, N" in only_zero and "gain" in only_zero and "zero" not in only_zero
+    only_gain = texts({"gain_relative": 0.0})
+    assert "noise of X, Y, N" in only_gain and "zero of X, Y, N" in only_gain and "gain" not in only_gain
+    assert "noise of X, N " in texts({"Y_noise_N": 1.0})
+    rest = texts({}, carriage={"waiting_s": 300.0})
+    assert "model of 3 m" in rest and "carriage way 240 m" in rest and "acceleration" in rest and "waiting" not in rest
+
+
+def test_derivatives_without_a_stated_error_are_marked_where_ships_are_drawn():
+    card = plan().design.card
+    bare = replace(card, uncertainty={})
+    count = sum(1 for value in card.derivatives.values() if value)
+    assert f"{count} derivatives: 30 %" in " ".join(marked(_assumptions(replace(plan().design, card=bare), 2)))
+    assert not any("of the card" in text for text in _assumptions(replace(plan().design, card=bare), 0))
+
+
+def test_a_range_that_the_mechanism_cuts_is_noted():
+    tank = TankFile.model_validate({"mechanism": {"drift_rad": np.radians(5.0), "rudder_rad": np.radians(10.0)}})
+    found = plan(tank=tank, largest=(30.0, 35.0, 0.6))
+    notes = " ".join(found.notices)
+    assert "drift goes to 5 deg, not 30" in notes and "rudder goes to 10 deg, not 35" in notes

@@ -21,8 +21,9 @@ from tank2sim.design.plan_files import campaign_template, plan_csv, run_rows, ru
 from tank2sim.design.tank_form import TankFile, read_tank, with_tank_values
 from tank2sim.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.errors import InputError
+from tank2sim.identification.estimates import RELATIVE_ERROR
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
-from tank2sim.marks import ASSUMED, LINEARISED
+from tank2sim.marks import ASSUMED, ASSUMED_TANK, CHECK, LINEARISED
 from tank2sim.units import from_si, to_si
 
 if TYPE_CHECKING:
@@ -31,8 +32,18 @@ if TYPE_CHECKING:
 DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
 """Figures where none is given: those of IMO MSC.137(76) that have slopes."""
 
-_GAUGE_KEYS = ("noise", "zero")
 _MOST_HOURS = 1000.0
+_LISTED = 6
+"""Names in a notice at most. Project choice: more are no longer read."""
+_HARDLY_CERTAIN = 0.1
+"""Standard error of a figure over its value from which the result is marked. Project choice: its 95 % interval is then
+a fifth of the value wide in each direction, as wide as the margins of many ships to the limits of IMO."""
+_FAR_BEYOND_USE = 100.0
+"""Range of a gauge over the largest force of the usual matrix from which it is named. Project choice: its errors are
+then more than a tenth of every force, as those of a usual gauge are stated (0.1 % of the range)."""
+_SENSOR_BOUNDS = (1e-3, 1e3)
+"""Least and largest standard deviation of a sensor, over the assumed one. Project choice: a thousandth is beyond any
+sensor aboard, and with much less the sums lose their digits; a thousand times as much shows nothing."""
 _TABLE_ROWS = 12
 """Coefficients in the printed table. Project choice: the page and JSON have all."""
 
@@ -50,7 +61,7 @@ class CampaignDesignResult(PagedResult):
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("esso-osaka", figures="overshoot1_deg@10/10", hours=8, draws=2)
+    >>> plan = t2s.design_campaign("esso-osaka", figures="overshoot1_deg@10/10", draws=2)
     >>> bool((plan.figures["design"] < plan.figures["usual"]).all())
     True
     """
@@ -103,7 +114,7 @@ class CampaignDesignResult(PagedResult):
             "usual_matrix": {
                 "hours": design.usual_hours,
                 "runs": sum(map(len, design.usual)),
-                "repeats": design.hours / design.usual_hours,
+                "repeats": design.compared_hours / design.usual_hours,
             },
             "model": {"length_m": runs.length_m, "speed_mps": runs.speed_mps, "longest_record_s": runs.longest_s},
             "range": {
@@ -127,13 +138,13 @@ class CampaignDesignResult(PagedResult):
     def headline(self) -> tuple[str, ...]:
         """How many runs in how many hours, and in how many hours a plan is as good as the usual matrix."""
         design = self.design
-        line = f"{self.ship.name}: {len(design.runs)} runs in {design.hours_used:.3g} h"
+        line = f"{self.ship.name}: {_counted(len(design.runs), 'run')} in {design.hours_used:.3g} h"
         if design.hours_needed is None:
             return line, "no plan was found that has every figure as certain as the usual matrix"
-        share = design.hours_needed / design.hours
+        share = design.hours_needed / design.compared_hours
         return (
             line,
-            f"as certain as the usual matrix in {design.hours:.3g} h: a plan of {design.hours_needed:.3g} h "
+            f"as certain as the usual matrix in {design.compared_hours:.3g} h: a plan of {design.hours_needed:.3g} h "
             f"({100 * share:.0f} %)",
         )
 
@@ -202,6 +213,10 @@ class CampaignDesignResult(PagedResult):
         }
 
 
+def _counted(count: int, word: str) -> str:
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
 def _shares(row: Mapping[str, object]) -> Mapping[str, float]:
     found = row["share_of_variance"]
     assert isinstance(found, dict)
@@ -268,7 +283,7 @@ def design_campaign(
     True
     """
     if hours is not None and not 0 < hours <= _MOST_HOURS:
-        raise InputError("--hours", f"{hours:g}", "is out of bounds", f"give hours up to {_MOST_HOURS:g}")
+        raise InputError("--hours", f"{hours:g}", "is out of bounds", f"give hours above 0 and up to {_MOST_HOURS:g}")
     if not 0 <= draws <= 1000:
         raise InputError("--draws", f"{draws}", "is out of bounds", "give 0 to 1000")
     ship = as_ship(card)
@@ -278,7 +293,9 @@ def design_campaign(
     limits = with_tank_values(limits, "carriage", length_m=carriage_length_m)
     limits = with_tank_values(limits, "model", length_m=model_length_m)
     reach = range_of_figures(polynomial, asked) if largest is None else _tested_range(largest)
-    own = None if usual is None else runs_of_campaign(Path(usual), tank_runs(polynomial, limits, reach))
+    source = "tank" if tank is None or isinstance(tank, TankFile) else str(tank)
+    runs = tank_runs(polynomial, limits, reach, source)
+    own = None if usual is None else runs_of_campaign(Path(usual), runs)
     settings = CaptiveDesignSettings(
         hours=hours,
         usual=own,
@@ -287,9 +304,10 @@ def design_campaign(
         one_side=one_side,
         draws=draws,
         seed=seed,
+        source=source,
     )
     design = CaptiveDesigner(polynomial, limits, asked, settings).design()
-    return CampaignDesignResult(ship, design, (*_notices(design, limits), *converted))
+    return CampaignDesignResult(ship, design, (*_notices(design, draws), *converted))
 
 
 class TrialDesignResult(PagedResult):
@@ -369,7 +387,7 @@ class TrialDesignResult(PagedResult):
         """How many manoeuvres in what time, and in what time a plan is as good as the usual set."""
         design = self.design
         count = sum(repeats for _, repeats in design.manoeuvres)
-        line = f"{self.ship.name}: {count} manoeuvres in {design.minutes_used:.3g} min"
+        line = f"{self.ship.name}: {_counted(count, 'manoeuvre')} in {design.minutes_used:.3g} min"
         if design.minutes_needed is None:
             return line, "no plan was found that has every figure as certain as the usual set in the same time"
         return (
@@ -469,7 +487,8 @@ def design_trial(
     True
     """
     if minutes is not None and not 0 < minutes <= 60 * _MOST_HOURS:
-        raise InputError("--minutes", f"{minutes:g}", "is out of bounds", f"give minutes up to {60 * _MOST_HOURS:g}")
+        remedy = f"give minutes above 0 and up to {60 * _MOST_HOURS:g}"
+        raise InputError("--minutes", f"{minutes:g}", "is out of bounds", remedy)
     ship = as_ship(card)
     polynomial, converted = _polynomial(ship)
     found = SENSORS if sensors is None else _sensors(sensors)
@@ -482,6 +501,9 @@ def design_trial(
             f"{ASSUMED} of the sensors, for none are stated: "
             + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items()),
         )
+    assumed = _assumed_of_card(polynomial)
+    if assumed:
+        notices.insert(0, assumed)
     if design.unstable:
         notices.insert(
             0,
@@ -503,14 +525,20 @@ def _by_column(sensors: Mapping[str, float]) -> dict[str, float]:
 
 def _sensors(given: Mapping[str, float]) -> dict[str, float]:
     """Variable to standard deviation, SI, from columns of a trial."""
-    found = {}
+    found: dict[str, float] = {}
     for column, size in given.items():
         signal, value = to_si(column, size)
         if signal not in OBSERVED_SIGNALS:
             raise InputError("--sensors", column, "is not measured", f"there are: {', '.join(_SENSOR_COLUMNS)}")
-        if not (math.isfinite(value) and value > 0):
-            raise InputError("--sensors", f"{column}={size:g}", "is not a standard deviation", "give a number above 0")
-        found[OBSERVED_SIGNALS[signal]] = value
+        variable = OBSERVED_SIGNALS[signal]
+        least, most = (SENSORS[variable] * factor for factor in _SENSOR_BOUNDS)
+        if not least <= value <= most:
+            low, high = (from_si(column, bound) for bound in (least, most))
+            remedy = f"give {low:.3g} to {high:.3g}"
+            raise InputError("--sensors", f"{column}={size:g}", "is not a standard deviation that a sensor has", remedy)
+        if variable in found:
+            raise InputError("--sensors", column, "is given twice", "give each sensor once")
+        found[variable] = value
     if not found:
         raise InputError("--sensors", "", "has no sensor", "give at least one, as r_degps=0.02")
     return found
@@ -543,24 +571,96 @@ def _polynomial(ship: Ship) -> tuple[ManoeuvringCard, tuple[str, ...]]:
     )
 
 
-def _notices(design: CaptiveDesign, tank: TankFile) -> tuple[str, ...]:
+def _notices(design: CaptiveDesign, draws: int) -> tuple[str, ...]:
     notices = list(design.slopes.notices)
     if design.not_excited:
         notices.append(
             f"no run of this tank shows {', '.join(design.not_excited)}: their errors are not in the standard errors"
         )
     if design.too_strong:
-        notices.append(f"{design.too_strong} candidate runs were left out: a force exceeds the range of its gauge")
-    errors = {"noise_share", "zero_share"} | {f"{force}_{kind}" for force in ("X", "Y", "N") for kind in _GAUGE_KEYS}
-    if not any(key.removesuffix("_N").removesuffix("_Nm") in errors for key in tank.gauges.model_fields_set):
-        gauges = tank.gauges
-        notices.insert(
-            0,
-            f"{ASSUMED} of the gauges, for [gauges] of the tank states none: noise {100 * gauges.noise_share:g} %, "
-            f"zero {100 * gauges.zero_share:g} % of the range, gain {100 * gauges.gain_relative:g} %",
-        )
+        left_out = _counted(design.too_strong, "candidate run")
+        notices.append(f"left out: {left_out} with a force that exceeds the range of its gauge")
+    asked, runs = design.tank_runs.largest, design.tank_runs
+    for word, size, most in (
+        ("drift", asked.drift_rad, runs.drift_rad),
+        ("rudder", asked.rudder_rad, runs.rudder_rad),
+    ):
+        if size > most + 1e-12:
+            notices.append(
+                f"{word} goes to {math.degrees(most):.3g} deg, not {math.degrees(size):.3g}, by [mechanism] of the tank"
+            )
     body = design.tank_runs.tank.mechanism.model_dump()
     missing = [key for key in ("sway_amplitude_m", "heading_amplitude_rad", "drift_rad") if body[key] is None]
     if missing:
         notices.append(f"not limited, for the tank does not state it: {', '.join(missing)} of [mechanism]")
-    return tuple(dict.fromkeys(notices))
+    return tuple(dict.fromkeys([*_checks(design), *_assumptions(design, draws), *notices]))
+
+
+def _checks(design: CaptiveDesign) -> list[str]:
+    """What needs a second look: too few hours, figures that are hardly certain, gauges far beyond their forces."""
+    found = []
+    if design.hours < design.usual_hours * (1 - 1e-9):
+        found.append(
+            f"{CHECK} the hours, {design.hours:.3g} h, are too few for one usual matrix: the plan is compared with it "
+            f"in its own {design.usual_hours:.3g} h"
+        )
+    for row, figure in enumerate(design.slopes.figures):
+        error, value = float(design.standard_errors[row]), abs(float(design.slopes.values[row]))
+        if error > _HARDLY_CERTAIN * value:
+            force = max(design.gauge_shares, key=lambda each: float(design.gauge_shares[each][row]))
+            part = 100 * float(design.gauge_shares[force][row])
+            found.append(
+                f"{CHECK} the standard error of {figure.text} by the plan, {error:.3g}, is more than "
+                f"{100 * _HARDLY_CERTAIN:g} % of its value, {value:.4g}; "
+                f"{part:.0f} % of the variance is by gauge {force}"
+            )
+    found += [
+        f"{CHECK} the range of gauge {force} is {times:.3g} times the largest force of the usual matrix"
+        for force, times in design.beyond_use.items()
+        if times > _FAR_BEYOND_USE
+    ]
+    return found
+
+
+def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
+    """What neither the tank's file, nor an option, nor the card states."""
+    tank, runs = design.tank_runs.tank, design.tank_runs
+    gauges, stated = tank.gauges, tank.gauges.model_fields_set
+    lacking = []
+    for kind, share in (("noise", gauges.noise_share), ("zero", gauges.zero_share)):
+        forces = [
+            force for force, unit in (("X", "N"), ("Y", "N"), ("N", "Nm")) if f"{force}_{kind}_{unit}" not in stated
+        ]
+        if forces and f"{kind}_share" not in stated:
+            lacking.append(f"{kind} of {', '.join(forces)} {100 * share:g} % of the range")
+    if "gain_relative" not in stated:
+        lacking.append(f"gain {100 * gauges.gain_relative:g} %")
+    if "rate_hz" not in stated:
+        lacking.append(f"{gauges.rate_hz:g} independent readings a second")
+    found = [f"{ASSUMED} of the gauges, as [gauges] of the tank does not state them: {', '.join(lacking)}"]
+    if not lacking:
+        found = []
+    card = _assumed_of_card(design.card) if draws else None
+    if card:
+        found.append(card)
+    carriage, model = tank.carriage.model_fields_set, tank.model.model_fields_set
+    body = tank.carriage
+    lengths = {
+        "model": None if "length_m" in model else f"model of {runs.length_m:.3g} m",
+        "way": None if "length_m" in carriage else f"carriage way {body.length_m:g} m",
+        "acceleration": None if "acceleration_mps2" in carriage else f"acceleration {body.acceleration_mps2:g} m/s2",
+        "waiting": None if "waiting_s" in carriage else f"waiting time {body.waiting_s:g} s",
+    }
+    missing = [text for text in lengths.values() if text]
+    if missing:
+        found.append(f"{ASSUMED_TANK}, for it is not stated: {', '.join(missing)}")
+    return found
+
+
+def _assumed_of_card(card: ManoeuvringCard) -> str | None:
+    """The derivatives without a stated standard error, which are taken to be known to a share of their values."""
+    names = [name for name, value in card.derivatives.items() if value and name not in card.uncertainty]
+    if not names:
+        return None
+    which = ", ".join(names) if len(names) <= _LISTED else f"{len(names)} derivatives"
+    return f"{ASSUMED} of the card, which states none for {which}: {100 * RELATIVE_ERROR:g} % of each"

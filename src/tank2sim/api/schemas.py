@@ -124,6 +124,7 @@ class StabilityEnsembleKeys(EnsembleKeys):
     """Bands of the straight course, and the probability of each IMO criterion and of all together."""
 
     probability_stable: Number
+    probability_stable_interval_95: list[float] | None
     imo: list[ChanceKeys]
     imo_all: ChanceOfAllKeys | None
     curves: dict[str, Any] | None

@@ -96,11 +96,10 @@ class StabilityResult(PagedResult):
             f"{found.name} at {found.speed_mps:.4g} m/s (drift {found.drift_deg:.3g} deg, rudder "
             f"{found.rudder_deg:.3g} deg) is {verdict} on a straight course: {_margin_text(self.study)}"
         )
-        chance = self.bands.stable if self.bands else None
         return (
             course,
             *_turning_text(self.study),
-            *([] if chance is None else [f"Stable on a straight course with probability {chance:.3g}"]),
+            *_stable_text(self.bands),
             *_together_text(self.bands),
         )
 
@@ -184,6 +183,13 @@ def _tails(found: StabilityBands) -> ResultTable:
     columns = ("criterion", "P(not met)", "standard error", "effective size", "distance (sd)")
     notes = tuple(f"({number}) {text}" for number, text in enumerate(remarks, 1))
     return ResultTable("Too rare for the ensemble: by importance sampling", columns, rows, notes)
+
+
+def _stable_text(found: StabilityBands | None) -> list[str]:
+    if found is None or found.stable is None or found.stable_between is None:
+        return []
+    low, high = found.stable_between
+    return [f"Stable on a straight course with probability {found.stable:.3g} (95 % interval {low:.3f} to {high:.3f})"]
 
 
 def _together_text(found: StabilityBands | None) -> list[str]:

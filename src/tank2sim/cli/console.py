@@ -89,7 +89,7 @@ def write_result(
     page: Path | None = None,
     plot: Path | None = None,
     plots: Path | None = None,
-    files: Mapping[Path, str | bytes] | None = None,
+    files: Mapping[Path, str | bytes] | Sequence[tuple[Path, str | bytes]] = (),
 ) -> None:
     """Write what of a result was asked for, all files or none.
 
@@ -102,15 +102,16 @@ def write_result(
         JSON, page (HTML) and main chart (PNG).
     plots : Path, optional
         Folder for a picture of each chart, and the page as ``report.html``.
-    files : mapping, optional
-        Further files and their contents.
+    files : mapping or sequence of pairs, optional
+        Further files and their contents; pairs show that a file was given twice.
 
     Raises
     ------
     InputError
         A file cannot be written, is an input or is given twice.
     """
-    contents = dict(files or {})
+    further = list(files.items()) if isinstance(files, Mapping) else list(files)
+    contents = dict(further)
     if json_file:
         contents[json_file] = result.to_json()
     if page:
@@ -121,4 +122,5 @@ def write_result(
         writable_folder(plots)
         contents |= {plots / f"{name}.png": result.picture(name) for name in result.charts()}
         contents[plots / "report.html"] = result.page()
-    write_together(contents, inputs=[Path(path) for path in inputs], outputs=[*(files or {}), json_file, page, plot])
+    given = [*(path for path, _ in further), json_file, page, plot]
+    write_together(contents, inputs=[Path(path) for path in inputs], outputs=given)

@@ -117,7 +117,7 @@ def command(
     tank_options |= {"--largest": largest}
     trial_options = {"--minutes": minutes, "--sensors": sensors, "--orders": orders}
     result: CampaignDesignResult | TrialDesignResult
-    files: dict[Path, str | bytes] = {}
+    files: list[tuple[Path, str | bytes]] = []
     if trial:
         _refuse_options(
             tank_options | {"--no-checks": no_checks or None}, "is of a campaign", "leave out --trial, or it"
@@ -131,7 +131,7 @@ def command(
         )
         if orders:
             writable_folder(orders)
-            files |= {orders / name: text for name, text in result.orders.items()}
+            files += [(orders / name, text) for name, text in result.orders.items()]
     else:
         _refuse_options(trial_options, "is of a sea trial", "add --trial, or leave it out")
         result = design_campaign(
@@ -149,13 +149,13 @@ def command(
             seed=seed,
         )
         if template:
-            files[template] = result.template
+            files.append((template, result.template))
     if output:
-        files[output] = result.plan
+        files.append((output, result.plan))
     inputs: list[str | Path] = [ship.card.source, *(path for path in (tank, usual) if path)]
     write_result(result, inputs, json_file=json_file, page=page, plot=plot, files=files)
     show_result(result)
-    for path in files:
+    for path, _ in files:
         screen.print(f"{path} written", soft_wrap=True, markup=False)
 
 
@@ -174,11 +174,14 @@ def _parsed_range(text: str) -> tuple[float, float, float]:
 
 
 def _parsed_sensors(given: Sequence[str]) -> dict[str, float]:
-    found = {}
+    found: dict[str, float] = {}
     for text in (part for each in given for part in each.split(",") if part.strip()):
         column, _, number = text.partition("=")
+        column = column.strip()
         try:
-            found[column.strip()] = float(number)
+            size = float(number)
         except ValueError:
             raise InputError("--sensors", text, "cannot be read", "give COLUMN=SD, as r_degps=0.02") from None
+        if found.setdefault(column, size) != size:
+            raise InputError("--sensors", text, f"is given before as {found[column]:g}", "give each sensor once")
     return found

@@ -59,13 +59,22 @@ def page_option(*names: str) -> Callable[[Command], Command]:
     return click.option(*names, "--page", "page", type=path, metavar="FILE.html", help="Write the page.")
 
 
+class _NumberOfShips(click.IntRange):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            int(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number of ships; give a whole number from {self.min} to {self.max}")
+        return super().convert(value, param, ctx)
+
+
 def ensemble_options(command: Command) -> Command:
     """``--ensemble``, ``--seed`` and ``--executor``."""
     options = (
         click.option(
             "--ensemble",
             "members",
-            type=click.IntRange(2, 10_000_000),
+            type=_NumberOfShips(2, 10_000_000),
             is_flag=False,
             flag_value=DEFAULT_MEMBERS,
             metavar="N",

@@ -9,6 +9,7 @@ import click
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import ensemble_options, page_option, set_option
+from tank2sim.errors import InputError
 
 
 @click.command("stability")
@@ -33,6 +34,10 @@ def command(
     json_file: Path | None,
 ) -> None:
     """Judge course stability, steady turning and the IMO criteria of CARD (a file, or a bundled ship's name)."""
+    if members is None and seed:
+        raise InputError(
+            "--seed", f"{seed}", "is of an ensemble, and none is asked for", "add --ensemble, or leave it out"
+        )
     ship = load(card, values)
     result = ship.stability(speed, spirals=spirals, members=members or 0, seed=seed, executor=executor)
     write_result(result, [ship.card.source], json_file=json_file, page=page)

@@ -17,7 +17,7 @@ from tank2sim.design.allocation import Allocation, InformationBlock, target_matr
 from tank2sim.design.captive_information import GaugeErrors, PlannedCampaign
 from tank2sim.design.captive_runs import PlannedRun, RunGroup, TankRuns, time_of
 from tank2sim.design.figure_slopes import FigureSlopes, figure_slopes, hydrodynamic_derivatives, range_of_figures
-from tank2sim.design.tank_form import TankFile
+from tank2sim.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.equations import candidate_terms
 from tank2sim.identification.captive.tank_conditions import SHORTEST_MODEL_M
@@ -30,6 +30,10 @@ the same within its rounding."""
 
 _BEYOND = 1.25
 """Range of a gauge over the largest force of the usual matrix, where the tank does not state it. Project choice."""
+
+_LEAST_ERROR = 1e-4
+"""Least noise and zero error of a gauge together, over its range. Project choice: the best gauges have as much; with a
+tenth of it runs without force have so much more information than others that the sums lose their digits."""
 
 _HOURS = (0.4, 0.6, 0.8, 1.0)
 """Shares of the hours at which certainty is drawn."""
@@ -73,7 +77,11 @@ class CaptiveDesign:
     usual : tuple of RunGroup
         The usual matrix, once.
     standard_errors, usual_standard_errors : array (m,)
-        Of each figure, by the plan and by the usual matrix in the same hours.
+        Of each figure, by the plan and by the usual matrix in the same hours, but at least once.
+    gauge_shares : mapping
+        Gauge (X, Y, N) to the share (m,) of each figure's variance by the plan that is in its coefficients.
+    beyond_use : mapping
+        Gauge to its stated range over the largest force of the usual matrix.
     ratios : array (m,)
         Variance of each figure by the plan over that by the usual matrix, mean over the ships that the card may be.
     curve : mapping
@@ -97,6 +105,8 @@ class CaptiveDesign:
     usual: tuple[RunGroup, ...]
     standard_errors: Array
     usual_standard_errors: Array
+    gauge_shares: Mapping[str, Array]
+    beyond_use: Mapping[str, float]
     ratios: Array
     curve: Mapping[str, object]
     hours_needed: float | None
@@ -114,6 +124,11 @@ class CaptiveDesign:
     def hours_used(self) -> float:
         """Time in the tank, h."""
         return sum(run.tank_s for run in self.runs) / 3600
+
+    @property
+    def compared_hours(self) -> float:
+        """Hours of the usual matrix with which the plan is compared: the same, or its own where those are fewer."""
+        return max(self.hours, self.usual_hours)
 
     @property
     def usual_hours(self) -> float:
@@ -139,6 +154,8 @@ class CaptiveDesignSettings:
         Figures to the side of the given rudder, in place of the mean over both sides.
     draws, seed : int
         Ships drawn from the errors of the card.
+    source : str
+        File of the tank, which messages name.
     """
 
     hours: float | None = None
@@ -148,6 +165,7 @@ class CaptiveDesignSettings:
     one_side: bool = False
     draws: int = DRAWN_SHIPS
     seed: int = 0
+    source: str = "tank"
 
 
 class CaptiveDesigner:
@@ -179,10 +197,13 @@ class CaptiveDesigner:
         self.slopes = figure_slopes(
             card, figures, terms, draws=settings.draws, seed=settings.seed, one_side=settings.one_side
         )
-        self.tank_runs = tank_runs(card, tank, settings.largest or range_of_figures(card, figures))
+        reach = settings.largest or range_of_figures(card, figures)
+        self.tank_runs = tank_runs(card, tank, reach, settings.source)
         usual = self.tank_runs.usual_matrix() if settings.usual is None else settings.usual
         if not any(run.oscillates for group in usual for run in group) and settings.usual is None:
-            raise InputError("tank", "mechanism", "allows no oscillation", "widen its limits of amplitude or frequency")
+            raise InputError(
+                settings.source, "mechanism", "allows no oscillation", "widen its limits of amplitude or frequency"
+            )
         self.planned = self._with_gauges(usual)
         self.usual = self._within_gauges(usual)
         every = self.tank_runs.candidates()
@@ -197,7 +218,8 @@ class CaptiveDesigner:
             "usual": len(candidates) + len(checks) + np.arange(len(self.usual)),
         }
         if not len(candidates) or not self.usual:
-            raise InputError("tank", "gauges", "allow no run: every force exceeds their ranges", "state wider ranges")
+            remedy = "state wider ranges"
+            raise InputError(settings.source, "gauges", "allow no run: every force exceeds their ranges", remedy)
         self.information = self.planned.information(self.groups)
 
     def _with_gauges(self, usual: Sequence[RunGroup]) -> PlannedCampaign:
@@ -222,12 +244,20 @@ class CaptiveDesigner:
             rate_hz=tank.gauges.rate_hz,
         )
         largest = [bare.largest_forces(run) for group in usual for run in group]
-        gauges = {}
+        gauges, self.beyond_use = {}, {}
         for force, unit in (("X", "N"), ("Y", "N"), ("N", "Nm")):
             stated = getattr(tank.gauges, f"{force}_range_{unit}")
-            span = stated or _BEYOND * max(forces[force] for forces in largest)
+            used = max(forces[force] for forces in largest)
+            span = stated or _BEYOND * used
+            self.beyond_use[force] = span / used if stated and used > 0 else 1.0
             noise = getattr(tank.gauges, f"{force}_noise_{unit}") or tank.gauges.noise_share * span
             zero = getattr(tank.gauges, f"{force}_zero_{unit}") or tank.gauges.zero_share * span
+            if math.hypot(noise, zero) < _LEAST_ERROR * span:
+                problem = (
+                    f"states no error of {force}: noise {noise:.2g} and zero {zero:.2g} {unit} of {span:.3g} {unit}"
+                )
+                remedy = f"give noise or zero of at least {_LEAST_ERROR:g} of the range"
+                raise InputError(self.settings.source, "gauges", problem, remedy)
             gauges[force] = GaugeErrors(noise=max(noise, 1e-9 * span), zero=zero, largest=span if stated else math.inf)
         return replace(bare, gauges=gauges)
 
@@ -321,12 +351,17 @@ class CaptiveDesigner:
         return self.usual_s if self.settings.hours is None else 3600 * self.settings.hours
 
     @cached_property
+    def _usual(self) -> Array:
+        """Counts of the usual matrix in the hours of the plan: there is no part of a matrix."""
+        return self.usual_counts * max(self._budget / self.usual_s, 1.0)
+
+    @cached_property
     def _targets(self) -> Allocation:
-        return self._over_usual(self.usual_counts * self._budget / self.usual_s)
+        return self._over_usual(self._usual)
 
     def design(self) -> CaptiveDesign:
         """The plan and what it is worth."""
-        usual = self.usual_counts * self._budget / self.usual_s
+        usual = self._usual
         counts, relaxed = self.plan(self._budget)
         plans = {1.0: counts}
         for share in _HOURS[:-1]:
@@ -346,6 +381,8 @@ class CaptiveDesigner:
             usual=self.usual,
             standard_errors=np.sqrt(self._at_card.variances(counts)),
             usual_standard_errors=np.sqrt(self._at_card.variances(usual)),
+            gauge_shares=self._gauge_shares(counts),
+            beyond_use=self.beyond_use,
             ratios=ratios[count:],
             curve=self._curve(plans),
             hours_needed=self._needed(plans, relaxed),
@@ -361,16 +398,21 @@ class CaptiveDesigner:
             for place in np.flatnonzero(counts)
         )
 
+    def _gauge_shares(self, counts: Array) -> dict[str, Array]:
+        """Share of each figure's variance in the coefficients of each force."""
+        total = self._at_card.variances(counts)
+        blocks = zip(self.information, self._at_card.blocks, strict=True)
+        return {force: Allocation((block,), self._at_card.cost).variances(counts) / total for force, block in blocks}
+
     def _curve(self, plans: Mapping[float, Array]) -> dict[str, object]:
         shares = sorted(plans)
         design = np.sqrt([self._at_card.variances(plans[share]) for share in shares])
-        usual = np.sqrt(
-            [self._at_card.variances(self.usual_counts * share * self._budget / self.usual_s) for share in shares]
-        )
+        usual_s = sorted({max(share * self._budget, self.usual_s) for share in shares})
+        usual = np.sqrt([self._at_card.variances(self.usual_counts * each / self.usual_s) for each in usual_s])
         cost = self._targets.cost
         return {
             "hours": [float(plans[share] @ cost) / 3600 for share in shares],
-            "usual_hours": [share * self._budget / 3600 for share in shares],
+            "usual_hours": [each / 3600 for each in usual_s],
             "design": {figure.text: design[:, row].tolist() for row, figure in enumerate(self.slopes.figures)},
             "usual": {figure.text: usual[:, row].tolist() for row, figure in enumerate(self.slopes.figures)},
         }
@@ -431,16 +473,25 @@ class CaptiveDesigner:
         )
 
 
-def tank_runs(card: ManoeuvringCard, tank: TankFile, largest: TestedRange) -> TankRuns:
+def tank_runs(card: ManoeuvringCard, tank: TankFile, largest: TestedRange, source: str = "tank") -> TankRuns:
     """The runs of a ship's model in a tank, at the stated length and speed, or at the card's Froude number.
 
     Raises
     ------
     InputError
-        The carriage is too slow or too short.
+        The carriage is too slow or too short, or the tank contradicts itself (then `source` is named).
     """
     model = tank.model
     length = model.length_m or min(SHORTEST_MODEL_M, card.ship.length_m)
     ratio = length / card.ship.length_m * model.gravity_mps2 / card.environment.gravity_mps2
     speed = model.speed_mps or card.model.speed_mps * math.sqrt(ratio)
+    beam, draught = card.ship.beam_m, card.ship.draught_m
+    scale = length / card.ship.length_m
+    refuse_contradictions(
+        tank,
+        source,
+        length,
+        None if beam is None else beam * scale,
+        None if draught is None else draught * scale,
+    )
     return TankRuns(tank=tank, length_m=length, speed_mps=speed, largest=largest)

@@ -169,6 +169,35 @@ def read_tank(path: Path | str) -> TankFile:
         raise form_fault(error, path, spelt, form=TankFile, what="a tank") from None
 
 
+def refuse_contradictions(
+    tank: TankFile, source: str, length_m: float, beam_m: float | None, draught_m: float | None
+) -> None:
+    """Refuse a tank that contradicts itself or does not take a model of this length, beam and draught, m.
+
+    Raises
+    ------
+    InputError
+        The carriage's way is longer than the tank, the tank is not broader and deeper than the model, or the lowest
+        frequency of the mechanism is above the highest.
+    """
+    basin, way, mechanism = tank.tank, tank.carriage.length_m, tank.mechanism
+    if basin.length_m is not None and way > basin.length_m:
+        assumed = "" if "length_m" in tank.carriage.model_fields_set else "assumed as "
+        problem = f"is {assumed}{way:g} m, longer than the tank ([tank] length_m = {basin.length_m:g})"
+        raise InputError(source, "carriage.length_m", problem, "state the way of the carriage within the tank")
+    for key, value, what, size in (
+        ("breadth_m", basin.breadth_m, "beam", beam_m),
+        ("depth_m", basin.depth_m, "draught", draught_m),
+    ):
+        if value is not None and size is not None and value <= size:
+            problem = f"is {value:g} m, and the model of {length_m:.3g} m has a {what} of {size:.3g} m"
+            raise InputError(source, f"tank.{key}", problem, "state the size of the tank, or take a shorter model")
+    low, high = mechanism.lowest_frequency_radps, mechanism.highest_frequency_radps
+    if low is not None and high is not None and low > high:
+        problem = f"is {low:g} rad/s, above highest_frequency_radps = {high:g}"
+        raise InputError(source, "mechanism.lowest_frequency_radps", problem, "give the lower of both")
+
+
 def with_tank_values(tank: TankFile, section: str, **values: float | None) -> TankFile:
     """The tank with other values in one section; None leaves a value as it is.
 

@@ -163,13 +163,15 @@ def test_the_chance_of_meeting_a_limit_at_the_median_is_a_half(mariner_card, mar
     found = stability_bands(mariner_card, [at_median], EnsembleRequest(16, 2))
     (one,) = found.chances
     assert one.met is not None and abs(one.met - 0.5) < 0.35 and found.stable == 1.0
+    # Wilson's interval of 16 of 16: from 1/(1 + z^2/n).
+    assert found.as_json()["probability_stable_interval_95"] == pytest.approx([1 / (1 + 1.959964**2 / 16), 1.0])
     assert one.band is not None and one.band.low < criteria[0].found < one.band.high
 
 
 def test_slow_motions_alone_give_no_probability_of_stability(mariner_card) -> None:
     roll = "\n[[effects]]\nname = 'roll_coupling'\n[effects.parameters]\nYphi = 0.001\nNphi = 0.02\n"
     found = stability_bands(parse_card(mariner_card.text + roll, "roll.toml"), [], EnsembleRequest(2, 0))
-    assert found.stable is None and any("motion.phi" in one for one in found.asked.notices)
+    assert found.stable is found.stable_between is None and any("motion.phi" in one for one in found.asked.notices)
 
 
 def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_card, mariner) -> None:

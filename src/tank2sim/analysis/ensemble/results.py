@@ -178,6 +178,7 @@ class StabilityBands:
     asked: Members
     figures: Mapping[str, Band]
     stable: float | None
+    stable_between: tuple[float, float] | None
     chances: tuple[Chance, ...]
     curves: SteeringBands | None = None
     all_met: ChanceOfAll | None = None
@@ -188,6 +189,7 @@ class StabilityBands:
             **self.asked.as_json(),
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "probability_stable": self.stable,
+            "probability_stable_interval_95": self.stable_between,
             "imo": [chance.as_json() for chance in self.chances],
             "imo_all": self.all_met and self.all_met.as_json(),
             "curves": self.curves and self.curves.as_json(),
@@ -270,13 +272,13 @@ def stability_bands(
             "no probability of stability: the figures of the members are those of slow motions, which "
             f"{', '.join(unseen)} follow at once"
         )
-    stable = None if unseen else _stable(straight)
+    stable, between = (None, None) if unseen else _stable(straight)
     bands, through = bands_without_poles(straight)
     messages += through
     drawn = steering_bands(ShipText.of(card), draws, request.members, curves, executor) if curves else None
     messages += drawn.notices if drawn else ()
     together = together and replace(together, tail=of_any)
-    return StabilityBands(_members(trials, messages), bands, stable, chances, drawn, together)
+    return StabilityBands(_members(trials, messages), bands, stable, between, chances, drawn, together)
 
 
 def named_bands(
@@ -357,13 +359,14 @@ def _share(count: int, of: int) -> tuple[float, tuple[float, float]]:
     return count / of, (float(between.low), float(between.high))
 
 
-def _stable(straight: Ensemble) -> float | None:
-    """Share of members whose modes of sway and yaw both decay: C' and T1 + T2 are positive."""
+def _stable(straight: Ensemble) -> tuple[float, tuple[float, float]] | tuple[None, None]:
+    """Share of members whose modes of sway and yaw both decay (C' and T1 + T2 are positive), and its interval."""
     if not straight.figures or not straight.usable:
-        return None
+        return None, None
     total = straight.figures["T_s"] + straight.figures["T3_s"]
     with np.errstate(invalid="ignore"):
-        return float(np.sum((straight.figures["criterion_C"] > 0) & (total > 0))) / straight.usable
+        count = int(np.sum((straight.figures["criterion_C"] > 0) & (total > 0)))
+    return _share(count, straight.usable)
 
 
 def _members(found: Ensemble, messages: Sequence[str]) -> Members:

@@ -43,9 +43,10 @@ def run_planes(found: Json) -> list[alt.TopLevelMixin]:
 def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> alt.Chart:
     kinds = list(dict.fromkeys(str(row["run"]) for row in rows))
     look = series_look(kinds, as_points=kinds)
-    size = alt.Size(
-        "runs:Q", scale=alt.Scale(range=[40, 500]), legend=alt.Legend(title="runs", tickCount=4, format="d")
-    )
+    most = max(int(row["runs"]) for row in rows)
+    counts = sorted({1, max(1, most // 2), most})
+    scale = alt.Scale(domain=[0, most], range=[0, 500])  # from no area for no runs: the legend has only numbers of runs
+    size = alt.Size("runs:Q", scale=scale, legend=alt.Legend(title="runs", values=counts, format="d"))
     return (
         alt.Chart(data(rows))
         .mark_point(filled=True, opacity=0.7)

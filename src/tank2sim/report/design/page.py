@@ -18,9 +18,9 @@ from tank2sim.units import in_words
 
 _FIGURES = (
     "Standard errors of the figures of the ship that the reduction of the tests will give, from the errors of the "
-    "gauges alone, by the plan and by the usual matrix in the same time. The ratio of variances is a mean over the "
-    "ships that the card may be.\n\nErrors common to the whole campaign (calibration, alignment, scale) are the same "
-    "in both."
+    "gauges alone, by the plan and by the usual matrix in the same time, but at least once. The ratio of variances is "
+    "a mean over the ships that the card may be.\n\nErrors common to the whole campaign (calibration, alignment, "
+    "scale) are the same in both."
 )
 _RUNS = (
     "The area of a point is the number of runs. Runs marked as checks are there to show whether a polynomial of third "
@@ -81,7 +81,7 @@ def figure_table(found: Json) -> PageTable:
     heads = ("figure", "value", "design", "usual", "ratio", "ratio of variances")
     return PageTable(
         caption="Figures and their standard errors",
-        columns=[Column(title=head, digits=3 if place > 1 else 4) for place, head in enumerate(heads)],
+        columns=[Column(title=head, digits=4) for place, head in enumerate(heads)],
         rows=rows,
     )
 
@@ -103,8 +103,8 @@ def coefficient_table(found: Json) -> PageTable:
         columns=[
             Column(title=""),
             Column(title="value"),
-            Column(title="design", digits=2),
-            Column(title="usual", digits=2),
+            Column(title="design", digits=3),
+            Column(title="usual", digits=3),
             *(Column(title=figure, unit="%", digits=2) for figure in names),
         ],
         rows=rows,

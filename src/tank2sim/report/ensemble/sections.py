@@ -119,7 +119,10 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
     heads += ["not shown by", "beyond the card"]
     columns = [Column(title=head) for head in heads]
     probability = found["probability_stable"]
-    stable = "" if probability is None else f" It is stable on a straight course with probability {probability:.3g}."
+    stable, between = "", found.get("probability_stable_interval_95")
+    if probability is not None:
+        interval = f" (95 % interval {between[0]:.3f} to {between[1]:.3f})" if between else ""
+        stable = f" It is stable on a straight course with probability {probability:.3g}{interval}."
     criteria_table = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
     together = found.get("imo_all")
     if together:

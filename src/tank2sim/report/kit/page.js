@@ -64,6 +64,22 @@
     return vegaEmbed(holder, chart, { mode: "vega-lite", actions: false, defaultStyle: false, ...looks });
   }
 
+  // Legends that are wider than the page leave no room for the chart: their entries then go under each other.
+  function legendsFit(holder, room) {
+    const picture = holder.querySelector("svg"); // the style of the page may show it smaller than it is
+    const scale = picture.width.baseVal.value / picture.getBoundingClientRect().width;
+    const boxes = [...holder.querySelectorAll(".role-legend")].map((legend) => legend.getBoundingClientRect());
+    const right = Math.max(...boxes.map((box) => box.right));
+    const left = Math.min(...boxes.map((box) => box.left));
+    return (right - left) * scale <= room;
+  }
+
+  function withStackedLegends(config) {
+    const { layout, ...legend } = config.legend;
+    const top = { ...layout.top, direction: "vertical", margin: 6 };
+    return { ...config, legend: { ...legend, columns: 1, layout: { ...layout, top } } };
+  }
+
   async function draw(place, config) {
     const holder = figures[place].querySelector(".drawing");
     const equal = Boolean(charts[place].usermeta?.equal_scales);
@@ -71,11 +87,16 @@
     const kept = chosen(place);
     const room = holder.clientWidth;
     let factor = 1;
-    for (let attempt = 0; attempt < 4; attempt += 1) {
+    let look = config;
+    for (let attempt = 0; attempt < 5; attempt += 1) {
       views.get(place)?.finalize();
-      views.set(place, await embedded(holder, shrunk(charts[place], factor, equal), config, choice));
+      views.set(place, await embedded(holder, shrunk(charts[place], factor, equal), look, choice));
       const width = holder.querySelector("svg").width.baseVal.value;
       if (width <= room || room === 0) break;
+      if (look === config && !legendsFit(holder, room)) {
+        look = withStackedLegends(config);
+        continue;
+      }
       factor *= (room / width) * 0.99;
     }
     choose(place, kept);
