@@ -167,8 +167,10 @@ def test_a_coefficient_that_is_not_that_of_a_ship_is_named(tmp_path) -> None:
 
 
 def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(tmp_path) -> None:
-    found = t2s.reduce(write_campaign(tmp_path, KVLCC2)).reduction
+    result = t2s.reduce(write_campaign(tmp_path, KVLCC2))
+    found = result.reduction
     loaded = sum(abs(n / 10.4 - 1) > 0.03 for n in conditions()[:, 4])
+    assert sum(" left out (" in notice for notice in result.notices) == 1
     assert sum("rpm" in reason for reason in found.not_used.values()) == loaded > 0
     assert {"steady_turn"} <= {run.run.type for run in found.runs}
     U, step = np.full(2, 1.179), np.array([-0.05, 0.05])

@@ -84,9 +84,9 @@ def read_steady_tests(path: Path) -> SteadyTests:
         A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force, revolutions, the
         open-water curve, and the sizes of model, propeller and rudder.
     """
-    form, factors = read_campaign_file(path)
+    form, spelt = read_campaign_file(path)
     _refuse_missing(form, path)
-    conditions, remarks = read_averages(form, factors, path) if form.averages else _averaged_runs(form, path)
+    conditions, remarks = read_averages(form, spelt, path) if form.averages else _averaged_runs(form, path)
     with_torque = all(condition.torque_Nm is not None for condition in conditions)
     if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
         first = next(condition.name for condition in conditions if condition.torque_Nm is None)
