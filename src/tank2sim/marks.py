@@ -19,6 +19,9 @@ FORCED = "FORCED"
 UNCONFIRMED = "UNCONFIRMED"
 """A channel of a log, or its clock, is not what it seems; somebody must confirm or correct it."""
 
+CHECK = "CHECK:"
+"""Tests contradict each other, or give what no ship has: somebody must find out why before the result is used."""
+
 
 def marked(messages: Iterable[str]) -> list[str]:
     """The messages that contain a mark, each once, in their order."""
@@ -26,6 +29,6 @@ def marked(messages: Iterable[str]) -> list[str]:
         dict.fromkeys(
             text
             for text in messages
-            if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, LINEARISED, FORCED, UNCONFIRMED))
+            if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, LINEARISED, FORCED, UNCONFIRMED, CHECK))
         )
     )

@@ -253,13 +253,13 @@ def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
     return found
 
 
-def together(faults: list[InputError]) -> InputError:
-    """Several faults as one error: runs with the same one are counted together, and the remedy is the first one's and
-    to go on without those runs."""
+def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputError:
+    """Several faults as one error: runs with the same one are counted together, and the remedy is the first one's, and
+    to go on without those runs if the command can."""
     alike: dict[tuple[str, str], list[InputError]] = {}
     for fault in faults:
         alike.setdefault((fault.place, fault.problem), []).append(fault)
-    said = []
+    said: list[str] = []
     for one, *others in list(alike.values())[:_FAULTS_SAID]:
         more = f" (the same of {len(others)} more, the last {Path(others[-1].source).name})" if others else ""
         where = [Path(one.source).name, one.place] if said else []
@@ -267,7 +267,7 @@ def together(faults: list[InputError]) -> InputError:
     if rest := sum(map(len, list(alike.values())[_FAULTS_SAID:])):
         said.append(f"and {rest} more faults")
     first = faults[0]
-    remedy = f"{first.remedy}, or leave such runs out with --keep-going"
+    remedy = first.remedy + (", or leave such runs out with --keep-going" if can_leave_out else "")
     return InputError(first.source, first.place, "; ".join(said), remedy)
 
 
