@@ -231,7 +231,7 @@ def test_points_of_the_open_water_curve_have_a_row_and_mark_a_result_that_they_d
         ("x_P = -0.48", "x_P = 0.48", "propeller.x_P"),
         ("x_R = -0.5", "x_R = 0.5", "rudder.x_R"),
         ("x_R = -0.5", "x_R = 0.0", "rudder.x_R"),
-        ('yaw_rate_prime = "r"', 'yaw_rate_radps = "r"', "r_radps: reaches 0.8"),
+        ('yaw_rate_prime = "r"', 'yaw_rate_radps = "r"', "averages.columns.yaw_rate: reaches 0.8"),
     ],
 )
 def test_sizes_and_units_that_no_ship_has_are_refused_by_their_keys(tmp_path, old, new, words) -> None:
