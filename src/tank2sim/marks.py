@@ -16,14 +16,15 @@ LINEARISED = "LINEARISED standard errors"
 ASSUMED_TANK = "ASSUMED of the tank"
 """Lengths and times of a tank that none has stated."""
 
-CHECK = "CHECK:"
-"""A result that needs a second look: it is hardly certain, or compared under other conditions than were asked for."""
-
 FORCED = "FORCED"
 """A refusal was overridden."""
 
 UNCONFIRMED = "UNCONFIRMED"
 """A channel of a log, or its clock, is not what it seems; somebody must confirm or correct it."""
+
+CHECK = "CHECK:"
+"""A result that needs a second look before it is used: it is hardly certain or compared under other conditions than were
+asked for, or tests contradict each other or give what no ship has."""
 
 
 def marked(messages: Iterable[str]) -> list[str]:

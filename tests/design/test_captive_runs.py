@@ -6,7 +6,7 @@ import pytest
 
 from tank2sim.cards.writing import TestedRange
 from tank2sim.design.captive_runs import TankRuns, time_of
-from tank2sim.design.tank_form import TankFile
+from tank2sim.design.tank_form import TankFile, read_tank
 from tank2sim.errors import InputError
 
 LARGEST = TestedRange(math.radians(12.0), math.radians(35.0), 0.6)
@@ -112,3 +112,11 @@ def test_checks_are_the_motions_that_a_plan_lacks_between_its_extremes():
     assert tank.check_runs(every) == ()
     extremes = [group for group in tank.usual_matrix() if abs(group[0].drift_rad) in (0.0, tank.drift_rad)]
     assert any(group[0].drift_rad == pytest.approx(tank.drift_rad / 2) for group in tank.check_runs(extremes))
+
+
+@pytest.mark.parametrize("keys", [("drift_deg", "drift_rad"), ("heading_amplitude_rad", "heading_amplitude_deg")])
+def test_a_quantity_of_the_tank_given_twice_is_refused_by_both_its_keys(tmp_path, keys):
+    path = tmp_path / "tank.toml"
+    path.write_text("[mechanism]\n" + "".join(f"{key} = 0.1\n" for key in keys))
+    with pytest.raises(InputError, match=f"mechanism.{keys[1]}: is given twice, also as {keys[0]};"):
+        read_tank(path)

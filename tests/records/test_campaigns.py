@@ -123,7 +123,7 @@ def test_a_gauge_that_shows_nothing_in_any_row_of_averages_is_refused_by_its_col
         (('"on_gauge"', '"gauge"'), "test.force_convention", "on_model"),
         (("speed_mps = 1.2", 'speed_mps = "fast"'), "test.speed_mps", "a number was expected"),
         (('type = "static_drift"', 'type = "drift"'), "runs.0.type", "static_drift"),
-        (("drift_deg = 4.78", "drift_deg = 4.78\ndrift_rad = 0.1"), "runs.0.drift_rad", "given twice"),
+        (("drift_deg = 4.78", "drift_deg = 4.78\ndrift_rad = 0.1"), "runs.0.drift_rad", "twice, also as drift_deg"),
         (("drift_deg = 4.78", "drift_deg = 478"), "runs.0.drift_deg", "below 90"),
         (("x_G_m = 0.1", "x_G_m = nan"), "model.x_G_m", "finite"),
         (("[test]", "[test"), "line 7", ""),
@@ -151,6 +151,38 @@ def test_missing_files_and_bad_cells_are_reported_together_by_run(folder):
     read = read_campaign(path, keep_going=True)
     assert [run.name for run in read.runs] == ["drift.csv"]
     assert len(read.faults) == 2
+
+
+def test_files_that_are_all_missing_are_counted(folder):
+    runs = "".join(RUN.format(file=f"run_{number:03}.csv", type="static_drift", more="") for number in range(1, 205))
+    with pytest.raises(InputError, match=r"run_001\.csv.*203 more.*run_204\.csv") as fault:
+        read_campaign(campaign(folder, runs))
+    assert len(str(fault.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('drift_deg = "beta"', 'drift_deg = "beta"\ndrift_rad = "beta"'), "columns.drift_rad: .* also as drift_deg"),
+        (
+            ('drift_deg = "beta"', 'drift_deg = "beta"\nyaw_rate_prime = "r"\nyaw_rate_degps = "r"'),
+            "columns.yaw_rate_degps: .* also as yaw_rate_prime",
+        ),
+        (
+            ('drift_deg = "beta"', 'drift_deg = "beta"\npropeller_rpm = "n"\npropeller_rps = "n"'),
+            "columns.propeller_rps: .* also as propeller_rpm",
+        ),
+        (('drift_deg = "beta"', 'drift_deg = "beta"\nheel_deg = "nope"'), "columns.heel_deg: the table has no"),
+        (('drift_deg = "beta"', 'drift_deg = "beta"\nheel_deg = 3'), "columns.heel_deg"),
+        (('drift_deg = "beta"', 'drift_deg = "n"'), "line 2: drift_deg is 180.*; correct"),
+        (('drift_deg = "beta"', 'drift_rad = "n"'), "line 2: drift_rad is 180.*; .*drift_deg"),
+    ],
+)
+def test_a_fault_of_the_columns_of_averages_names_them_as_the_file_does(tmp_path, change, words):
+    (tmp_path / "table.csv").write_text("beta,delta,U,X',Y',N',n,r\n0,5,0.6,-1e-4,2e-3,1e-3,180,0\n")
+    assert change[0] in AVERAGES
+    with pytest.raises(InputError, match=words):
+        read_campaign(campaign(tmp_path, AVERAGES.replace(*change), convention="hydrodynamic"))
 
 
 def test_a_campaign_needs_runs_or_averages_and_not_both(folder):

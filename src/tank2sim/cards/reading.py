@@ -240,10 +240,11 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
                 si_key, si_value = to_si(key, float(value))
             except OverflowError:
                 raise InputError(source, f"{place}.{key}", f"is {short(value)}", "no number is so large") from None
+            other = spelt.get(f"{place}.{si_key}", si_key).rpartition(".")[2]
             spelt[f"{place}.{si_key}"] = f"{place}.{key}"
             if si_key != key:
                 if si_key in section:
-                    raise InputError(source, f"{place}.{key}", f"is given twice, also as {si_key}", "give it once")
+                    raise InputError(source, f"{place}.{key}", f"is given twice, also as {other}", "give it once")
                 del section[key]
                 section[si_key] = si_value
 

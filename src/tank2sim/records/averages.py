@@ -14,7 +14,7 @@ import numpy as np
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
-from tank2sim.records.campaign_form import CampaignFile
+from tank2sim.records.campaign_form import CampaignFile, SpeltColumn
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.spelt_units import unit_factor
 from tank2sim.records.text_layout import cells_of, decoded_text, text_layout
@@ -48,7 +48,9 @@ class Condition:
     heel_rad: float = 0.0
 
 
-def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
+def read_averages(
+    form: CampaignFile, spelt: Mapping[str, SpeltColumn], path: Path
+) -> tuple[list[Condition], list[str]]:
     """Every distinct row of the table that ``[averages]`` names, and what should know of reading it.
 
     Only the columns that ``[averages.columns]`` names are read; others may hold text.
@@ -57,8 +59,8 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
     ----------
     form : CampaignFile
         The campaign's file.
-    factors : mapping
-        Quantity to the factor that brings its column to SI.
+    spelt : mapping
+        Quantity to its key in the file and the factor that brings its column to SI.
     path : Path
         Of the campaign's file, for messages and as the folder of the table.
 
@@ -76,11 +78,11 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
     for key, heading in averages.columns.model_dump(exclude_none=True).items():
         if heading not in heads:
             problem = f"the table has no column {heading!r}"
-            raise InputError(path, f"averages.columns.{key}", problem, f"its columns are {', '.join(heads)}")
+            raise InputError(path, f"averages.columns.{spelt[key].key}", problem, f"its columns are {', '.join(heads)}")
         place = heads.index(heading)
-        _refuse_other_unit(file, heading, key, units[place] if place < len(units) else "", factors.get(key, 1.0))
+        _refuse_other_unit(file, heading, key, units[place] if place < len(units) else "", spelt[key].factor)
         cells = _column(file, heading, place, zip(lines[1:], rows, strict=True))
-        values[key] = [cell * factors.get(key, 1.0) for cell in cells]
+        values[key] = [cell * spelt[key].factor for cell in cells]
         if key in ("X", "Y", "N") and max(map(abs, cells)) < LEAST_FORCE:
             remedy = "give the readings of the gauge"
             raise InputError(file, f"column {heading}", "is zero in every row: the gauge is dead", remedy)
@@ -90,7 +92,7 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
     _, first = np.unique(table, axis=0, return_index=True)
     distinct = sorted(int(row) for row in first)
     conditions = [
-        _condition(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row + 1]), form)
+        _condition(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row + 1]), form, spelt)
         for row in distinct
     ]
     repeated = len(rows) - len(distinct)
@@ -167,12 +169,18 @@ def _number(file: Path, place: tuple[int, str], text: str) -> float:
     return value
 
 
-def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignFile) -> Condition:
+def _condition(
+    at: Mapping[str, float], place: tuple[Path, int], form: CampaignFile, spelt: Mapping[str, SpeltColumn]
+) -> Condition:
     assert form.averages is not None
     file, line = place
     for key in ("drift_rad", "rudder_rad", "heel_rad"):
         if abs(at.get(key, 0.0)) >= math.pi / 2:
-            raise InputError(file, f"line {line}", f"{key} is {at[key]:g}", "name its column as _deg if it is degrees")
+            as_given = spelt[key]
+            problem = f"{as_given.key} is {at[key] / as_given.factor:g}, not within 90 deg"
+            in_degrees = as_given.key != key
+            remedy = "correct the row" if in_degrees else f"name its column {key[:-4]}_deg if it is degrees"
+            raise InputError(file, f"line {line}", problem, remedy)
     speed = at.get("speed_mps", form.test.speed_mps)
     if speed <= 0:
         raise InputError(file, f"line {line}", f"the speed is {speed:g} m/s", "a positive one was expected")

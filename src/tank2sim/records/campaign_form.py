@@ -7,7 +7,7 @@ then renamed (``drift_deg`` to ``drift_rad``, ``propeller_rps`` to ``propeller_r
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationError
 
@@ -339,6 +339,13 @@ class RudderTest(CardSection):
     y_R: Annotated[float, Field(gt=0, lt=0.5)] | None = None
 
 
+class SpeltColumn(NamedTuple):
+    """How ``[averages.columns]`` spells a quantity: its key there, and the factor that brings the column to SI."""
+
+    key: str
+    factor: float
+
+
 class CampaignFile(CardSection):
     """The whole of ``campaign.toml``."""
 
@@ -357,8 +364,12 @@ class CampaignFile(CardSection):
     runs: tuple[RunSheet, ...] = ()
 
 
-def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, float]]:
-    """The checked form of a campaign's parsed TOML, and the factors to SI of the columns of ``[averages]``.
+_SAME_QUANTITY = {"yaw_rate_radps": "yaw_rate_prime", "yaw_rate_prime": "yaw_rate_radps"}
+"""Columns of averages that are one quantity in another scaling."""
+
+
+def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, SpeltColumn]]:
+    """The checked form of a campaign's parsed TOML, and how it spells the columns of ``[averages]``, by SI key.
 
     Parameters
     ----------
@@ -382,16 +393,21 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
             section_in_si(run, f"runs.{number}", source, spelt) if isinstance(run, dict) else run
             for number, run in enumerate(content["runs"])
         )
-    factors: dict[str, float] = {}
+    spelt_columns: dict[str, SpeltColumn] = {}
     averages = content.get("averages")
     if isinstance(averages, dict) and isinstance(averages.get("columns"), dict):
         columns = {}
         for key, heading in averages["columns"].items():
-            si_key, factors[to_si(key, 1.0)[0]] = to_si(key, 1.0)
-            columns[si_key] = heading
+            si_key, factor = to_si(key, 1.0)
+            same = next((known for known in (si_key, _SAME_QUANTITY.get(si_key, "")) if known in columns), None)
+            if same is not None:
+                problem = f"is given twice, also as {spelt_columns[same].key}"
+                raise InputError(source, f"averages.columns.{key}", problem, "give it once")
+            columns[si_key], spelt_columns[si_key] = heading, SpeltColumn(key, factor)
+            spelt[f"averages.columns.{si_key}"] = f"averages.columns.{key}"
         content["averages"] = {**averages, "columns": columns}
     try:
-        return CampaignFile.model_validate(content), factors
+        return CampaignFile.model_validate(content), spelt_columns
     except ValidationError as error:
         raise form_fault(error, source, spelt, form=CampaignFile, what="a campaign") from None
 
@@ -409,7 +425,8 @@ def section_in_si(section: dict[str, Any], place: str, source: Path, spelt: dict
         number = isinstance(value, int | float) and not isinstance(value, bool)
         si_key, si_value = to_si(key, value) if number else (key, value)
         if si_key in converted:
-            raise InputError(source, f"{place}.{key}", f"is given twice, also as {si_key}", "give it once")
+            other = spelt[f"{place}.{si_key}"].rpartition(".")[2]
+            raise InputError(source, f"{place}.{key}", f"is given twice, also as {other}", "give it once")
         spelt[f"{place}.{si_key}"] = f"{place}.{key}"
         converted[si_key] = si_value
     return converted

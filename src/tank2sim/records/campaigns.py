@@ -35,6 +35,7 @@ from tank2sim.records.campaign_form import (
     ModelSection,
     RunSheet,
     RunType,
+    SpeltColumn,
     TankSection,
     TankTest,
     UncertaintySection,
@@ -46,6 +47,8 @@ from tank2sim.records.run_tables import read_run_table
 FORCE_COLUMNS = ("X", "Y", "N")
 _FEWEST_READINGS = 16
 """Readings of three gauges that cannot agree by chance, however coarse the gauges are."""
+_FAULTS_SAID = 8
+"""Different faults that one message lists; the others are counted. Project choice: they fill a screen."""
 _FORCE_COLUMNS = {"X": "X_N", "Y": "Y_N", "N": "N_Nm"}
 
 
@@ -187,7 +190,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
         reported.
     """
     path = Path(path)
-    form, factors = read_campaign_file(path)
+    form, spelt = read_campaign_file(path)
     runs: list[CaptiveRun] = []
     faults: list[InputError] = []
     remarks: list[str] = []
@@ -195,7 +198,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
         problem = "has both [averages] and [[runs]]" if form.runs else "has no run"
         raise InputError(path, "", problem, "give [[runs]] with a file each, or one table in [averages]")
     if form.averages is not None:
-        conditions, remarks = read_averages(form, factors, path)
+        conditions, remarks = read_averages(form, spelt, path)
         runs = [_averaged_run(condition, form) for condition in conditions]
     _refuse_doubled_names(form, path)
     for sheet in form.runs:
@@ -250,17 +253,26 @@ def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
     return found
 
 
-def together(faults: list[InputError]) -> InputError:
-    """Several faults as one error: each is reported, the remedy is the first one's and to go on without those runs."""
-    first, *others = faults
-    also = "".join(f"; {': '.join((Path(o.source).name, *filter(None, [o.place]), o.problem))}" for o in others)
-    return InputError(
-        first.source, first.place, first.problem + also, f"{first.remedy}, or leave such runs out with --keep-going"
-    )
+def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputError:
+    """Several faults as one error: runs with the same one are counted together, and the remedy is the first one's, and
+    to go on without those runs if the command can."""
+    alike: dict[tuple[str, str], list[InputError]] = {}
+    for fault in faults:
+        alike.setdefault((fault.place, fault.problem), []).append(fault)
+    said: list[str] = []
+    for one, *others in list(alike.values())[:_FAULTS_SAID]:
+        more = f" (the same of {len(others)} more, the last {Path(others[-1].source).name})" if others else ""
+        where = [Path(one.source).name, one.place] if said else []
+        said.append(": ".join(filter(None, [*where, one.problem])) + more)
+    if rest := sum(map(len, list(alike.values())[_FAULTS_SAID:])):
+        said.append(f"and {rest} more faults")
+    first = faults[0]
+    remedy = first.remedy + (", or leave such runs out with --keep-going" if can_leave_out else "")
+    return InputError(first.source, first.place, "; ".join(said), remedy)
 
 
-def read_campaign_file(path: Path) -> tuple[CampaignFile, dict[str, float]]:
-    """The checked form of ``campaign.toml`` and the factors of its columns of averages; raises as `campaign_file`."""
+def read_campaign_file(path: Path) -> tuple[CampaignFile, dict[str, SpeltColumn]]:
+    """The checked form of ``campaign.toml`` and how it spells its columns of averages; raises as `campaign_file`."""
     text = read_text(path)
     with faults_of_toml(str(path)):
         content = tomllib.loads(text)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.api.mmg_reduction import MmgReductionResult
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses
 from tank2sim.identification.captive_mmg.regression import ORDINARY, fit_mmg
@@ -160,15 +162,108 @@ def test_a_campaign_that_lacks_what_the_method_needs_is_refused(tmp_path, old, n
         t2s.reduce_to_mmg(path)
 
 
-def test_a_coefficient_that_is_not_that_of_a_ship_is_named(tmp_path) -> None:
-    result = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2 | {"C_2_plus": 6.0}))
-    assert result.fit.at_limit == ("C_2_plus",)
-    assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).fit.at_limit == ()
+def test_a_coefficient_at_the_limit_of_the_search_marks_the_result(tmp_path) -> None:
+    fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
+    assert fit.at_limit == () and MmgReductionResult(fit).marks == ()
+    values = fit.values.copy()
+    values[fit.names.index("C_2_plus")] = 5.0
+    at_limit = replace(fit, values=values)
+    assert at_limit.at_limit == ("C_2_plus",)
+    assert any("C_2_plus" in mark for mark in MmgReductionResult(at_limit).marks)
+    assert fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2 | {"C_2_plus": 6.0}))).at_limit == ("C_2_plus",)
+
+
+def scale_column(folder: Path, name: str, factor: float) -> None:
+    """A column of ``runs.csv`` or ``water.csv`` times a factor."""
+    for table in (folder / "runs.csv", folder / "water.csv"):
+        heads, *rows = (line.split(",") for line in table.read_text().splitlines())
+        if name in heads:
+            place = heads.index(name)
+            rows = [[*row[:place], repr(factor * float(row[place])), *row[place + 1 :]] for row in rows]
+            table.write_text("\n".join(",".join(row) for row in [heads, *rows]))
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("K_T", 1.5, "open_water.K_T: is .* off its curve.*propeller_diameter_m"),
+        ("K_T", 10.0, "open_water.K_T: is .* at J = 0"),
+        ("K_T", -1.0, "open_water.K_T: .*falls with J"),
+        ("T", -1.0, r"averages.columns.thrust \(column T\)"),
+        ("T", 0.5, "open_water.K_T: is .* off its curve"),
+        ("rps", -1.0, r"averages.columns.propeller \(column rps\)"),
+        ("r", -1.0, r"averages.columns.yaw_rate \(column r\): Nr is \+"),
+        ("r", 0.1, r"averages.columns.yaw_rate \(column r\): .*l_R"),
+        ("X", -1.0, r"averages.columns.X \(column X\) .*R0"),
+        ("Y", -1.0, r"averages.columns.Y \(column Y\) .*Yv"),
+        ("N", -1.0, r"averages.columns.N \(column N\) .*x_H"),
+    ],
+)
+def test_columns_of_another_sign_or_unit_are_refused_by_their_names(tmp_path, column, factor, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    scale_column(tmp_path, column, factor)
+    with pytest.raises(InputError, match=words) as fault:
+        t2s.reduce_to_mmg(path)
+    assert fault.value.source == str(path)
+
+
+def test_points_of_the_open_water_curve_have_a_row_and_mark_a_result_that_they_doubt(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    sound = t2s.reduce_to_mmg(path)
+    assert sound.marks == () and sound.content()["open_water"]["unexplained"] < 0.02
+    assert [row[0] for row in sound.tables[1].rows][-1].startswith("K_T")
+    scale_column(tmp_path, "K_T", 1.1)
+    doubted = t2s.reduce_to_mmg(path)
+    assert doubted.content()["open_water"]["unexplained"] == pytest.approx(0.09, abs=0.01)
+    assert any("K_T" in mark for mark in doubted.marks)
+    with_torque = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, torque=True))
+    assert [row[0].partition(" ")[0] for row in with_torque.tables[1].rows][-2:] == ["K_T", "K_Q"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("rudder_area_m2 = 0.0539", "rudder_area_m2 = 112.5", "model.rudder_area_m2"),
+        ("rudder_area_m2 = 0.0539", "rudder_area_m2 = 0.0000539", "model.rudder_area_m2"),
+        ("height_m = 0.345", "height_m = 15.8", "rudder.height_m"),
+        ("propeller_diameter_m = 0.216", "propeller_diameter_m = 9.86", "model.propeller_diameter_m"),
+        ("propeller_diameter_m = 0.216", "propeller_diameter_m = 0.25", "open_water.K_T: .*propeller_diameter_m"),
+        ("x_P = -0.48", "x_P = 0.48", "propeller.x_P"),
+        ("x_R = -0.5", "x_R = 0.5", "rudder.x_R"),
+        ("x_R = -0.5", "x_R = 0.0", "rudder.x_R"),
+        ('yaw_rate_prime = "r"', 'yaw_rate_radps = "r"', "averages.columns.yaw_rate: reaches 0.8"),
+    ],
+)
+def test_sizes_and_units_that_no_ship_has_are_refused_by_their_keys(tmp_path, old, new, words) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=words):
+        t2s.reduce_to_mmg(path)
+
+
+def test_a_hull_whose_derivatives_no_ship_has_marks_the_result(tmp_path) -> None:
+    fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
+    for name, value in (("Nr", 0.03), ("Nr", -0.5), ("Nr", -0.005), ("Nv", 0.1), ("l_R", 0.5), ("t_P", 0.75)):
+        values = fit.values.copy()
+        values[fit.names.index(name)] = value
+        marks = MmgReductionResult(replace(fit, values=values)).marks
+        assert any(f" {name} is" in mark for mark in marks), name
+
+
+def test_the_polynomial_warns_of_a_yaw_rate_in_another_unit(tmp_path) -> None:
+    path = write_campaign(tmp_path, KVLCC2)
+    assert not t2s.reduce(path).headline
+    path.write_text(path.read_text().replace("yaw_rate_prime", "yaw_rate_degps"))
+    assert any("yaw rate" in line for line in t2s.reduce(path).headline)
 
 
 def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(tmp_path) -> None:
-    found = t2s.reduce(write_campaign(tmp_path, KVLCC2)).reduction
+    result = t2s.reduce(write_campaign(tmp_path, KVLCC2))
+    found = result.reduction
     loaded = sum(abs(n / 10.4 - 1) > 0.03 for n in conditions()[:, 4])
+    assert sum(" left out (" in notice for notice in result.notices) == 1
     assert sum("rpm" in reason for reason in found.not_used.values()) == loaded > 0
     assert {"steady_turn"} <= {run.run.type for run in found.runs}
     U, step = np.full(2, 1.179), np.array([-0.05, 0.05])

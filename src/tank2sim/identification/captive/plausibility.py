@@ -29,6 +29,12 @@ LEVERS = (
 """Moment and force, and the range of their ratio, lengths forward of midships. The rudder is at -0.5, and its force
 on the hull acts forward of it; drift: 0.23 (Mariner) to 0.44 (KVLCC2)."""
 
+YAW_DAMPING = (0.05, 1.0)
+"""Range of N_r' over that of a slender hull, -pi (d/L)^2. Clarke, Gedling and Hine (1983) have 1/4 + 0.039 B/d -
+0.56 B/L times it, 0.2 to 0.4; the KVLCC2 0.24 without and 0.29 with its rudder. The bounds, a factor of three and more
+away, are a project choice: a yaw rate r L/U taken for deg/s makes N_r' about ten times as large, one in rad/s five
+times."""
+
 _SIGNIFICANT = 2.0
 
 
@@ -142,6 +148,24 @@ def yaw_force(derivatives: Mapping[str, float], mass_prime: float) -> Iterator[C
             "sign",
             f"Yr is {value:.3g}, not below m' = {mass_prime:.3g}; Y_r - m' is negative of every known ship. Was the "
             "inertia of the model taken out of the forces twice?",
+        )
+
+
+def yaw_damping(
+    derivatives: Mapping[str, float], standard_errors: Mapping[str, float], draught_ratio: float | None
+) -> Iterator[Caution]:
+    """N_r of a size that no hull has, by more than two standard errors; `draught_ratio` is d/L, None if unknown."""
+    value = derivatives.get("Nr")
+    if value is None or value > 0 or not draught_ratio:
+        return
+    unit = math.pi * draught_ratio**2
+    ratio, doubt = -value / unit, _SIGNIFICANT * standard_errors.get("Nr", 0.0) / unit
+    low, high = YAW_DAMPING
+    if not low - doubt <= ratio <= high + doubt:
+        yield Caution(
+            "size",
+            f"Nr is {value:.3g}, {ratio:.2g} times -pi (d/L)², and hulls have 0.2 to 0.4 times it; check the unit of "
+            "the yaw rate (r L/U, rad/s or deg/s).",
         )
 
 

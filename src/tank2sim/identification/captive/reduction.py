@@ -331,7 +331,7 @@ def _used_runs(
             not_used[run.run.name] = f"its speed is {speed:.4g} m/s, and the test speed {campaign.test.speed_mps:.4g}"
         elif abs(turning - usual) > SPEED_RANGE * usual and not options.off_speed:
             found, nominal = (f"{radps * 60 / (2 * np.pi):.4g}" for radps in (turning, usual))
-            not_used[run.run.name] = f"its propeller turns at {found} rpm, and most others at {nominal}"
+            not_used[run.run.name] = f"its rate of revolution is {found} rpm, and that of most others {nominal}"
         else:
             used.append(run)
     return used, not_used

@@ -28,6 +28,16 @@ _STEP_RATIO, _STEP_WITH_DRIFT = 9.0, 5.5
 reaches 5 among the hundreds of records of a campaign, does not reach both."""
 _LARGEST_PRIME = {"X": 0.5, "Y": 0.5, "N": 0.25}
 """Far above the coefficients of any hull: a flat plate broadside has Y' of about T/L."""
+_OF_AVERAGES = {
+    "r_radps": ("averages.columns.yaw_rate", "name its column by its unit: yaw_rate_prime, _radps or _degps"),
+    "delta_rad": ("averages.columns.rudder", "name its column by its unit: rudder_rad or _deg"),
+    "speed_mps": ("averages.columns.speed_mps", "give it in m/s"),
+    "v_mps": ("averages.columns.drift", "name its column by its unit: drift_rad or _deg; drift stays below 70 deg"),
+    "X_N": ("averages.columns.X", "correct averages.scaling"),
+    "Y_N": ("averages.columns.Y", "correct averages.scaling"),
+    "N_Nm": ("averages.columns.N", "correct averages.scaling"),
+}
+"""Column of a run's file to its key in a table of averages, and what to do about its unit there."""
 _GAP = 5.0
 _NO_SMALL_ANGLE = 0.05
 _FEWEST_LEVELS = 8
@@ -38,11 +48,14 @@ at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at th
 
 def record_faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
     """Faults of a record before its reduction: the first of each kind."""
-    if not run.is_average:
-        yield from _clock(run)
-    yield from _impossible_values(campaign, run)
     if run.is_average:
+        for fault in _impossible_values(campaign, run):
+            column = fault.place.removeprefix("column ")
+            place, remedy = _OF_AVERAGES.get(column, (fault.place, fault.remedy))
+            yield InputError(fault.source, place, fault.problem, remedy)
         return
+    yield from _clock(run)
+    yield from _impossible_values(campaign, run)
     yield from _foreign_motion(campaign, run)
     for force in FORCE_COLUMNS:
         yield from _dead(campaign, run, force)

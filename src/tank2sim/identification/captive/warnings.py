@@ -11,6 +11,7 @@ from tank2sim.identification.captive.plausibility import (
     force_convention,
     levers,
     unusual_signs,
+    yaw_damping,
     yaw_force,
 )
 from tank2sim.identification.captive.tank_conditions import (
@@ -76,6 +77,7 @@ def cautions_of_result(
     assert mass is not None
     body = body_of(campaign)
     deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
+    draught_ratio = body.draught_m / body.length_m if body.draught_m else None
     # A positive added mass is reported once, with its likely cause.
     other_derivatives = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (
@@ -84,6 +86,7 @@ def cautions_of_result(
         *(added_masses(derivatives, standard_errors, mass, inertia) if deep else ()),
         *unusual_signs(other_derivatives, standard_errors),
         *yaw_force(derivatives, mass),
+        *(yaw_damping(derivatives, standard_errors, draught_ratio) if deep else ()),
         *levers(derivatives, standard_errors),
     )
 

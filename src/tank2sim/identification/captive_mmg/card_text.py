@@ -6,13 +6,28 @@ from collections.abc import Mapping
 
 import tomlkit
 
-from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS
+from tank2sim.cards import parse_card
+from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS, MmgCard
 from tank2sim.cards.mmg import fujii
 from tank2sim.dynamics.mmg.hull import HULL_TERMS
+from tank2sim.errors import InputError
 from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
+from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
 from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
 from tank2sim.identification.estimates import estimate
 
+_CAUSES = {
+    "derivatives.Y": ("Y", "drift"),
+    "derivatives.N": ("N", "drift"),
+    "derivatives.": ("X", "thrust"),
+    "propeller.": ("thrust",),
+    "rudder.l_R": ("yaw_rate",),
+    "rudder.t_R": ("X", "rudder_normal_force"),
+    "rudder.a_H": ("Y", "rudder_normal_force"),
+    "rudder.x_H": ("N", "rudder_normal_force"),
+    "rudder.": ("rudder_normal_force",),
+}
+"""Beginning of a place on a card to the columns that give what is there; the first that fits."""
 MASS_KEYS = {"Xudot": "mx", "Yvdot": "my", "Nrdot": "Jz"}
 """Derivative to its name on an MMG card, of which it is the negative."""
 
@@ -81,6 +96,27 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
     document["derivatives"], document["propeller"], document["rudder"] = derivatives, propeller, of_rudder
     document["uncertainty"] = uncertainty
     return tomlkit.dumps(document)
+
+
+def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:
+    """The card of :func:`mmg_card_text`.
+
+    Raises
+    ------
+    InputError
+        The coefficients are not those of a ship; it names the campaign, and the columns that give the one at fault.
+    """
+    try:
+        card = parse_card(mmg_card_text(tests, values, errors, note), "the reduced card")
+    except InputError as fault:
+        keys = next((keys for start, keys in _CAUSES.items() if fault.place.startswith(start)), ())
+        places = [place_of_column(tests.form, key) for key in keys]
+        place = " or ".join(places) if places else "averages" if tests.form.averages else "runs"
+        problem = f"the tests give what no card can have, {fault.place}: {fault.problem}"
+        remedy = "check sign, unit and scaling of these, open_water and the sizes of the model"
+        raise InputError(tests.path, place, problem, remedy) from None
+    assert isinstance(card, MmgCard)
+    return card
 
 
 def estimated_masses(tests: SteadyTests) -> dict[str, tuple[float, float]]:

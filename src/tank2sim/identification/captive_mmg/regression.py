@@ -27,14 +27,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tank2sim.arrays import Array
-from tank2sim.cards import parse_card
 from tank2sim.cards.card import MmgCard
 from tank2sim.cards.mmg import open_water_fit
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.identification.captive_mmg.card_text import estimated_masses, mmg_card_text
+from tank2sim.identification.captive_mmg.card_text import estimated_masses, tested_card
 from tank2sim.identification.captive_mmg.common_errors import erring_tests
 from tank2sim.identification.captive_mmg.steady_tests import TORQUE, SteadyTests
 
@@ -144,6 +143,14 @@ class MmgFit:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def curves_unexplained(self) -> dict[str, float]:
+        """Of the open-water K_T, and K_Q with torque: standard deviation from the fitted curve over the rms of the
+        points."""
+        points = np.sqrt(np.mean(self.tests.open_water[:, 1:] ** 2, axis=0))
+        shares = self.sigmas[len(self.tests.channels) :] / points
+        return dict(zip(("K_T", "K_Q"), map(float, shares), strict=False))
+
+    @property
     def open(self) -> tuple[str, ...]:
         """Coefficients that the tests leave open: they are those of ordinary ships."""
         pairs = zip(self.names, self.random, strict=True)
@@ -232,10 +239,7 @@ def start_card(tests: SteadyTests) -> MmgCard:
     values = {name: mean for name, (mean, _) in ORDINARY.items()}
     values |= dict(zip(("k_0", "k_1", "k_2"), map(float, _open_water(tests)), strict=True))
     hull = {name: 0.0 for names in HULL_TERMS.values() for name in names}
-    text = mmg_card_text(tests, {**hull, **values, "X0": _START_X0}, {}, "start of the regression")
-    card = parse_card(text, str(tests.path))
-    assert isinstance(card, MmgCard)
-    return card
+    return tested_card(tests, {**hull, **values, "X0": _START_X0}, {}, "start of the regression")
 
 
 def _open_water(tests: SteadyTests) -> Array:

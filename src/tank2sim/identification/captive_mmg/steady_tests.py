@@ -13,6 +13,11 @@ from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
+from tank2sim.identification.captive_mmg.contradicted_tests import (
+    refuse_astern,
+    refuse_impossible_sizes,
+    refuse_other_curve,
+)
 from tank2sim.records.averages import Condition, read_averages, read_columns
 from tank2sim.records.campaign_form import CampaignFile
 from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_file, together
@@ -84,9 +89,12 @@ def read_steady_tests(path: Path) -> SteadyTests:
         A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force, revolutions, the
         open-water curve, and the sizes of model, propeller and rudder.
     """
-    form, factors = read_campaign_file(path)
+    form, spelt = read_campaign_file(path)
     _refuse_missing(form, path)
-    conditions, remarks = read_averages(form, factors, path) if form.averages else _averaged_runs(form, path)
+    refuse_impossible_sizes(form, path)
+    if form.averages:
+        _refuse_impossible_rows(path)
+    conditions, remarks = read_averages(form, spelt, path) if form.averages else _averaged_runs(form, path)
     with_torque = all(condition.torque_Nm is not None for condition in conditions)
     if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
         first = next(condition.name for condition in conditions if condition.torque_Nm is None)
@@ -96,7 +104,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
         raise InputError(
             path, "averages.columns.heel_rad", f"{heeled} has a heel; the method is of an upright hull", remedy
         )
-    return SteadyTests(
+    tests = SteadyTests(
         path=path,
         form=form,
         names=tuple(condition.name for condition in conditions),
@@ -105,6 +113,21 @@ def read_steady_tests(path: Path) -> SteadyTests:
         open_water=_open_water(form, path, with_torque=with_torque),
         remarks=tuple(remarks),
     )
+    thrusts = {"T": "thrust", "T_left": "thrust_left"}
+    refuse_astern(
+        form,
+        path,
+        tests.motion[:, 4],
+        {thrusts[name]: tests.readings[:, i] for i, name in enumerate(tests.channels) if name in thrusts},
+    )
+    return tests
+
+
+def _refuse_impossible_rows(path: Path) -> None:
+    """Refuse averages that cannot be, as the polynomial reduction does."""
+    campaign = read_campaign(path)
+    if faults := [fault for run in campaign.runs for fault in list(record_faults(campaign, run))[:1]]:
+        raise together(faults, can_leave_out=False)
 
 
 def _refuse_missing(form: CampaignFile, path: Path) -> None:
@@ -179,7 +202,7 @@ def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], lis
         found = [*_lacking(run), *record_faults(campaign, run)]
         faults += (found or [*reduced_faults(reduced_run(run))])[:1]
     if faults:
-        raise together(faults)
+        raise together(faults, can_leave_out=False)
     oscillating = [run.name for run in campaign.runs if run.oscillates]
     remarks = []
     if oscillating:
@@ -269,6 +292,7 @@ def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
         remedy = "a quadratic and its error need four"
         raise InputError(path, "open_water.J", "has less than four different values", remedy)
     table = np.column_stack([values[key] for key in given])
+    refuse_other_curve(table, path)
     if with_torque:
         table[:, 2] *= section.K_Q_factor
         first = int(np.argmin(np.abs(table[:, 0])))
