@@ -23,8 +23,8 @@ UNCONFIRMED = "UNCONFIRMED"
 """A channel of a log, or its clock, is not what it seems; somebody must confirm or correct it."""
 
 CHECK = "CHECK:"
-"""A result that needs a second look before it is used: it is hardly certain or compared under other conditions than were
-asked for, or tests contradict each other or give what no ship has."""
+"""A result that needs a second look before it is used: it is hardly certain, or compared under other conditions than
+were asked for, or tests contradict each other or give what no ship has."""
 
 
 def marked(messages: Iterable[str]) -> list[str]:
