@@ -255,7 +255,7 @@ def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
 
 def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputError:
     """Several faults as one error: runs with the same one are counted together, and the remedy is the first one's, and
-    to go on without those runs if the command can."""
+    to go on without those runs if the command can (`can_leave_out`)."""
     alike: dict[tuple[str, str], list[InputError]] = {}
     for fault in faults:
         alike.setdefault((fault.place, fault.problem), []).append(fault)

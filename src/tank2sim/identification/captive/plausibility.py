@@ -95,7 +95,8 @@ def added_masses(
 ) -> Iterator[Caution]:
     """Added mass or yaw inertia that no known ship has in deep water, by more than two standard errors.
 
-    Positive derivatives are the subject of :func:`force_convention`.
+    Positive derivatives are the subject of :func:`force_convention`. `derivatives` and `standard_errors` are prime, as
+    `mass_prime` and `inertia_prime` (None if unknown).
     """
     inertias = ((mass_prime, "mass", "mass_kg"), (inertia_prime, "yaw inertia", "yaw_inertia_kgm2"))
     for name, (inertia, what, key) in zip(ADDED_MASSES, inertias, strict=True):
@@ -131,7 +132,10 @@ def _likely_cause(value: float, inertia: float, convention: str) -> str:
 
 
 def unusual_signs(derivatives: Mapping[str, float], standard_errors: Mapping[str, float]) -> Iterator[Caution]:
-    """Derivatives whose sign no known ship has, by more than two standard errors, each with the reason for the sign."""
+    """Derivatives whose sign no known ship has, by more than two standard errors, each with the reason for the sign.
+
+    `derivatives` and `standard_errors` are prime.
+    """
     for name, expected in EXPECTED_SIGNS.items():
         value = derivatives.get(name)
         if value is None or value * expected.sign > 0:
@@ -141,7 +145,10 @@ def unusual_signs(derivatives: Mapping[str, float], standard_errors: Mapping[str
 
 
 def yaw_force(derivatives: Mapping[str, float], mass_prime: float) -> Iterator[Caution]:
-    """Y_r of m' or more: the water would push a yawing ship inwards by more than the centrifugal force."""
+    """Y_r of m' or more: the water would push a yawing ship inwards by more than the centrifugal force.
+
+    `derivatives` are prime, as `mass_prime`.
+    """
     value = derivatives.get("Yr")
     if value is not None and value >= mass_prime:
         yield Caution(
@@ -154,7 +161,10 @@ def yaw_force(derivatives: Mapping[str, float], mass_prime: float) -> Iterator[C
 def yaw_damping(
     derivatives: Mapping[str, float], standard_errors: Mapping[str, float], draught_ratio: float | None
 ) -> Iterator[Caution]:
-    """N_r of a size that no hull has, by more than two standard errors; `draught_ratio` is d/L, None if unknown."""
+    """N_r of a size that no hull has, by more than two standard errors.
+
+    `derivatives` and `standard_errors` are prime; `draught_ratio` is d/L, None if unknown.
+    """
     value = derivatives.get("Nr")
     if value is None or value > 0 or not draught_ratio:
         return
@@ -170,7 +180,10 @@ def yaw_damping(
 
 
 def levers(derivatives: Mapping[str, float], standard_errors: Mapping[str, float]) -> Iterator[Caution]:
-    """Points of attack that no ship has, by more than two standard errors: N_v/Y_v and N_delta/Y_delta."""
+    """Points of attack that no ship has, by more than two standard errors: N_v/Y_v and N_delta/Y_delta.
+
+    `derivatives` and `standard_errors` are prime.
+    """
     for moment, force, (low, high), what in LEVERS:
         if not derivatives.get(moment) or not derivatives.get(force):
             continue

@@ -99,7 +99,7 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
 
 
 def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:
-    """The card of :func:`mmg_card_text`.
+    """The card of :func:`mmg_card_text`, with the same `tests`, `values`, `errors` and `note`.
 
     Raises
     ------
