@@ -40,7 +40,7 @@ def test_the_plan_keeps_the_hours_and_makes_every_figure_more_certain_than_the_u
 
 @pytest.mark.slow
 def test_the_usual_matrix_in_twice_the_hours_has_half_the_variance():
-    short, long = plan(hours=24.0), plan(hours=48.0)
+    short, long = plan(hours=40.0), plan(hours=80.0)
     ratio = (short.figures["usual"] / long.figures["usual"]) ** 2
     assert ratio.to_numpy() == pytest.approx(2.0, rel=0.03)
     assert (long.figures["design"] < short.figures["design"]).all()
@@ -167,7 +167,7 @@ def test_an_unknown_key_of_the_tank_is_refused_with_its_place(tmp_path):
 
 @pytest.mark.slow
 def test_drawn_ships_count_as_much_as_the_one_of_the_card():
-    found = plan(draws=3)
+    found = plan(draws=3, hours=40.0)
     assert len(found.design.slopes.drawn) > 1
     assert (found.figures["variance_ratio"] < 1).all()
 
