@@ -80,7 +80,7 @@ def test_a_turn_without_a_rate_is_refused_with_what_lacks(tmp_path):
 def test_a_yaw_rate_in_degrees_read_as_radians_is_refused(tmp_path):
     path = write_arm(tmp_path, TRUTH, column="deg")
     path.write_text(path.read_text().replace("yaw_rate_degps", "yaw_rate_radps"))
-    with pytest.raises(InputError, match="averages.columns.yaw_rate"):
+    with pytest.raises(InputError, match=r"averages\.columns\.yaw_rate"):
         reduced(path)
 
 
