@@ -82,7 +82,7 @@ class Tail:
         Number of the card (name in the model) to the mean of failing ships less the card, in standard errors: the
         largest.
     remark : str
-        Why there is no probability; empty with one.
+        Why the probability is missing; empty where it is known.
     """
 
     distance: float

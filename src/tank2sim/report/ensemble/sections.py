@@ -80,7 +80,7 @@ def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
 
 
 def _tail_notes(rare: Sequence[tuple[str, Json]]) -> list[str]:
-    """Why there is no probability; where the failing ships are, and what of the members drawn there."""
+    """Why the probability is missing; where the failing ships are, and what of the members drawn there."""
     remarks: dict[str, list[str]] = {}
     notes = []
     for name, tail in rare:
