@@ -352,7 +352,7 @@ class CaptiveDesigner:
 
     @cached_property
     def _usual(self) -> Array:
-        """Counts of the usual matrix in the hours of the plan, whole ones only."""
+        """Counts of the usual matrix repeated to fill the hours of the plan, at least once as a whole."""
         return self.usual_counts * max(self._budget / self.usual_s, 1.0)
 
     @cached_property
