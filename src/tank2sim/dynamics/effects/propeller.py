@@ -174,7 +174,8 @@ def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
 
     ITTC 7.5-02-06-03 asks for the time constant of the engine next to that of the steering gear. A diesel that must be
-    stopped before it is reversed takes longer still.
+    stopped before it is reversed takes longer still. The engine of a ship at the berth (``initial.u`` = 0) is stopped,
+    unless ``initial.propeller_speed`` is set.
     """
     if "propeller.speed_actual" not in model:
         raise card.fault("effects", "engine_lag needs an engine", "give the card [propulsion] nominal_rpm and Xnn")
@@ -183,7 +184,8 @@ def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     start = Parameter(
         name="initial.propeller_speed",
         unit=order.unit,
-        description="Revolutions at the start, positive ahead",
+        description=f"Revolutions at the start, positive ahead; at {order.start:g}, where it is not set, those of a "
+        "ship that starts at rest (initial.u = 0) are zero",
         display_unit=order.display_unit,
         nominal=order.nominal,
         start=order.start,
@@ -196,7 +198,7 @@ def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
         display_unit=order.display_unit,
         nominal=order.nominal,
         derivative="engine_lag.rate",
-        start=start.symbol,
+        start=ca.if_else(ca.logic_and(model.symbol("initial.u") == 0, start.symbol == order.start), 0, start.symbol),
         steady=True,
     )
     rate = Quantity(
