@@ -191,7 +191,7 @@ class OperatingPointKeys(_Part):
     rudder_deg: float
 
 
-class SteadySpeedKeys(_Keys):
+class SteadySpeedKeys(TypedDict):
     """A speed straight ahead that the engine holds."""
 
     speed_mps: Number

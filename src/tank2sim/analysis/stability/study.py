@@ -155,8 +155,8 @@ def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[str]:
         return []
     return [
         f"CHECK: {len(stable)} stable speeds straight ahead at the same revolutions ({', '.join(stable)} m/s): the "
-        "ship goes at one or another as it comes from below or above, which no ship does; check the terms of X in u and "
-        "low_speed_below_mps"
+        "ship goes at one or another as it comes from below or above, which no ship does; check the terms of X in u "
+        "and low_speed_below_mps"
     ]
 
 
