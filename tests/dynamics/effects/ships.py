@@ -18,6 +18,8 @@ FRONT, SIDE, N0, MASS, X_G = 400.0, 1500.0, 84.0 * 2 * np.pi / 60, 798e-5, -0.02
 TYPICAL: dict[str, dict[str, float]] = {
     "current": {"speed_mps": 0.4, "direction_deg": 30.0},
     "wind": {"speed_mps": 10.0, "direction_deg": 40.0},
+    "current_field": {"speed_mps": 0.4, "direction_deg": 30.0},
+    "wind_field": {"speed_mps": 10.0, "direction_deg": 40.0},
     "wave_drift": {"height_m": 2.0, "direction_deg": 40.0},
     "bank_suction": {"Y_prime": 1e-4, "N_prime": -3e-5},
     "propeller_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},

@@ -3,6 +3,7 @@
 from tank2sim.dynamics.effects import (
     derivatives,
     dynamic_effects,
+    fields,
     gear,
     hull,
     loaded_rudder,
@@ -20,6 +21,8 @@ EFFECTS: Registry[Effect] = Registry(
     (
         surroundings.CURRENT,
         surroundings.WIND,
+        fields.CURRENT_FIELD,
+        fields.WIND_FIELD,
         surroundings.WAVE_DRIFT,
         surroundings.BANK_SUCTION,
         propeller.PROPELLER_SIDE_FORCE,

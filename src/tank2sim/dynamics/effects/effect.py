@@ -189,6 +189,9 @@ class Effect:
         True if the equations of the MMG method have it already: it is not for such a card.
     in_roll : bool
         True if a card with ``[roll]`` has it already: it is not for such a card.
+    sought : bool
+        False if it is not to be tried on trials: what it describes is given, not found, or another effect is sought in
+        its place.
     terminal : str
         What its inputs are together, a few words for the FMI terminal that joins them.
     """
@@ -211,6 +214,7 @@ class Effect:
     terminal: str = ""
     in_mmg: bool = False
     in_roll: bool = False
+    sought: bool = True
 
     @property
     def looks_like(self) -> str:
@@ -243,7 +247,7 @@ class Effect:
 
     def tried(self, card: ManoeuvringCard) -> bool:
         """True if a search can begin: this ship's model can have it, and required parameters have typical values."""
-        if (self.in_mmg and card.model.kind == "mmg") or (self.in_roll and card.roll):
+        if not self.sought or (self.in_mmg and card.model.kind == "mmg") or (self.in_roll and card.roll):
             return False
         required = self.required()
         return all(parameter.typical_values(card) for parameter in self.parameters if parameter.name in required)
