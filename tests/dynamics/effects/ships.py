@@ -50,6 +50,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "linear_sway_damping": {"factor": 0.1},
     "shallow_water": {"magnification": 0.2},
     "water_depth": {"depth_m": 12.0},
+    "finite_depth": {"depth_m": 12.0},
     "trim": {"by_stern_m": 1.0},
     "roll_coupling": {"Yphi": 1e-4, "Nphi": -5e-5},
     "flow_memory": {"share": 0.3, "time_constant_s": 8.0},

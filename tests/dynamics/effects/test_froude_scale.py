@@ -101,7 +101,15 @@ def test_an_absent_effect_changes_neither_rates_nor_readings(name: str, share: t
 
 def test_what_never_vanishes_replaces_something_or_needs_depth() -> None:
     never = set(EFFECTS) - set(CAN_VANISH)
-    assert never == {"loaded_rudder", "rudder_rate_limit", "rudder_lag", "telemotor_lag", "engine_lag", "water_depth"}
+    assert never == {
+        "loaded_rudder",
+        "rudder_rate_limit",
+        "rudder_lag",
+        "telemotor_lag",
+        "engine_lag",
+        "water_depth",
+        "finite_depth",
+    }
 
 
 def test_what_trials_show_is_tried_and_only_required_parameters_and_those_with_a_spread_are_free() -> None:

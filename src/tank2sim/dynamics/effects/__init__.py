@@ -1,6 +1,7 @@
 """Physical effects on top of the polynomial: each a function from model to model."""
 
 from tank2sim.dynamics.effects import (
+    depth,
     derivatives,
     dynamic_effects,
     fields,
@@ -53,6 +54,7 @@ EFFECTS: Registry[Effect] = Registry(
         derivatives.LINEAR_SWAY_DAMPING,
         derivatives.SHALLOW_WATER,
         derivatives.WATER_DEPTH,
+        depth.FINITE_DEPTH,
         derivatives.TRIM,
         dynamic_effects.ROLL_COUPLING,
         dynamic_effects.FLOW_MEMORY,

@@ -72,7 +72,9 @@ def _with_changing_current(model: Model, given: EffectSymbols, card: Manoeuvring
     motion through the water: M_RB da/dt + M_A da_r/dt = F(u_r), Fossen (2011), 8.3. In a steady current nothing but the
     kinematics is left. w is uniform over the hull, and its change does not heel the ship.
     """
-    states, starts, rates = [], [], []
+    states: list[State] = []
+    starts: list[Parameter] = []
+    rates: list[Quantity] = []
     direction = given["direction"]
     by_direction = {"north": ca.cos(direction), "east": ca.sin(direction)}
     inputs = {variable.name: variable.start for variable in model.inputs}

@@ -38,6 +38,15 @@ RESISTANCE = 6e-4
 a tanker (5e-4) and of the Mariner (8e-4); project choice."""
 
 
+def resistance_prime(model: Model, card: ManoeuvringCard) -> ca.SX:
+    """Resistance at u0 over 1/2 rho L^2 u0^2: R_0 of an MMG card, Xnn of [propulsion], or :data:`RESISTANCE`."""
+    if card.model.kind == "mmg":
+        return -model.symbol("derivatives.X0")
+    if "propulsion.Xnn" in model:
+        return model.symbol("propulsion.Xnn")
+    return ca.SX(RESISTANCE)
+
+
 def _relative_revolutions(model: Model) -> ca.SX:
     """n/n0, positive ahead; 1 on a card without propulsion, whose revolutions are the nominal ones."""
     if "propeller.speed_actual" not in model:
