@@ -107,6 +107,7 @@ def test_what_never_vanishes_replaces_something_or_needs_depth() -> None:
         "rudder_lag",
         "telemotor_lag",
         "engine_lag",
+        "engine_telegraph",
         "water_depth",
         "finite_depth",
     }
@@ -145,7 +146,7 @@ def test_sizes_lie_within_bounds_on_small_models_and_large_ships(length: float) 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_sizes_of_a_model_are_those_of_its_ship_by_froudes_law(name: str) -> None:
-    powers = {"m": 1.0, "s": 0.5, "mps": 0.5, "radps": -0.5}
+    powers = {"N": 3.0, "m": 1.0, "s": 0.5, "mps": 0.5, "radps": -0.5}
     ship, model = card_with(), smaller()
     for one in EFFECTS[name].parameters:
         factor = FROUDE ** powers.get(one.name.rpartition("_")[2], 0.0)

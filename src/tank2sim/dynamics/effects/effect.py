@@ -12,7 +12,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
 
-_UNITS = {"mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s", "prime": "1"}
+_UNITS = {"mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s", "N": "N", "prime": "1"}
 """Suffix of a parameter's name to its unit; a name without one of these has unit 1."""
 
 _SHOWN = {"rad": "deg", "radps": "deg/s", "mps": "knots"}
@@ -283,7 +283,7 @@ class Effect:
             A required value is missing.
         """
         if self.in_mmg and card.model.kind == "mmg":
-            raise card.fault("effects", f"{self.name} is part of the MMG method's own rudder", "leave it out")
+            raise card.fault("effects", f"{self.name} is part of the MMG method already", "leave it out")
         if self.in_roll and card.roll:
             raise card.fault("effects", f"{self.name} is part of the card's own [roll]", "leave one of the two out")
         variables = {
