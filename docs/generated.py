@@ -32,7 +32,7 @@ from tank2sim.cli import tank2sim as program
 from tank2sim.design import tank_form
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
-from tank2sim.dynamics.external_forces import with_external_forces
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.fmu.interface import FmuVariable, interface
 from tank2sim.records import campaign_form
 
@@ -229,7 +229,7 @@ def _in_degrees(key: str) -> str:
 def fmu_variables(ship: str) -> str:
     """Every variable of the FMU of a bundled ship, as its ``modelDescription.xml`` has it."""
     text: list[str] = []
-    variables = interface(with_external_forces(build(read_card(ship)))).variables
+    variables = interface(with_simulator_interface(build(read_card(ship)))).variables
     for causality in ("input", "output", "parameter"):
         rows = [one for one in variables if one.causality == causality]
         text += [f"### {causality.capitalize()}s", "", "| variable | unit (shown) | start | range | meaning |"]

@@ -71,6 +71,7 @@ def test_a_ship_has_terminals_for_what_a_bridge_is_wired_to(mariner: Model) -> N
         "angle": "rudder.angle",
         "command": "rudder.command",
         "failed": "steering.failed",
+        **{letter: f"rudder.{letter}" for letter in "XYN"},
     }
     assert {"x", "y", "psi", "u", "v", "r", "sog", "cog"} <= set(found["motion"])
     assert set(found["position"]) == {"latitude", "longitude"}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.external_forces import with_external_forces
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
 from tank2sim.fmu.documents import documents_of, documents_without_card
@@ -154,7 +154,7 @@ def make_fmu_file(
         Called with the stage that begins.
     """
     chosen = named_platforms(platforms)
-    model = with_external_forces(ship.model)
+    model = with_simulator_interface(ship.model)
     if sources:
         made = make_fmu(model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
     else:
@@ -188,4 +188,4 @@ def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     text = embedded_card(Path(path)) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else card.model
-    return CheckResult(check_against_model(Path(path), model=model and with_external_forces(model)))
+    return CheckResult(check_against_model(Path(path), model=model and with_simulator_interface(model)))
