@@ -14,6 +14,7 @@ from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
 from tank2sim.fmu.documents import documents_of, documents_without_card
 from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
+from tank2sim.fmu.osp import osp_system
 from tank2sim.fmu.platforms import named_platforms
 from tank2sim.fmu.unpacking import embedded_card
 
@@ -138,6 +139,7 @@ def make_fmu_file(
     platforms: str = "host",
     ssp: Path | None = None,
     sources: bool = True,
+    osp: bool = False,
     report: Callable[[str], None] = lambda _: None,
 ) -> ExportResult:
     """Make the FMU of a ship, without writing it: its bytes are in ``files``. Raises as :meth:`.Ship.to_fmu`.
@@ -150,6 +152,8 @@ def make_fmu_file(
         As in :meth:`.Ship.to_fmu`.
     ssp : Path, optional
         Also an SSP package in which a heading autopilot steers the ship.
+    osp : bool
+        Also the files of :func:`tank2sim.fmu.osp.osp_system`, beside the FMU.
     report : callable
         Called with the stage that begins.
     """
@@ -165,6 +169,8 @@ def make_fmu_file(
         from tank2sim.fmu.ssp import ship_with_autopilot
 
         files[ssp] = ship_with_autopilot(model, made, platforms=chosen, report=report)
+    if osp:
+        files |= {path.parent / name: text for name, text in osp_system(model, path.name).items()}
     return ExportResult(ship, path, made, ssp, files)
 
 
