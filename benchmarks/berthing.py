@@ -1,8 +1,8 @@
 """Berthing of the 3 m Esso Osaka model: median position error 100 s after a measured state, over the length.
 
 The card is identified here from turns and zigzags, in which no propeller turns astern: once with the thrust astern as
-the mirror of that ahead, and once with the share that is published of this ship. Or it is the one that is given. The measured
-rudder, revolutions and wind are its inputs; each window starts in the measured state. Needs the data folder.
+the mirror of that ahead, and once with the share that is published of this ship. Or it is the one that is given. The
+measured rudder, revolutions and wind are its inputs; each window starts in the measured state. Needs the data folder.
 
 ``python benchmarks/berthing.py [CARD ...]``
 """
