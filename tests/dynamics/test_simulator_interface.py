@@ -37,17 +37,17 @@ def test_the_relative_wind_is_what_an_anemometer_shows(name: str, heading_deg: f
 
 
 def test_forces_by_origin_are_those_that_each_effect_adds() -> None:
-    names = ("wind", "bow_thruster", "tugs", "current", "linear_yaw_damping")
+    names = ("wind", "bow_tunnel_thruster", "tugs", "current", "linear_yaw_damping")
     model = with_simulator_interface(ship({name: TYPICAL[name] for name in names}))
     at = {**state(3.0, 0.3, 0.01, 0.2), "motion.psi": 0.3}
-    alone = {name: added_forces(name, TYPICAL[name], at) for name in ("bow_thruster", "tugs")}
+    alone = {name: added_forces(name, TYPICAL[name], at) for name in ("bow_tunnel_thruster", "tugs")}
     for name, expected in alone.items():
         shown = [f"{name}.{letter}" for letter in "XYN" if f"{name}.{letter}" in model]
         found = dict(zip(shown, values(model, shown, at), strict=True))
         np.testing.assert_allclose(
             [found.get(f"{name}.{letter}", 0.0) for letter in "XYN"], expected, rtol=1e-6, atol=1e-3
         )
-    assert {"wind.X", "wind.Y", "wind.N", "bow_thruster.Y", "rudder.N", "motion.heading"} <= set(model.outputs)
+    assert {"wind.X", "wind.Y", "wind.N", "bow_tunnel_thruster.Y", "rudder.N", "motion.heading"} <= set(model.outputs)
     assert not any(name.startswith(("current.X", "linear_yaw_damping.")) for name in model.outputs)
 
 

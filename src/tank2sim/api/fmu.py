@@ -153,7 +153,7 @@ def make_fmu_file(
     ssp : Path, optional
         Also an SSP package in which a heading autopilot steers the ship.
     osp : bool
-        Also the files of :func:`tank2sim.fmu.osp.osp_system`, beside the FMU.
+        Also the files of :func:`tank2sim.fmu.osp.osp_system`, next to the FMU.
     report : callable
         Called with the stage that begins.
     """

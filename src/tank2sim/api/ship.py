@@ -611,7 +611,7 @@ class Ship:
         sources : bool
             False: without C sources, ship card and coefficients, which are then constants of the library.
         osp : bool
-            Also write ``OspSystemStructure.xml`` and the OSP model description beside the FMU, for the Open Simulation
+            Also write ``OspSystemStructure.xml`` and the OSP model description next to the FMU, for the Open Simulation
             Platform.
 
         Raises

@@ -40,7 +40,7 @@ from tank2sim.fmu.platforms import PLATFORMS
     help="Also an SSP package in which a heading autopilot steers the ship.",
 )
 @click.option(
-    "--osp", is_flag=True, help="Also OspSystemStructure.xml and the OSP model description, beside the FMU (FMI 2)."
+    "--osp", is_flag=True, help="Also OspSystemStructure.xml and the OSP model description, next to the FMU (FMI 2)."
 )
 @json_option
 def command(

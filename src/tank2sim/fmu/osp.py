@@ -66,7 +66,7 @@ _MOTION: dict[str, Parts] = {
 
 
 def osp_system(model: Model, file: str) -> dict[str, str]:
-    """Name to text of the files that the engine of OSP wants beside the FMU `file`.
+    """Name to text of the files that the engine of OSP wants next to the FMU `file`.
 
     ``OspSystemStructure.xml`` is a system of this ship alone, with the start of each input to change, at steps that are
     ten times the model's; ``<model name>_OspModelDescription.xml`` has the groups of variables by which ships are

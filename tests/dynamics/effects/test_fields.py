@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 
-from .ships import MASS, RHO, RHO_AIR, SIDE, STATES, X_G, L, added_forces, forces, ship, state, values
+from .ships import MASS, RHO, RHO_AIR, SIDE, STATES, X_G, L, added_forces, card_with, forces, ship, state, values
 
 FIELD = {"speed_mps": 0.0, "direction_deg": 0.0, "entry_time_s": 20.0}
 WIND = {"speed_mps": 12.0, "direction_deg": 35.0}
@@ -55,6 +56,13 @@ def test_in_a_steady_current_nothing_but_the_kinematics_differs() -> None:
     np.testing.assert_allclose(field, values(ship({"current": given}), names, at), rtol=1e-9)
     start = ship({"current_field": given})
     assert [start[f"initial.current_{side}"].start for side in ("north", "east")] == pytest.approx(list(water.values()))
+
+
+@pytest.mark.parametrize("kind", ["current", "wind"])
+def test_a_search_does_not_try_what_another_effect_of_the_card_takes_the_inputs_of(kind: str) -> None:
+    with_field = card_with({f"{kind}_field": {"speed_mps": 1.0, "direction_deg": 0.0}})
+    assert EFFECTS[kind].tried(card_with()) and not EFFECTS[kind].tried(with_field)
+    assert not EFFECTS[f"{kind}_field"].tried(card_with())
 
 
 @pytest.mark.parametrize("kind", ["current", "wind"])

@@ -15,7 +15,7 @@ from .ships import N0, RHO, U0, L, added_forces, ship, state
 TELEGRAPH = {"time_constant_s": 4.0, "start_s": 6.0, "reversal_s": 25.0}
 
 
-@pytest.mark.parametrize(("name", "forward"), [("bow_thruster", 60.0), ("stern_thruster", -70.0)])
+@pytest.mark.parametrize(("name", "forward"), [("bow_tunnel_thruster", 60.0), ("stern_tunnel_thruster", -70.0)])
 def test_a_thruster_pushes_its_end_to_the_side_of_its_order_and_fades_with_speed(name: str, forward: float) -> None:
     given = {"command": 0.5, "force_N": 2e5, "forward_m": forward, "half_speed_mps": 1.5}
     for u, left in ((0.0, 1.0), (1.5, 0.5), (-1.5, 0.5), (4.5, 0.1)):
@@ -24,7 +24,7 @@ def test_a_thruster_pushes_its_end_to_the_side_of_its_order_and_fades_with_speed
 
 
 def test_thrusters_turn_a_stopped_ship_on_the_spot() -> None:
-    model = ship({"bow_thruster": {"command": 1.0}, "stern_thruster": {"command": -1.0}})
+    model = ship({"bow_tunnel_thruster": {"command": 1.0}, "stern_tunnel_thruster": {"command": -1.0}})
     running = Running(Integrator(model), {"propeller.speed": 0.0}, {"initial.u": 0.0})
     running.run(300.0)
     assert running.state("motion.psi") > 0.2

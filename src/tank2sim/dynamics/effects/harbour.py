@@ -59,7 +59,7 @@ def _thruster(end: str, sign: float) -> tuple[EffectParameter, ...]:
             f"order of the thruster over its largest force, positive pushes the {end} to starboard",
             -1.0,
             1.0,
-            input_name=f"{end}_thruster.command",
+            input_name=f"{end}_tunnel_thruster.command",
             absent=0.0,
             typical=(0.5,),
         ),
@@ -76,7 +76,7 @@ def _thruster(end: str, sign: float) -> tuple[EffectParameter, ...]:
 
 
 BOW_THRUSTER = Effect(
-    name="bow_thruster",
+    name="bow_tunnel_thruster",
     acts_on="force",
     description="A tunnel thruster pushes the bow sideways, at low speed.",
     source="Chislett and Bjorheden (1966); Brix (ed.) (1993), Manoeuvring Technical Manual",
@@ -87,7 +87,7 @@ BOW_THRUSTER = Effect(
 )
 
 STERN_THRUSTER = Effect(
-    name="stern_thruster",
+    name="stern_tunnel_thruster",
     acts_on="force",
     description="A tunnel thruster pushes the stern sideways, at low speed.",
     source="Chislett and Bjorheden (1966); Brix (ed.) (1993), Manoeuvring Technical Manual",
