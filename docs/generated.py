@@ -42,7 +42,10 @@ logger = logging.getLogger(__name__)
 
 FAMILIES = {
     "surroundings": "Surroundings",
+    "fields": "Surroundings",
+    "depth": "Surroundings",
     "propeller": "Propeller and engine",
+    "harbour": "Thrusters and tugs",
     "rudder": "Rudder",
     "loaded_rudder": "Rudder",
     "gear": "Steering gear",
@@ -57,7 +60,7 @@ OTHERS = "From installed packages"
 """Heading of the effects that are not built in."""
 
 _SUFFIXES = {"rad": ("deg", 180 / math.pi), "radps": ("degps", 180 / math.pi)}
-_UNITS = {"deg": "deg", "degps": "deg/s", "mps": "m/s", "m": "m", "s": "s", "prime": "prime"}
+_UNITS = {"deg": "deg", "degps": "deg/s", "mps": "m/s", "m": "m", "s": "s", "N": "N", "prime": "prime"}
 
 
 def effects() -> str:
