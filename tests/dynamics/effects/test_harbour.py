@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 
@@ -21,6 +22,25 @@ def test_a_thruster_pushes_its_end_to_the_side_of_its_order_and_fades_with_speed
     for u, left in ((0.0, 1.0), (1.5, 0.5), (-1.5, 0.5), (4.5, 0.1)):
         found = added_forces(name, given, state(u, 0.0, 0.0))
         np.testing.assert_allclose(found, [0.0, 1e5 * left, forward * 1e5 * left], rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "input_name", "wrong"),
+    [
+        ("bow_tunnel_thruster", {"command": 0.0}, "bow_tunnel_thruster.command", 50.0),
+        ("tugs", {"force_1_N": 0.0, "direction_1_deg": 0.0}, "tug.force_2", -1.0),
+        ("wind", {"speed_mps": 0.0, "direction_deg": 0.0}, "wind.speed", 500.0),
+        ("current", {"speed_mps": 0.0, "direction_deg": 0.0}, "current.speed", -30.0),
+        ("finite_depth", {"depth_m": 50.0}, "water.depth", 1e6),
+    ],
+)
+def test_an_order_that_nothing_can_follow_is_refused(
+    name: str, given: dict[str, float], input_name: str, wrong: float
+) -> None:
+    model = ship({name: given})
+    with pytest.raises(InputError) as caught:
+        model.input_values({input_name: wrong})
+    assert caught.value.place == input_name
 
 
 def test_thrusters_turn_a_stopped_ship_on_the_spot() -> None:

@@ -22,6 +22,10 @@ STEPS_PER_TIME_CONSTANT = 5
 the change, (1/5)^5/120, in each step."""
 
 
+BEYOND_CARD = 2.0
+"""Largest speed or length that an input takes over the largest that a card may give: a hurricane and a depth of the
+ocean are within, an order in a wrong unit seldom is. Project choice."""
+
 Values = tuple[float, ...]
 
 
@@ -104,8 +108,11 @@ class EffectParameter:
                 unit=unit,
                 description=description,
                 display_unit=_SHOWN.get(suffix),
-                # A direction may go round and round, and a negative speed is one the other way; no largest is known.
-                minimum=None if unit in ("rad", "m/s") else self.lowest(card),
+                # A direction may go round and round, and a negative speed is one the other way.
+                minimum={"rad": None, "m/s": -BEYOND_CARD * self.maximum}.get(unit, self.lowest(card)),
+                maximum={"rad": None, "m/s": BEYOND_CARD * self.maximum, "m": BEYOND_CARD * self.maximum}.get(
+                    unit, self.maximum
+                ),
                 start=value,
             )
         return Parameter(
