@@ -50,7 +50,7 @@ def records(label: str, columns: Mapping[str, Array]) -> list[ChartRecord]:
     ]
 
 
-class _SharedData(alt.InlineData):
+class _SharedData(alt.InlineData):  # type: ignore[misc]
     """Data of which copies of a chart share the records: Altair copies a chart in most of its steps, and copying each
     number of each record takes half of the time of a page. Nothing changes records."""
 
