@@ -32,7 +32,7 @@ from tank2sim.cli import tank2sim as program
 from tank2sim.design import tank_form
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
-from tank2sim.dynamics.external_forces import with_external_forces
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.fmu.interface import FmuVariable, interface
 from tank2sim.records import campaign_form
 
@@ -42,7 +42,10 @@ logger = logging.getLogger(__name__)
 
 FAMILIES = {
     "surroundings": "Surroundings",
+    "fields": "Surroundings",
+    "depth": "Surroundings",
     "propeller": "Propeller and engine",
+    "harbour": "Thrusters and tugs",
     "rudder": "Rudder",
     "loaded_rudder": "Rudder",
     "gear": "Steering gear",
@@ -57,7 +60,7 @@ OTHERS = "From installed packages"
 """Heading of the effects that are not built in."""
 
 _SUFFIXES = {"rad": ("deg", 180 / math.pi), "radps": ("degps", 180 / math.pi)}
-_UNITS = {"deg": "deg", "degps": "deg/s", "mps": "m/s", "m": "m", "s": "s", "prime": "prime"}
+_UNITS = {"deg": "deg", "degps": "deg/s", "mps": "m/s", "m": "m", "s": "s", "N": "N", "prime": "prime"}
 
 
 def effects() -> str:
@@ -229,7 +232,7 @@ def _in_degrees(key: str) -> str:
 def fmu_variables(ship: str) -> str:
     """Every variable of the FMU of a bundled ship, as its ``modelDescription.xml`` has it."""
     text: list[str] = []
-    variables = interface(with_external_forces(build(read_card(ship)))).variables
+    variables = interface(with_simulator_interface(build(read_card(ship)))).variables
     for causality in ("input", "output", "parameter"):
         rows = [one for one in variables if one.causality == causality]
         text += [f"### {causality.capitalize()}s", "", "| variable | unit (shown) | start | range | meaning |"]

@@ -82,6 +82,8 @@ void reset_instance(Instance *self) {
     self->stale = STALE_ALL;
     self->stop_defined = false;
     self->last_step = OK;
+    memset(self->left_range, 0, sizeof self->left_range);
+    memset(self->clamped, 0, sizeof self->clamped);
 }
 
 static const char *mode_name(int mode) {

@@ -63,6 +63,8 @@ struct Instance {
     unsigned stale;
     unsigned logged;
     Status last_step;
+    bool left_range[VALIDITY_FACTOR_COUNT + 1]; /* the log has this cause of a lower validity */
+    bool clamped[INPUT_COUNT + 1];              /* the log has that this input is held at a bound */
     bool stop_defined;
     double stop_time;
     double constant[CONSTANT_COUNT + 1]; /* what the step needs and only parameters determine */

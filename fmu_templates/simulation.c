@@ -74,6 +74,18 @@ static int find_initial_states(Instance *self) {
     return trim_wanted(self) ? trim(self, &work) : 0;
 }
 
+/* A line in the log for each cause that lowers validity, the first time that it is seen in the outputs. */
+static void report_range(Instance *self) {
+    if (!(self->mode & SIMULATED)) return;
+    for (int i = 0; i < VALIDITY_FACTOR_COUNT; ++i) {
+        const unsigned factor = VALIDITY_FACTORS[i];
+        if (self->left_range[i] || !(self->value[factor] < 1)) continue;
+        self->left_range[i] = true;
+        report(self, WARNING, "at %g s the model leaves the range in which it holds: %s = %g", self->value[TIME],
+               VARIABLES[factor].name, self->value[factor]);
+    }
+}
+
 /* Calculate what of `parts` is stale. */
 void refresh(Instance *self, unsigned parts) {
     Work work;
@@ -94,6 +106,7 @@ void refresh(Instance *self, unsigned parts) {
     if (self->stale & parts & STALE_OUTPUTS) {
         model_outputs(arguments, outputs, work.integers, work.reals, 0);
         self->stale &= ~(unsigned)STALE_OUTPUTS;
+        report_range(self);
     }
 }
 

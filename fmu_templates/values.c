@@ -7,7 +7,7 @@ bool is_block(unsigned reference, unsigned begin, unsigned end) { return referen
 
 static bool is_input(unsigned reference) { return is_block(reference, INPUTS_BEGIN, INPUTS_END); }
 
-static bool is_parameter(unsigned reference) { return is_block(reference, PARAMETERS_BEGIN, MAX_STEP + 1); }
+static bool is_parameter(unsigned reference) { return is_block(reference, PARAMETERS_BEGIN, CLAMP_SWITCH + 1); }
 
 /* May this variable be read or, if it is an input, set in an intermediate update? As in modelDescription.xml. */
 bool can_update(unsigned reference) {
@@ -88,6 +88,23 @@ static bool within_bounds(unsigned reference, double value) {
     return value >= variable->minimum && value <= variable->maximum;
 }
 
+static bool clamps(const Instance *self, unsigned reference) {
+    return is_input(reference) && self->value[CLAMP_SWITCH] != 0;
+}
+
+/* An input at its nearer bound if it is beyond, with a line in the log the first time. */
+static double clamped(Instance *self, unsigned reference, double value) {
+    const Variable *variable = &VARIABLES[reference];
+    const double held = fmin(fmax(value, variable->minimum), variable->maximum);
+    bool *logged = &self->clamped[reference - INPUTS_BEGIN];
+    if (!*logged) {
+        report(self, WARNING, "%s = %g is held at %g: it lies between %g and %g", variable->name, value, held,
+               variable->minimum, variable->maximum);
+        *logged = true;
+    }
+    return held;
+}
+
 /* Sets all of the variables or, if one of them cannot be set, none. */
 Status set_reals(Instance *self, const unsigned references[], size_t count, const double values[]) {
     for (size_t i = 0; i < count; ++i) {
@@ -98,14 +115,15 @@ Status set_reals(Instance *self, const unsigned references[], size_t count, cons
         if (references[i] == MAX_STEP && !(values[i] > 0)) {
             return report(self, DISCARD, "%s must be positive", VARIABLES[MAX_STEP].name);
         }
-        if (!within_bounds(references[i], values[i])) {
+        if (!within_bounds(references[i], values[i]) && !clamps(self, references[i])) {
             return report(self, DISCARD, "%s cannot be set to %g: it lies between %g and %g",
                           VARIABLES[references[i]].name, values[i], VARIABLES[references[i]].minimum,
                           VARIABLES[references[i]].maximum);
         }
     }
     for (size_t i = 0; i < count; ++i) {
-        self->value[references[i]] = values[i];
+        const bool within = within_bounds(references[i], values[i]);
+        self->value[references[i]] = within ? values[i] : clamped(self, references[i], values[i]);
         mark_stale(self, references[i]);
     }
     return OK;

@@ -7,6 +7,7 @@ from pathlib import Path
 import bundled_ships
 import numpy as np
 import pytest
+import rudder_and_speed
 
 import tank2sim as t2s
 from tank2sim.bundled import bundled_cards
@@ -99,3 +100,26 @@ def test_identified_ships_name_their_trials_and_hold_no_record_of_them() -> None
         "esso-osaka-estimated",
         "mariner",
     } <= set(bundled_cards())
+
+
+def test_the_mariners_rudder_goes_with_the_square_of_speed_where_its_table_is_read_with_the_nominal_speed() -> None:
+    """By hand from the printed table: N' by rudder is Nd (1 + 2 Du + Du^2) delta + Nddd delta^3, to port."""
+    shares = np.array([1.0, 0.9, 0.8, 0.7])
+    delta = np.radians(-10.0)  # the table's rudder is positive to port
+    linear, cubic = -139e-5 * delta, 45e-5 * delta**3
+    pressure = 0.5 * 1025.0 * 160.93**3
+    nominal = pressure * (linear * shares**2 + cubic) / shares**2
+    du = 1 - 1 / shares
+    instantaneous = pressure * (linear * (1 + du) ** 2 + cubic)
+    found = [rudder_and_speed.moments_over_square(name, tuple(shares)) for name in rudder_and_speed.SHIPS]
+    np.testing.assert_allclose(found, [instantaneous, nominal], rtol=0.005)
+    assert np.ptp(found[1]) < 0.02 * found[1][0] and found[0][-1] < 0.35 * found[0][0]
+
+
+def test_the_mariner_at_nominal_speed_turns_within_the_imo_diameter_and_overshoots_as_before() -> None:
+    turns = {name: t2s.load(name).turn(35).figures["tactical_diameter_lengths"] for name in rudder_and_speed.SHIPS}
+    assert turns["mariner-nominal"] == pytest.approx(4.96, abs=0.02) and turns["mariner"] == pytest.approx(
+        6.40, abs=0.02
+    )
+    zigzags = [t2s.load(name).zigzag(10, 10).figures["overshoot_1_deg"] for name in rudder_and_speed.SHIPS]
+    assert zigzags[0] == pytest.approx(zigzags[1], abs=0.1)

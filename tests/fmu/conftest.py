@@ -16,8 +16,8 @@ from fmpy.model_description import read_model_description
 
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.dynamics import build
-from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.files import write_whole
 from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import ExportedFmu, write_fmu
@@ -176,7 +176,7 @@ def fmu_file(models: dict[str, Model], session_folder: Path) -> Callable[[str, i
 @pytest.fixture(scope="session")
 def mariner(mariner_card: ManoeuvringCard) -> Model:
     """The model of which FMUs of this ship are made."""
-    return with_external_forces(build(mariner_card))
+    return with_simulator_interface(build(mariner_card))
 
 
 @pytest.fixture(scope="session")

@@ -30,6 +30,12 @@ def steps(fmu: RunningFmu, count: int, size: float = 0.1, begin: float = 0.0) ->
     return fmu.read(STATES)
 
 
+def time_of(fmu: RunningFmu) -> float:
+    """Time of an instance: value reference 0, which FMI 2 does not have in its description."""
+    read = fmu.instance.getReal if fmu.unpacked.fmi == 2 else fmu.instance.getFloat64
+    return float(read([0])[0])
+
+
 def untyped(fmu: RunningFmu) -> ctypes.CDLL:
     """The same library without FMPy's checks of argument types, to hand it what FMPy would not."""
     return ctypes.CDLL(fmu.instance.dll._name)

@@ -104,3 +104,50 @@ def aground(tmp_path_factory) -> UnpackedFmu:
     with zipfile.ZipFile(folder / "ship.fmu") as archive:
         archive.extractall(folder)
     return UnpackedFmu(folder, read_model_description(str(folder), validate=False))
+
+
+class Lines:
+    """What an FMU has logged."""
+
+    def __init__(self, fmu) -> None:
+        self.fmu = fmu
+
+    def with_text(self, text: str) -> list[str]:
+        return [line for line in self.fmu.log if text in line]
+
+
+def test_each_cause_of_a_lower_validity_is_logged_once(unpacked_ship) -> None:
+    with running(unpacked_ship, "CoSimulation") as fmu:
+        fmu.initialise({"rudder.command": 0.6, "wind.speed": 0.0, "current.speed": 0.0})
+        for place in range(300):
+            fmu.instance.doStep(currentCommunicationPoint=float(place), communicationStepSize=1.0)
+            if place == 0:
+                assert fmu.read(["validity"]) == [1.0] and not Lines(fmu).with_text("validity_by")
+            if place == 200:
+                fmu.write({"propeller.speed": -N0})
+            validity, *factors = fmu.read(["validity", *FACTORS])
+            assert validity == pytest.approx(np.prod(factors), abs=1e-12)
+        logged = {name: len(Lines(fmu).with_text(name)) for name in FACTORS}
+    assert logged["validity_by.low_speed"] == 1
+    assert set(logged.values()) <= {0, 1}
+
+
+FACTORS = [f"validity_by.{cause}" for cause in ("low_speed", "high_speed", "drift", "yaw_rate", "rudder")]
+
+
+def test_an_input_beyond_its_bounds_is_refused_or_held_as_a_parameter_says(unpacked_ship) -> None:
+    """90 is an order in rpm where rad/s belong."""
+    with running(unpacked_ship, "CoSimulation") as fmu:
+        fmu.initialise({})
+        with pytest.raises(Exception, match="fmi"):
+            fmu.write({"propeller.speed": 90.0})
+        assert fmu.read(["propeller.speed"]) == pytest.approx([N0])
+    with running(unpacked_ship, "CoSimulation") as fmu:
+        fmu.initialise({"solver.clamp_inputs": True})
+        for order in (90.0, -90.0, 95.0):
+            fmu.write({"propeller.speed": order})
+            assert fmu.read(["propeller.speed"]) == pytest.approx([np.sign(order) * 3 * N0])
+        assert len(Lines(fmu).with_text("propeller.speed = 90 is held at")) == 1
+        assert len(Lines(fmu).with_text("is held at")) == 1
+        with pytest.raises(Exception, match="fmi"):
+            fmu.write({"current.speed": float("nan")})

@@ -16,8 +16,8 @@ from scipy.integrate import solve_ivp
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Model, Parameter
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
 from tank2sim.fmu.check import LIMITS, compare_with_model
 from tank2sim.fmu.comparison import description_differences
@@ -48,7 +48,7 @@ def test_an_fmu_agrees_with_its_model(
 def test_a_bundled_ship_agrees_with_its_model(
     ship: str, fmi: int, mariner_fmu: Callable[[int], Path], tmp_path: Path
 ) -> None:
-    model, path = with_external_forces(build(read_card(ship))), tmp_path / "x.fmu"
+    model, path = with_simulator_interface(build(read_card(ship))), tmp_path / "x.fmu"
     if ship == "mariner":
         path = mariner_fmu(fmi)
     else:

@@ -20,7 +20,7 @@ from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tests.fmu.conftest import quantity, state, tunable
-from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, by_casadi, steps, untyped
+from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, by_casadi, steps, time_of, untyped
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 
@@ -34,7 +34,7 @@ def test_a_thousand_steps_of_a_microsecond_are_one_of_a_millisecond(fmi: int, in
     for fmu in (many, one):
         steps(fmu, 1000, 0.1)  # far from 0, where a microsecond is near what a time can tell
     assert steps(many, 1000, 1e-6, begin=100.0) == pytest.approx(steps(one, 1, 1e-3, begin=100.0), rel=1e-12)
-    assert many.read(["time"]) == pytest.approx([100.001], abs=1e-12)
+    assert time_of(many) == pytest.approx(100.001, abs=1e-12)
 
 
 @FMI
@@ -141,7 +141,7 @@ def test_output_derivatives_are_the_rates_at_which_outputs_change(
     values = []
     for _ in range(3):
         values.append(np.array(fmu.read(names)))
-        fmu.instance.doStep(fmu.read(["time"])[0], width)
+        fmu.instance.doStep(time_of(fmu), width)
     (fmu.instance.setFMUstate if fmi == 2 else fmu.instance.setFMUState)(state)
     (fmu.instance.freeFMUstate if fmi == 2 else fmu.instance.freeFMUState)(state)
     found = np.array(output_derivatives(fmu, names))

@@ -16,6 +16,7 @@ import vl_convert
 from lxml import etree
 from PIL import Image
 
+import tank2sim as t2s
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.interface import interface
@@ -71,6 +72,7 @@ def test_a_ship_has_terminals_for_what_a_bridge_is_wired_to(mariner: Model) -> N
         "angle": "rudder.angle",
         "command": "rudder.command",
         "failed": "steering.failed",
+        **{letter: f"rudder.{letter}" for letter in "XYN"},
     }
     assert {"x", "y", "psi", "u", "v", "r", "sog", "cog"} <= set(found["motion"])
     assert set(found["position"]) == {"latitude", "longitude"}
@@ -205,3 +207,31 @@ def test_the_engine_of_osp_joins_ship_and_autopilot_by_their_groups(
     words = [line.split()[1] for line in ended.stdout.splitlines() if line.startswith("heading")]
     assert words, ended.stderr[-1500:]
     assert float(words[0]) == pytest.approx(0.3, abs=2e-3)
+
+
+def test_beside_the_fmu_osp_finds_a_system_of_the_ship(tmp_path: Path) -> None:
+    t2s.load("mariner").to_fmu(tmp_path / "my ship.fmu", fmi=2, osp=True)
+    described = fmpy.read_model_description(str(tmp_path / "my ship.fmu"), validate=False)
+    inputs = {one.name for one in described.modelVariables if one.causality == "input"}
+    root = etree.parse(tmp_path / "OspSystemStructure.xml").getroot()
+    space = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
+    (simulator,) = root.iter(f"{space}Simulator")
+    assert simulator.get("source") == "my ship.fmu"
+    assert {one.get("variable") for one in root.iter(f"{space}InitialValue")} == inputs
+    beside = tmp_path / f"{described.modelName}_OspModelDescription.xml"
+    assert beside.read_bytes() == entry(tmp_path / "my ship.fmu", OSP_FILE)
+
+
+@pytest.mark.slow
+def test_the_engine_of_osp_runs_the_system_that_is_beside_the_fmu(tmp_path: Path) -> None:
+    pytest.importorskip("libcosimpy", reason="libcosimpy is not installed")
+    t2s.load("mariner").to_fmu(tmp_path / "ship.fmu", fmi=2, osp=True)
+    text = (tmp_path / "OspSystemStructure.xml").read_text(encoding="utf-8")
+    ordered = text.replace('"rudder.command"><Real value="0.0"/>', '"rudder.command"><Real value="0.3"/>')
+    assert ordered != text
+    (tmp_path / "OspSystemStructure.xml").write_text(ordered, encoding="utf-8")
+    command = [sys.executable, "-c", _LIBCOSIM.replace("1800", "200"), str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    words = [line.split()[1] for line in ended.stdout.splitlines() if line.startswith("heading")]
+    assert words, ended.stderr[-1500:]
+    assert float(words[0]) > 0.5

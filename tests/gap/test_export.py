@@ -115,6 +115,8 @@ def test_figures_stand_before_and_after() -> None:
 
 def test_every_parameter_of_the_library_is_read_back_as_it_was() -> None:
     for effect in EFFECTS.values():
+        if not effect.sought:  # of two effects with one input it is the one that is sought
+            continue
         for parameter, variable in effect.model_names().items():
             key, value = in_file_units(parameter, 0.3)
             assert "rad" not in key.rpartition("_")[2]

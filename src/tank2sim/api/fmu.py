@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.external_forces import with_external_forces
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
 from tank2sim.fmu.documents import documents_of, documents_without_card
 from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
+from tank2sim.fmu.osp import osp_system
 from tank2sim.fmu.platforms import named_platforms
 from tank2sim.fmu.unpacking import embedded_card
 
@@ -138,6 +139,7 @@ def make_fmu_file(
     platforms: str = "host",
     ssp: Path | None = None,
     sources: bool = True,
+    osp: bool = False,
     report: Callable[[str], None] = lambda _: None,
 ) -> ExportResult:
     """Make the FMU of a ship, without writing it: its bytes are in ``files``. Raises as :meth:`.Ship.to_fmu`.
@@ -150,11 +152,13 @@ def make_fmu_file(
         As in :meth:`.Ship.to_fmu`.
     ssp : Path, optional
         Also an SSP package in which a heading autopilot steers the ship.
+    osp : bool
+        Also the files of :func:`tank2sim.fmu.osp.osp_system`, next to the FMU.
     report : callable
         Called with the stage that begins.
     """
     chosen = named_platforms(platforms)
-    model = with_external_forces(ship.model)
+    model = with_simulator_interface(ship.model)
     if sources:
         made = make_fmu(model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
     else:
@@ -165,6 +169,8 @@ def make_fmu_file(
         from tank2sim.fmu.ssp import ship_with_autopilot
 
         files[ssp] = ship_with_autopilot(model, made, platforms=chosen, report=report)
+    if osp:
+        files |= {path.parent / name: text for name, text in osp_system(model, path.name).items()}
     return ExportResult(ship, path, made, ssp, files)
 
 
@@ -188,4 +194,4 @@ def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     text = embedded_card(Path(path)) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else card.model
-    return CheckResult(check_against_model(Path(path), model=model and with_external_forces(model)))
+    return CheckResult(check_against_model(Path(path), model=model and with_simulator_interface(model)))

@@ -191,6 +191,13 @@ class OperatingPointKeys(_Part):
     rudder_deg: float
 
 
+class SteadySpeedKeys(TypedDict):
+    """A speed straight ahead that the engine holds."""
+
+    speed_mps: Number
+    stable: bool
+
+
 class StabilityKeys(_Keys):
     """Stability, steady turning and IMO criteria."""
 
@@ -206,6 +213,7 @@ class StabilityKeys(_Keys):
     characteristic: dict[str, Any] | None
     spirals: dict[str, dict[str, Any] | None]
     imo: list[ImoKeys]
+    steady_speeds: list[SteadySpeedKeys]
     notices: list[str]
     ensemble: NotRequired[StabilityEnsembleKeys]
 

@@ -596,7 +596,9 @@ class Ship:
             write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
         return result
 
-    def to_fmu(self, path: str | Path, *, fmi: int = 3, platforms: str = "host", sources: bool = True) -> ExportResult:
+    def to_fmu(
+        self, path: str | Path, *, fmi: int = 3, platforms: str = "host", sources: bool = True, osp: bool = False
+    ) -> ExportResult:
         """Write the FMU (Model Exchange and Co-Simulation).
 
         Parameters
@@ -608,6 +610,9 @@ class Ship:
             ``host``, ``all``, or names of FMI 3 with commas between (``x86_64-linux,x86_64-windows``).
         sources : bool
             False: without C sources, ship card and coefficients, which are then constants of the library.
+        osp : bool
+            Also write ``OspSystemStructure.xml`` and the OSP model description next to the FMU, for the Open Simulation
+            Platform.
 
         Raises
         ------
@@ -616,7 +621,7 @@ class Ship:
         """
         from tank2sim.api.fmu import make_fmu_file
 
-        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources)
+        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources, osp=osp)
         write_together(made.files, inputs=[Path(self.card.source)])
         return made
 

@@ -96,7 +96,9 @@ class StabilityResult(PagedResult):
             f"{found.name} at {found.speed_mps:.4g} m/s (drift {found.drift_deg:.3g} deg, rudder "
             f"{found.rudder_deg:.3g} deg) is {verdict} on a straight course: {_margin_text(self.study)}"
         )
+        check = [notice for notice in self.study.notices if notice.startswith("CHECK")]
         return (
+            *check,
             course,
             *_turning_text(self.study),
             *_stable_text(self.bands),

@@ -39,6 +39,9 @@ from tank2sim.fmu.platforms import PLATFORMS
     metavar="SYSTEM.ssp",
     help="Also an SSP package in which a heading autopilot steers the ship.",
 )
+@click.option(
+    "--osp", is_flag=True, help="Also OspSystemStructure.xml and the OSP model description, next to the FMU (FMI 2)."
+)
 @json_option
 def command(
     card: str,
@@ -48,11 +51,14 @@ def command(
     values: dict[str, object],
     sources: bool,
     ssp: Path | None,
+    osp: bool,
     json_file: Path | None,
 ) -> None:
     """Write the FMU (Model Exchange and Co-Simulation) of CARD (a file, or the name of a bundled ship)."""
     ship = load(card, values)
     with showing_stages("making the FMU") as report:
-        result = make_fmu_file(ship, output, fmi=int(fmi), platforms=platforms, ssp=ssp, sources=sources, report=report)
+        result = make_fmu_file(
+            ship, output, fmi=int(fmi), platforms=platforms, ssp=ssp, sources=sources, osp=osp, report=report
+        )
     write_result(result, [ship.card.source], json_file=json_file, files=result.files)
     show_result(result)

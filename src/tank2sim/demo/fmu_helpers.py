@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tank2sim.cards import Card
 from tank2sim.dynamics import Model
-from tank2sim.dynamics.external_forces import with_external_forces
+from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 from tank2sim.fmu.check import CheckReport, compare_with_model
@@ -58,7 +58,7 @@ class Workshop:
         InputError
             The FMU differs from the model, or is not valid: the demo would show something untrue.
         """
-        path, model = self.folder / f"{name}-fmi{fmi}.fmu", with_external_forces(model)
+        path, model = self.folder / f"{name}-fmi{fmi}.fmu", with_simulator_interface(model)
         self.begin(f"{path.name}: exporting")
         write_fmu(model, path, fmi=fmi, documents=documents_of(card))
         self.files.append(path.name)

@@ -12,6 +12,7 @@ from tank2sim.dynamics.effects import EFFECTS, Effect
 from tank2sim.dynamics.glider import glider_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
+from tank2sim.dynamics.simulator_interface import force_shares
 from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.units import from_si
@@ -97,4 +98,8 @@ def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place:
             key, shown = card.in_file(f"{place}.parameters.{name}", value)
             lowest, highest = (from_si(key, bound) for bound in (parameter.lowest(card), parameter.maximum))
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
-    return effect.apply(model, entry.parameters, card)
+    changed = effect.apply(model, entry.parameters, card)
+    # One that changes derivatives has no force of its own.
+    if effect.acts_on != "force" or effect.reads_derivatives or effect.changes:
+        return changed
+    return changed.extend(*force_shares(model, changed, entry.name))

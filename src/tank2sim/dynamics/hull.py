@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,6 +35,10 @@ Project choice: forces grow with the square of speed, so 20 % of speed is 44 % o
 DRIFT_MARGIN, YAW_RATE_MARGIN, RUDDER_MARGIN = 0.5, 1.0, 0.35
 """Beyond the largest abs(v'), abs(r') and abs(delta) (rad) of the card ``validity`` falls from 1 to 0 over these: those
 of v' and r' are what captive tests usually reach, that of the rudder 20 deg. Project choice."""
+
+
+VALIDITY_FACTOR = "validity_by."
+"""First part of the names of the factors of ``validity``, one for each cause (``validity_by.drift``)."""
 
 
 @dataclass(frozen=True)
@@ -304,7 +309,7 @@ def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quanti
     )
 
 
-def _inside(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
+def inside_range(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
     """1 without excess, falling smoothly to 0 where it is the margin."""
     beyond = ca.fmax(0, ca.fmin(1, excess / margin))
     return 1 - beyond * beyond * (3 - 2 * beyond)
@@ -331,11 +336,31 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     )
     u0 = hull["ship.speed"]
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
-    inside = (
-        _inside(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
-        * _inside(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN)
-        * _inside(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN)
-        * _inside(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN)
+    factors = tuple(
+        validity_factor(name, description, value)
+        for name, description, value in (
+            ("low_speed", "low speed and motion astern", 1 - share_out_of_range(hull.symbols)),
+            (
+                "high_speed",
+                "speed above ship.fastest",
+                inside_range(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0),
+            ),
+            (
+                "drift",
+                "drift angle",
+                inside_range(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN),
+            ),
+            (
+                "yaw_rate",
+                "yaw rate r L/U",
+                inside_range(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN),
+            ),
+            (
+                "rudder",
+                "rudder angle",
+                inside_range(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN),
+            ),
+        )
     )
     low = Quantity(
         name="low_speed.share",
@@ -355,6 +380,18 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         ),
         minimum=0.0,
         maximum=1.0,
-        value=(1 - share_out_of_range(hull.symbols)) * inside,
+        value=math.prod((factor.symbol for factor in factors), start=ca.SX(1)),
     )
-    return speed, drift, low, validity
+    return speed, drift, low, *factors, validity
+
+
+def validity_factor(name: str, cause: str, value: ca.SX) -> Quantity:
+    """Factor ``validity_by.<name>`` of ``validity``: 1 where the model holds for that `cause`, falling to 0 beyond."""
+    return Quantity(
+        name=f"{VALIDITY_FACTOR}{name}",
+        unit="1",
+        description=f"Factor of validity by {cause}: 1 where the model holds, falling to 0 beyond",
+        minimum=0.0,
+        maximum=1.0,
+        value=value,
+    )

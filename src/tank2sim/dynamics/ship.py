@@ -15,7 +15,7 @@ from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
-from tank2sim.dynamics.hull import Hull, motion_quantities, polynomial_forces
+from tank2sim.dynamics.hull import VALIDITY_FACTOR, Hull, motion_quantities, polynomial_forces
 from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
 from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
@@ -40,6 +40,7 @@ _OUTPUTS = (
     *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
     *("motion.udot", "motion.vdot", "motion.rdot", "rudder.angle"),
     *("force.X", "force.Y", "force.N", "validity"),
+    *(f"{VALIDITY_FACTOR}{cause}" for cause in ("low_speed", "high_speed", "drift", "yaw_rate", "rudder")),
 )
 
 

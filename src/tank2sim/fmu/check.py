@@ -18,7 +18,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.export import without_coefficients
-from tank2sim.fmu.interface import MAX_STEP, interface
+from tank2sim.fmu.interface import CLAMP_SWITCH, MAX_STEP, interface
 from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.process import Drive, drive_apart
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors, relative_errors
@@ -124,7 +124,10 @@ def _compare(
         "ModelExchange": exactly,
         "CoSimulation": by_scheme,
     }
-    parameters = {parameter.name: float(parameter.start) for parameter in model.parameters} | {MAX_STEP: model.step_s}
+    parameters = {parameter.name: float(parameter.start) for parameter in model.parameters} | {
+        MAX_STEP: model.step_s,
+        CLAMP_SWITCH: 0.0,
+    }
     names = {"inputs": model.input_names, "outputs": model.outputs, "parameters": tuple(parameters)}
     errors: dict[FmuType, dict[str, float]] = {}
     with ThreadPoolExecutor() as pool:  # the FMU runs in its processes while this one calculates what to expect

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from tank2sim.dynamics.event_indicators import kinks
+from tank2sim.dynamics.hull import VALIDITY_FACTOR
 from tank2sim.dynamics.model import Input, Model, Parameter, Variable
 from tank2sim.units import UNITS
 
@@ -16,6 +17,9 @@ TRIM_SWITCH = "initial.trim"
 """Boolean parameter that asks for a start in steady motion."""
 
 MAX_STEP = "solver.max_step"
+
+CLAMP_SWITCH = "solver.clamp_inputs"
+"""Boolean parameter that asks for inputs to be held within their bounds instead of refused."""
 
 # The structured names of FMI 2.0 (2.2.9), except for quoted parts, which C and file names do not allow.
 _STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
@@ -78,7 +82,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Interface:
-    """All variables of an FMU, in blocks: time, states, inputs, parameters, largest step, rates, other outputs.
+    """All variables of an FMU, in blocks: time, states, inputs, parameters, two of the solver, rates, other outputs.
 
     The event indicators (:func:`tank2sim.dynamics.event_indicators.kinks`) are the last of the other outputs.
     A state or its rate that is an output of the model is in its own block, with causality output. Boolean inputs
@@ -106,6 +110,16 @@ class Interface:
         """Value reference of the largest internal step of Co-Simulation."""
         return self.parameters.end
 
+    @property
+    def clamp_switch(self) -> int:
+        """Value reference of ``solver.clamp_inputs``."""
+        return self.parameters.end + 1
+
+    @cached_property
+    def validity_factors(self) -> tuple[int, ...]:
+        """Value references of the factors of ``validity``, one for each cause."""
+        return tuple(variable.reference for variable in self.variables if variable.name.startswith(VALIDITY_FACTOR))
+
     @cached_property
     def by_name(self) -> dict[str, FmuVariable]:
         """The variables by name."""
@@ -130,7 +144,7 @@ def interface(model: Model) -> Interface:
     states = Block("STATES", 1, 1 + counts[0])
     inputs = Block("INPUTS", states.end, states.end + counts[1])
     parameters = Block("PARAMETERS", inputs.end, inputs.end + counts[2])
-    rates = Block("RATES", parameters.end + 1, parameters.end + 1 + counts[0])
+    rates = Block("RATES", parameters.end + 2, parameters.end + 2 + counts[0])
     indicated = kinks(model)
     outputs = Block("OUTPUTS", rates.end, rates.end + len(others) + len(indicated))
     indicators = Block("INDICATORS", outputs.end - len(indicated), outputs.end)
@@ -142,6 +156,7 @@ def interface(model: Model) -> Interface:
         *(_input(variable, inputs.begin + place) for place, variable in enumerate(model.inputs)),
         *(_parameter(variable, parameters.begin + place) for place, variable in enumerate(model.parameters)),
         _max_step(model, parameters.end),
+        _clamp_switch(parameters.end + 1),
         *(_rate(model, name, place, (states, rates)) for place, name in enumerate(rate_names)),
         *(_calculated(model, model[name], outputs.begin + place) for place, name in enumerate(others)),
         *(_calculated(model, kink, indicators.begin + place) for place, kink in enumerate(indicated)),
@@ -253,6 +268,20 @@ def _max_step(model: Model, reference: int) -> FmuVariable:
         nominal=model.step_s,
         minimum=0.0,
         start=model.step_s,
+    )
+
+
+def _clamp_switch(reference: int) -> FmuVariable:
+    return FmuVariable(
+        name=CLAMP_SWITCH,
+        reference=reference,
+        description="True: an input beyond its bounds is held at the nearer bound, with a warning in the log once for "
+        "each input. False: it is refused",
+        causality="parameter",
+        variability="fixed",
+        initial="exact",
+        start=0.0,
+        boolean=True,
     )
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tank2sim.fmu.interface import FmuVariable, Interface
+from tank2sim.dynamics.model import Model
+from tank2sim.fmu.interface import FmuVariable, Interface, interface
+from tank2sim.fmu.templates import render
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,26 @@ _MOTION: dict[str, Parts] = {
     "rudder_feedback": (("AngularDisplacement", "rudder_feedback.angle", {"rudder.angle": "z"}),),
     "heading_order": (("AngularDisplacement", "heading_order.angle", {"heading.command": "z"}),),
 }
+
+
+def osp_system(model: Model, file: str) -> dict[str, str]:
+    """Name to text of the files that the engine of OSP wants next to the FMU `file`.
+
+    ``OspSystemStructure.xml`` is a system of this ship alone, with the start of each input to change, at steps that are
+    ten times the model's; ``<model name>_OspModelDescription.xml`` has the groups of variables by which ships are
+    joined.
+    """
+    described = interface(model)
+    step = float(STEPS_IN_COMMUNICATION * model.step_s)
+    values = {"step": step, "file": file, "inputs": described.with_causality("input")}
+    return {
+        "OspSystemStructure.xml": render("OspSystemStructure.xml", values),
+        f"{model.name}_OspModelDescription.xml": render("OspModelDescription.xml", {"groups": osp_groups(described)}),
+    }
+
+
+STEPS_IN_COMMUNICATION = 10
+"""Steps of the model in a communication step of the system for OSP: project choice, within a second for ships."""
 
 
 def osp_groups(interface: Interface) -> tuple[Group, ...]:

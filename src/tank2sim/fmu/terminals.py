@@ -13,6 +13,8 @@ _DESCRIPTIONS = {
     "steering": "Steering gear: rudder order and angle, failure",
     "propulsion": "Propulsion: ordered and actual revolutions",
     "force": "Hydrodynamic forces and moment on the ship",
+    "validity_by": "Factors of validity, one for each cause",
+    "squat": "Largest sinkage by squat, by two formulas",
     "external": "External force and moment: X and Y at a point x, y, and N",
     "heading": "Heading order",
     "buoyancy": "Net buoyancy: order and actual",

@@ -42,7 +42,7 @@ def test_parameters_become_named_variables_that_start_at_the_cards_values(name: 
     for parameter in effect.parameters:
         variable = model[names[parameter.name]]
         if isinstance(variable, Parameter):
-            assert variable.name == f"{name}.{re.sub('_(rad|radps|mps|m|s|prime)$', '', parameter.name)}"
+            assert variable.name == f"{name}.{re.sub('_(rad|radps|mps|m|s|N|prime)$', '', parameter.name)}"
             assert variable.tunable and (variable.minimum, variable.maximum) == (parameter.minimum, parameter.maximum)
         if parameter.name in given:
             assert variable.start == pytest.approx(given[parameter.name])

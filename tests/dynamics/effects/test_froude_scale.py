@@ -82,6 +82,9 @@ def seen_of(model: Model, at: Mapping[str, float]) -> np.ndarray:
     return np.array(seen(model)(x, u, model.parameter_values())).ravel()
 
 
+GIVEN = [name for name, effect in EFFECTS.items() if not effect.sought]
+"""What is given, and never sought in trials."""
+
 CAN_VANISH = [name for name, effect in EFFECTS.items() if any(one.absent is not None for one in effect.parameters)]
 
 
@@ -98,12 +101,24 @@ def test_an_absent_effect_changes_neither_rates_nor_readings(name: str, share: t
 
 def test_what_never_vanishes_replaces_something_or_needs_depth() -> None:
     never = set(EFFECTS) - set(CAN_VANISH)
-    assert never == {"loaded_rudder", "rudder_rate_limit", "rudder_lag", "telemotor_lag", "engine_lag", "water_depth"}
+    assert never == {
+        "loaded_rudder",
+        "rudder_rate_limit",
+        "rudder_lag",
+        "telemotor_lag",
+        "engine_lag",
+        "engine_telegraph",
+        "water_depth",
+        "finite_depth",
+    }
 
 
 def test_what_trials_show_is_tried_and_only_required_parameters_and_those_with_a_spread_are_free() -> None:
     card = card_with()
-    assert [name for name, effect in EFFECTS.items() if not effect.tried(card)] == ["engine_lag", "water_depth"]
+    assert [name for name, effect in EFFECTS.items() if effect.sought and not effect.tried(card)] == [
+        "engine_lag",
+        "water_depth",
+    ]
     coefficients = ("surge_coefficient", "sway_coefficient", "yaw_coefficient")
     expected = ("speed_mps", "direction_rad", *coefficients, "centroid_forward_m", "still_air")
     assert EFFECTS["wind"].free(card) == expected
@@ -131,7 +146,7 @@ def test_sizes_lie_within_bounds_on_small_models_and_large_ships(length: float) 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_sizes_of_a_model_are_those_of_its_ship_by_froudes_law(name: str) -> None:
-    powers = {"m": 1.0, "s": 0.5, "mps": 0.5, "radps": -0.5}
+    powers = {"N": 3.0, "m": 1.0, "s": 0.5, "mps": 0.5, "radps": -0.5}
     ship, model = card_with(), smaller()
     for one in EFFECTS[name].parameters:
         factor = FROUDE ** powers.get(one.name.rpartition("_")[2], 0.0)
@@ -165,7 +180,7 @@ def bare_track() -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in EFFECTS if name not in ("rudder_time_offset", "water_depth", "engine_lag")]
+    "name", [name for name in EFFECTS if name not in ("rudder_time_offset", "water_depth", "engine_lag", *GIVEN)]
 )
 def test_an_effect_of_usual_size_shows_in_a_manoeuvre_but_is_no_other_ship(name: str) -> None:
     card = card_with()

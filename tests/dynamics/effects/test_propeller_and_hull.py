@@ -89,6 +89,17 @@ def test_an_engine_with_a_lag_may_start_at_rest_and_trims_at_its_order() -> None
     assert 0.5 * U0 < trimmed.state("motion.u") < 0.9 * U0
 
 
+def test_the_engine_of_a_ship_at_the_berth_is_stopped_unless_its_revolutions_are_set() -> None:
+    integrator = Integrator(LAGGING, compiled=False)
+    berthed = Running(integrator, {"propeller.speed": 0.0}, {"initial.u": 0.0})
+    assert berthed.state("engine_lag.speed") == 0.0
+    berthed.run(120.0)
+    assert abs(berthed.state("motion.u")) < 1e-9
+    turning = Running(integrator, {"propeller.speed": 0.0}, {"initial.u": 0.0, "initial.propeller_speed": 3.0})
+    assert turning.state("engine_lag.speed") == 3.0
+    assert Running(integrator, {}, {"initial.u": 0.1}).state("engine_lag.speed") == pytest.approx(N0)
+
+
 def test_thrust_and_droop_follow_what_the_engine_has_reached() -> None:
     model = ship({"engine_lag": {"time_constant_s": 15.0}, "engine_droop": {"droop": 0.4}})
     at = {"motion.u": 0.75 * U0, "engine_lag.speed": 8.0, "propeller.speed": 3.0}

@@ -21,7 +21,7 @@ from tank2sim.errors import InputError
 from tank2sim.gap.outcome.improve_card import add_effects_to_card
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
-SIZES = {"time_constant_s": 2.0, "depth_m": 1.5}
+SIZES = {"start_s": 1.0, "reversal_s": 4.0, "time_constant_s": 2.0, "depth_m": 1.5}
 
 
 def ship_of(text: str) -> t2s.Ship:

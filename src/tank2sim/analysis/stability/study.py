@@ -10,6 +10,7 @@ from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.margin import Margin, stability_margin
 from tank2sim.analysis.stability.response import SteeringResponse, steering_responses
+from tank2sim.analysis.stability.steady_speeds import FASTEST, SteadySpeed, steady_speeds
 from tank2sim.analysis.stability.straight_line import Stability, stability
 from tank2sim.analysis.stability.trim import TrimEffect, trim_effect
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic, steering_characteristic
@@ -40,6 +41,8 @@ class StabilityStudy:
         Simulated spirals; None if not requested or not possible.
     imo : tuple of ImoCriterion
         At the speed of expansion.
+    steady_speeds : tuple of SteadySpeed
+        Speeds straight ahead that the engine holds at the revolutions of the start.
     notices : tuple of str
         Messages for the user.
     """
@@ -53,6 +56,7 @@ class StabilityStudy:
     direct: SpiralPoints | None
     reverse: SpiralPoints | None
     imo: tuple[ImoCriterion, ...]
+    steady_speeds: tuple[SteadySpeed, ...]
     notices: tuple[str, ...]
 
     def as_json(self) -> dict[str, object]:
@@ -69,6 +73,7 @@ class StabilityStudy:
                 "reverse": self.reverse and self.reverse.as_json(),
             },
             "imo": [criterion.as_json() for criterion in self.imo],
+            "steady_speeds": [vars(speed) for speed in self.steady_speeds],
             "notices": list(self.notices),
         }
 
@@ -91,6 +96,8 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         *_about_effects(found),
         *_about_weather(model),
     ]
+    held = steady_speeds(model)
+    notices += _about_steady_speeds(held)
     turning, direct, reverse = None, None, None
     try:
         turning = steady_turning(model)
@@ -110,6 +117,7 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         direct=direct,
         reverse=reverse,
         imo=imo_criteria(model),
+        steady_speeds=held,
         notices=tuple(notices),
     )
 
@@ -134,6 +142,22 @@ def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]
             f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
         )
     return messages
+
+
+def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[str]:
+    stable = [f"{speed.speed_mps:.4g}" for speed in held if speed.stable]
+    if not held:
+        return [
+            "no steady speed straight ahead: the surge force at the revolutions of the start does not vanish below "
+            f"{FASTEST:g} times the speed of expansion, and such a run leaves the card's range"
+        ]
+    if len(stable) < 2:
+        return []
+    return [
+        f"CHECK: {len(stable)} stable speeds straight ahead at the same revolutions ({', '.join(stable)} m/s): the "
+        "ship goes at one or another as it comes from below or above, which no ship does; check the terms of X in u "
+        "and low_speed_below_mps"
+    ]
 
 
 def _about_effects(found: Stability) -> list[str]:

@@ -1,9 +1,12 @@
 """Physical effects on top of the polynomial: each a function from model to model."""
 
 from tank2sim.dynamics.effects import (
+    depth,
     derivatives,
     dynamic_effects,
+    fields,
     gear,
+    harbour,
     hull,
     loaded_rudder,
     propeller,
@@ -20,6 +23,8 @@ EFFECTS: Registry[Effect] = Registry(
     (
         surroundings.CURRENT,
         surroundings.WIND,
+        fields.CURRENT_FIELD,
+        fields.WIND_FIELD,
         surroundings.WAVE_DRIFT,
         surroundings.BANK_SUCTION,
         propeller.PROPELLER_SIDE_FORCE,
@@ -27,6 +32,11 @@ EFFECTS: Registry[Effect] = Registry(
         propeller.LOADING_SIDE_FORCE,
         propeller.ENGINE_DROOP,
         propeller.ENGINE_LAG,
+        propeller.ENGINE_TELEGRAPH,
+        propeller.REVERSED_THRUST,
+        harbour.BOW_THRUSTER,
+        harbour.STERN_THRUSTER,
+        harbour.TUG_FORCES,
         rudder.RUDDER_BIAS,
         rudder.RUDDER_EFFECTIVENESS,
         rudder.RUDDER_SLIPSTREAM,
@@ -50,6 +60,7 @@ EFFECTS: Registry[Effect] = Registry(
         derivatives.LINEAR_SWAY_DAMPING,
         derivatives.SHALLOW_WATER,
         derivatives.WATER_DEPTH,
+        depth.FINITE_DEPTH,
         derivatives.TRIM,
         dynamic_effects.ROLL_COUPLING,
         dynamic_effects.FLOW_MEMORY,

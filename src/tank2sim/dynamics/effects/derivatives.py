@@ -207,11 +207,12 @@ AGROUND = 0.95
 """Largest draught over depth: at 1 the ship is aground, and the fit of the source ends before. Project choice."""
 
 
-def _least_depth(card: ManoeuvringCard) -> float:
+def least_depth(card: ManoeuvringCard) -> float:
+    """Depth of the water (m) below which no ship of this draught floats with water under it."""
     return model_particular(card, "draught_m") / AGROUND
 
 
-def _at_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def at_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y_v, N_v, N_r times f = 1/(1 - h)^n - h with h = T/H, as input ``water.depth`` says.
 
     n = 0.40 Cb B/T for Y_v, 0.425 Cb B/T for N_v, 1.5 - 14.28 T/L for N_r: Kijima, Katsuno, Nakiri and Furukawa (1990),
@@ -233,9 +234,9 @@ WATER_DEPTH = Effect(
     source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
     parameters=(
         # Not sought in trials: what they show of shallow water is one factor, that of SHALLOW_WATER.
-        EffectParameter("depth_m", "depth of the water", _least_depth, 1e4, input_name="water.depth"),
+        EffectParameter("depth_m", "depth of the water", least_depth, 1e4, input_name="water.depth"),
     ),
-    equations=_at_depth,
+    equations=at_depth,
     reads_derivatives=True,
     terminal="Water under the ship",
 )

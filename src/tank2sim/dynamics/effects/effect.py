@@ -12,7 +12,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
 
-_UNITS = {"mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s", "prime": "1"}
+_UNITS = {"mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s", "N": "N", "prime": "1"}
 """Suffix of a parameter's name to its unit; a name without one of these has unit 1."""
 
 _SHOWN = {"rad": "deg", "radps": "deg/s", "mps": "knots"}
@@ -21,6 +21,10 @@ STEPS_PER_TIME_CONSTANT = 5
 """Integration steps in a time constant, as for the steering gear: classical Runge-Kutta then errs by less than 1e-5 of
 the change, (1/5)^5/120, in each step."""
 
+
+BEYOND_CARD = 2.0
+"""Largest speed or length that an input takes over the largest that a card may give: a hurricane and a depth of the
+ocean are within, an order in a wrong unit seldom is. Project choice."""
 
 Values = tuple[float, ...]
 
@@ -104,8 +108,11 @@ class EffectParameter:
                 unit=unit,
                 description=description,
                 display_unit=_SHOWN.get(suffix),
-                # A direction may go round and round, and a negative speed is one the other way; no largest is known.
-                minimum=None if unit in ("rad", "m/s") else self.lowest(card),
+                # A direction may go round and round, and a negative speed is one the other way.
+                minimum={"rad": None, "m/s": -BEYOND_CARD * self.maximum}.get(unit, self.lowest(card)),
+                maximum={"rad": None, "m/s": BEYOND_CARD * self.maximum, "m": BEYOND_CARD * self.maximum}.get(
+                    unit, self.maximum
+                ),
                 start=value,
             )
         return Parameter(
@@ -189,6 +196,9 @@ class Effect:
         True if the equations of the MMG method have it already: it is not for such a card.
     in_roll : bool
         True if a card with ``[roll]`` has it already: it is not for such a card.
+    sought : bool
+        False if it is not to be tried on trials: what it describes is given, not found, or another effect is sought in
+        its place.
     terminal : str
         What its inputs are together, a few words for the FMI terminal that joins them.
     """
@@ -211,6 +221,7 @@ class Effect:
     terminal: str = ""
     in_mmg: bool = False
     in_roll: bool = False
+    sought: bool = True
 
     @property
     def looks_like(self) -> str:
@@ -243,10 +254,23 @@ class Effect:
 
     def tried(self, card: ManoeuvringCard) -> bool:
         """True if a search can begin: this ship's model can have it, and required parameters have typical values."""
-        if (self.in_mmg and card.model.kind == "mmg") or (self.in_roll and card.roll):
+        if (
+            not self.sought
+            or self._taken(card)
+            or (self.in_mmg and card.model.kind == "mmg")
+            or (self.in_roll and card.roll)
+        ):
             return False
         required = self.required()
         return all(parameter.typical_values(card) for parameter in self.parameters if parameter.name in required)
+
+    def _taken(self, card: ManoeuvringCard) -> bool:
+        """True if another effect of the card has one of its inputs (a current that changes, for a steady one)."""
+        from tank2sim.dynamics.effects import EFFECTS  # which holds this class
+
+        others = [EFFECTS.get(entry.name) for entry in card.effects if entry.name != self.name]
+        taken = {parameter.input_name for effect in others if effect for parameter in effect.parameters}
+        return any(parameter.input_name in taken for parameter in self.parameters if parameter.input_name)
 
     def changes_on(self, card: ManoeuvringCard) -> tuple[str, ...]:
         """Derivatives as in `changes`; none where they are the rudder's and the card has an MMG rudder instead."""
@@ -279,7 +303,7 @@ class Effect:
             A required value is missing.
         """
         if self.in_mmg and card.model.kind == "mmg":
-            raise card.fault("effects", f"{self.name} is part of the MMG method's own rudder", "leave it out")
+            raise card.fault("effects", f"{self.name} is part of the MMG method already", "leave it out")
         if self.in_roll and card.roll:
             raise card.fault("effects", f"{self.name} is part of the card's own [roll]", "leave one of the two out")
         variables = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.form import ASTERN_THRUST
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
@@ -36,6 +37,15 @@ def _side_force(Y: float, N: float) -> tuple[EffectParameter, EffectParameter]:
 RESISTANCE = 6e-4
 """Resistance, and so effective thrust, at u0 over 1/2 rho L^2 u0^2 where a card states no propulsion: between those of
 a tanker (5e-4) and of the Mariner (8e-4); project choice."""
+
+
+def resistance_prime(model: Model, card: ManoeuvringCard) -> ca.SX:
+    """Resistance at u0 over 1/2 rho L^2 u0^2: R_0 of an MMG card, Xnn of [propulsion], or :data:`RESISTANCE`."""
+    if card.model.kind == "mmg":
+        return -model.symbol("derivatives.X0")
+    if "propulsion.Xnn" in model:
+        return model.symbol("propulsion.Xnn")
+    return ca.SX(RESISTANCE)
 
 
 def _relative_revolutions(model: Model) -> ca.SX:
@@ -170,35 +180,48 @@ ENGINE_DROOP = Effect(
 )
 
 
-def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
-
-    ITTC 7.5-02-06-03 asks for the time constant of the engine next to that of the steering gear. A diesel that must be
-    stopped before it is reversed takes longer still.
-    """
-    if "propeller.speed_actual" not in model:
-        raise card.fault("effects", "engine_lag needs an engine", "give the card [propulsion] nominal_rpm and Xnn")
-    order = model["propeller.speed"]
-    assert isinstance(order, Input)
+def _start(model: Model, order: Input) -> tuple[Parameter, ca.SX]:
+    """Parameter ``initial.propeller_speed``, and the revolutions (rad/s) at the start that follow from it."""
     start = Parameter(
         name="initial.propeller_speed",
         unit=order.unit,
-        description="Revolutions at the start, positive ahead",
+        description=f"Revolutions at the start, positive ahead; at {order.start:g}, where it is not set, those of a "
+        "ship that starts at rest (initial.u = 0) are zero",
         display_unit=order.display_unit,
         nominal=order.nominal,
         start=order.start,
         tunable=False,
     )
-    turning = State(
-        name="engine_lag.speed",
+    berthed = ca.logic_and(model.symbol("initial.u") == 0, start.symbol == order.start)
+    return start, ca.if_else(berthed, 0, start.symbol)
+
+
+def _revolutions_reached(effect: str, order: Input, start: ca.SX) -> State:
+    return State(
+        name=f"{effect}.speed",
         unit=order.unit,
         description="Revolutions that the engine has reached, positive ahead",
         display_unit=order.display_unit,
         nominal=order.nominal,
-        derivative="engine_lag.rate",
-        start=start.symbol,
+        derivative=f"{effect}.rate",
+        start=start,
         steady=True,
     )
+
+
+def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
+
+    ITTC 7.5-02-06-03 asks for the time constant of the engine next to that of the steering gear. A diesel that must be
+    stopped before it is reversed takes longer still. The engine of a ship at the berth (``initial.u`` = 0) is stopped,
+    unless ``initial.propeller_speed`` is set.
+    """
+    if "propeller.speed_actual" not in model:
+        raise card.fault("effects", "engine_lag needs an engine", "give the card [propulsion] nominal_rpm and Xnn")
+    order = model["propeller.speed"]
+    assert isinstance(order, Input)
+    start, begun = _start(model, order)
+    turning = _revolutions_reached("engine_lag", order, begun)
     rate = Quantity(
         name="engine_lag.rate",
         unit="rad/s2",
@@ -223,4 +246,110 @@ ENGINE_LAG = Effect(
     parameters=(EffectParameter("time_constant_s", "time constant of the engine", 0.01, 600.0),),
     equations=_with_engine_lag,
     states_behind={"engine_lag.speed": "propeller.speed"},
+)
+
+
+STOP_ORDER = 0.02
+"""Revolutions over the nominal ones below which an order is Stop: a telegraph has no lower ahead. Project choice."""
+
+_CLUTCHING = 0.05
+"""Share of the way of the engine's gear in its new direction over which it takes the order: project choice."""
+
+
+def _with_telegraph(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    """An engine that must be started, and stopped before it is reversed.
+
+    A state g goes from 0 (stopped) to 1 (running ahead) or -1 (astern) in the time `start`, back to 0 in `reversal`
+    less `start`, and dn/dt = (order - n)/T only where g has come to the side of the order, else dn/dt = -n/T. So an
+    order from stop acts after `start`, and one to the other direction after `reversal`, while the propeller slows down.
+    ITTC 7.5-02-06-03 asks for the time constant and the reversal of the engine; the form is a project choice.
+    """
+    if "propeller.speed_actual" not in model or card.propulsion is None:
+        raise card.fault("effects", "engine_telegraph needs an engine", "give the card [propulsion]")
+    order = model["propeller.speed"]
+    assert isinstance(order, Input)
+    start, begun = _start(model, order)
+    turning = _revolutions_reached("engine_telegraph", order, begun)
+    least = STOP_ORDER * model.symbol("propulsion.nominal_speed") if "propulsion.nominal_speed" in model else STOP_ORDER
+    wanted = (order.symbol > least) - (order.symbol < -least)
+    gear = State(
+        name="engine_telegraph.gear",
+        unit="1",
+        description="The engine's gear: 1 running ahead, 0 stopped, -1 running astern",
+        derivative="engine_telegraph.gear_rate",
+        start=(begun > least) - (begun < -least),
+        trim=wanted,
+    )
+    starting, stopping = given["start"], ca.fmax(given["reversal"] - given["start"], 0.01)
+    towards_stop = ca.fabs(wanted) * gear.symbol * wanted < 0
+    leaving = ca.logic_or(towards_stop, wanted == 0)
+    pace = ca.if_else(leaving, 1 / stopping, 1 / starting)
+    # Proportional within the last step of the way, so that it comes to rest at its end.
+    step = 1.0 / _CLUTCHING
+    moving = ca.fmax(-1, ca.fmin(1, step * (wanted - gear.symbol))) * pace
+    engaged = ca.fmax(0, ca.fmin(1, (gear.symbol * wanted - (1 - 2 * _CLUTCHING)) / _CLUTCHING))
+    rates = (
+        Quantity(name="engine_telegraph.rate", unit="rad/s2", description="Rate of the revolutions", value=ca.SX(0)),
+        Quantity(
+            name="engine_telegraph.gear_rate", unit="1/s", description="Rate of the engine's gear", value=ca.SX(0)
+        ),
+    )
+    lagging = (
+        model.extend(start, turning, gear, *rates)
+        .substitute(order.name, turning.symbol)
+        .redefine(rates[0].name, lambda _: (engaged * order.symbol - turning.symbol) / given["time_constant"])
+        .redefine(rates[1].name, lambda _: moving)
+    )
+    return with_steps_for(lagging, "engine_telegraph.time_constant")
+
+
+ENGINE_TELEGRAPH = Effect(
+    name="engine_telegraph",
+    acts_on="propulsion",
+    description="The engine needs time to start, and more to be stopped and reversed.",
+    source="ITTC 7.5-02-06-03, validation of manoeuvring simulation models; form chosen here",
+    parameters=(
+        EffectParameter("time_constant_s", "time constant of the engine", 0.01, 600.0),
+        EffectParameter("start_s", "time from an order to the first turn of a stopped engine", 0.1, 600.0),
+        EffectParameter(
+            "reversal_s", "time from an order astern to the first turn astern, more than start_s", 0.2, 900.0
+        ),
+    ),
+    equations=_with_telegraph,
+    sought=False,
+    states_behind={"engine_telegraph.speed": "propeller.speed"},
+)
+
+
+def _with_weaker_astern(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    """X += Xnn 1/2 rho L^2 u0^2 (1 - f) min(n, 0)^2/n0^2: astern the thrust is f of what it is ahead.
+
+    Blades are cambered and twisted for ahead, and astern the hull takes more of the thrust: Harvald (1983), Resistance
+    and Propulsion of Ships.
+    """
+    if "propulsion.Xnn" not in model:
+        raise card.fault("propulsion", "has no Xnn", "astern_thrust is for linear and abkowitz cards with [propulsion]")
+    astern = ca.fmin(_relative_revolutions(model), 0)
+    force = scales(model, model.symbol("ship.speed")).force * model.symbol("propulsion.Xnn")
+    return with_forces(model, X=force * (1 - given["factor"]) * astern**2)
+
+
+REVERSED_THRUST = Effect(
+    name="astern_thrust",
+    acts_on="force",
+    description="A propeller that turns astern pulls less than it pushes ahead.",
+    source="Harvald (1983), Resistance and Propulsion of Ships",
+    parameters=(
+        EffectParameter(
+            "factor",
+            "thrust astern over that ahead at the same revolutions",
+            0.0,
+            1.5,
+            absent=1.0,
+            typical=(ASTERN_THRUST,),
+        ),
+    ),
+    equations=_with_weaker_astern,
+    in_mmg=True,
+    sought=False,
 )

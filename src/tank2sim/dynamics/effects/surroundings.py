@@ -15,7 +15,7 @@ from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 
-_STILL_MPS = 1e-6
+STILL_MPS = 1e-6
 """Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
 
 
@@ -70,8 +70,12 @@ def air_over_ship(model: Model, speed: ca.SX, direction: ca.SX) -> tuple[ca.SX, 
     speed, direction : casadi.SX
         True wind (m/s) and the direction from which it comes (rad, clockwise from north).
     """
-    north = -speed * ca.cos(direction) - model.symbol("motion.xdot")
-    east = -speed * ca.sin(direction) - model.symbol("motion.ydot")
+    return relative_air(model, -speed * ca.cos(direction), -speed * ca.sin(direction))
+
+
+def relative_air(model: Model, north: ca.SX, east: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """As :func:`air_over_ship`, from the velocity of the air over the ground to north and to east (m/s)."""
+    north, east = north - model.symbol("motion.xdot"), east - model.symbol("motion.ydot")
     return earth_velocity(north, east, -model.symbol("motion.psi"))
 
 
@@ -93,7 +97,7 @@ def _with_wind(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
     model, (front, side) = with_particulars(model, card, "projected_area_front_m2", "projected_area_side_m2")
 
     def force(forward: ca.SX, starboard: ca.SX) -> ca.SX:
-        speed = ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2)
+        speed = ca.sqrt(forward**2 + starboard**2 + STILL_MPS**2)
         X = 0.5 * density * front * given["surge_coefficient"] * speed * forward
         Y = 0.5 * density * side * given["sway_coefficient"] * speed * starboard
         # sin(2 gamma) = 2 sin cos, forward = -V cos, starboard = -V sin

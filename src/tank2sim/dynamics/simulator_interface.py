@@ -1,0 +1,100 @@
+"""What a ship in a simulator has on top of its equations: inputs for external forces, and outputs for displays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import casadi as ca
+
+from tank2sim.dynamics.effects.surroundings import relative_air
+from tank2sim.dynamics.external_forces import with_external_forces
+from tank2sim.dynamics.model import Model, Quantity
+
+_FORCES = (("X", "N", "Surge force"), ("Y", "N", "Sway force"), ("N", "N.m", "Yaw moment"))
+_SIDES = {"X": "forward", "Y": "to starboard", "N": "to starboard"}
+
+
+def force_shares(before: Model, after: Model, name: str) -> tuple[Quantity, ...]:
+    """Quantities ``<name>.X``, ``.Y``, ``.N`` of what `after` has more than `before` in ``force.*``: N, N and N m.
+
+    None for a force that is the same in both.
+    """
+    shares = []
+    for letter, unit, description in _FORCES:
+        old, new = (model[f"force.{letter}"] for model in (before, after))
+        assert isinstance(old, Quantity) and isinstance(new, Quantity)
+        if ca.is_equal(old.value, new.value, 1) or f"{name}.{letter}" in after:
+            continue
+        shares.append(
+            Quantity(
+                name=f"{name}.{letter}",
+                unit=unit,
+                description=f"{description} by {name}, positive {_SIDES[letter]}",
+                nominal=old.nominal,
+                value=new.value - old.value,
+            )
+        )
+    return tuple(shares)
+
+
+def with_simulator_interface(model: Model) -> Model:
+    """The model with the inputs of :func:`.with_external_forces` and the outputs that displays and hosts ask for.
+
+    ``motion.heading`` (rad, 0 to 2 pi, clockwise from north), ``wind.relative_speed`` and ``wind.relative_direction``
+    (from, clockwise from the bow, 0 to 2 pi) of a ship with a wind, and forces by origin, ``rudder.X``, ``rudder.Y``,
+    ``rudder.N``, those of propellers of an MMG ship and of each effect that adds a force (``wind.Y``). A model that is
+    not of a ship is returned as it is.
+    """
+    if not all(f"force.{name}" in model for name in "XYN") or "motion.psi" not in model:
+        return model
+    model = with_external_forces(model)
+    added = tuple(quantity for quantity in _displays(model) if quantity.name not in model)
+    parts = tuple(
+        quantity.name
+        for quantity in model.quantities
+        if quantity.name.rpartition(".")[2] in ("X", "Y", "N")
+        and not quantity.name.startswith("force.")
+        and quantity.unit in ("N", "N.m")
+        and quantity.name not in model.outputs
+    )
+    return model.extend(*added, outputs=[*(quantity.name for quantity in added), *parts])
+
+
+def _displays(model: Model) -> Iterator[Quantity]:
+    yield _bearing("motion.heading", "Heading, clockwise from north, 0 to 360 deg", model.symbol("motion.psi"))
+    if "wind.speed" not in model:
+        return
+    speed, direction = model.symbol("wind.speed"), model.symbol("wind.direction")
+    north, east = -speed * ca.cos(direction), -speed * ca.sin(direction)
+    if "wind.north" in model:
+        north, east = north + model.symbol("wind.north"), east + model.symbol("wind.east")
+    forward, starboard = relative_air(model, north, east)
+    yield Quantity(
+        name="wind.relative_speed",
+        unit="m/s",
+        description="Speed of the wind relative to the ship",
+        display_unit="knots",
+        nominal=10.0,
+        value=ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2),
+    )
+    from_bow = ca.atan2(-starboard, -forward + _STILL_MPS * (forward**2 + starboard**2 < _STILL_MPS**2))
+    description = "Direction from which the relative wind comes, clockwise from the bow, 0 to 360 deg"
+    yield _bearing("wind.relative_direction", description, from_bow)
+
+
+_STILL_MPS = 1e-8
+"""Relative wind below which its direction is dead ahead: far below any wind. Project choice."""
+
+
+def _bearing(name: str, description: str, angle: ca.SX) -> Quantity:
+    turn = 2 * math.pi
+    return Quantity(
+        name=name,
+        unit="rad",
+        description=description,
+        display_unit="deg",
+        minimum=0.0,
+        maximum=2 * math.pi,
+        value=angle - turn * ca.floor(angle / turn),
+    )

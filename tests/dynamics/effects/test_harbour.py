@@ -1,0 +1,107 @@
+"""Thrusters, tugs, the engine's telegraph and thrust astern: by hand and by the clock."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.running import Running
+
+from .ships import N0, RHO, U0, L, added_forces, ship, state
+
+TELEGRAPH = {"time_constant_s": 4.0, "start_s": 6.0, "reversal_s": 25.0}
+
+
+@pytest.mark.parametrize(("name", "forward"), [("bow_tunnel_thruster", 60.0), ("stern_tunnel_thruster", -70.0)])
+def test_a_thruster_pushes_its_end_to_the_side_of_its_order_and_fades_with_speed(name: str, forward: float) -> None:
+    given = {"command": 0.5, "force_N": 2e5, "forward_m": forward, "half_speed_mps": 1.5}
+    for u, left in ((0.0, 1.0), (1.5, 0.5), (-1.5, 0.5), (4.5, 0.1)):
+        found = added_forces(name, given, state(u, 0.0, 0.0))
+        np.testing.assert_allclose(found, [0.0, 1e5 * left, forward * 1e5 * left], rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "input_name", "wrong"),
+    [
+        ("bow_tunnel_thruster", {"command": 0.0}, "bow_tunnel_thruster.command", 50.0),
+        ("tugs", {"force_1_N": 0.0, "direction_1_deg": 0.0}, "tug.force_2", -1.0),
+        ("wind", {"speed_mps": 0.0, "direction_deg": 0.0}, "wind.speed", 500.0),
+        ("current", {"speed_mps": 0.0, "direction_deg": 0.0}, "current.speed", -30.0),
+        ("finite_depth", {"depth_m": 50.0}, "water.depth", 1e6),
+    ],
+)
+def test_an_order_that_nothing_can_follow_is_refused(
+    name: str, given: dict[str, float], input_name: str, wrong: float
+) -> None:
+    model = ship({name: given})
+    with pytest.raises(InputError) as caught:
+        model.input_values({input_name: wrong})
+    assert caught.value.place == input_name
+
+
+def test_thrusters_turn_a_stopped_ship_on_the_spot() -> None:
+    model = ship({"bow_tunnel_thruster": {"command": 1.0}, "stern_tunnel_thruster": {"command": -1.0}})
+    running = Running(Integrator(model), {"propeller.speed": 0.0}, {"initial.u": 0.0})
+    running.run(300.0)
+    assert running.state("motion.psi") > 0.2
+    assert math.hypot(running.state("motion.x"), running.state("motion.y")) < 0.1 * L
+
+
+def test_tugs_are_forces_at_their_points() -> None:
+    given = {
+        "force_1_N": 2e5, "direction_1_deg": 90.0, "forward_1_m": 60.0, "starboard_1_m": 10.0,
+        "force_4_N": 3e5, "direction_4_deg": 150.0, "forward_4_m": -50.0, "starboard_4_m": -8.0,
+    }  # fmt: skip
+    X4, Y4 = 3e5 * math.cos(math.radians(150)), 3e5 * 0.5
+    expected = [X4, 2e5 + Y4, 60.0 * 2e5 - 50.0 * Y4 + 8.0 * X4]
+    np.testing.assert_allclose(added_forces("tugs", given, state(1.0, 0.1, 0.0)), expected, rtol=1e-6)
+
+
+def revolutions(before: float, order: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times (s) and revolutions over the nominal ones after an order, from a ship whose engine runs at `before`."""
+    model = ship({"engine_telegraph": TELEGRAPH})
+    start = {"initial.u": U0 if before else 0.0, "initial.propeller_speed": before * N0}
+    running = Running(Integrator(model), {"propeller.speed": order * N0}, start)
+    running.run(duration)
+    run = running.trajectory()
+    return run.t, run["propeller.speed_actual"] / N0
+
+
+def test_a_stopped_engine_starts_after_its_time() -> None:
+    t, n = revolutions(0.0, 0.5, 60.0)
+    first = t[np.argmax(n > 0.005)]
+    assert 0.85 * 6.0 < first < 1.1 * 6.0
+    assert n[-1] == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("before", [1.0, -0.5])
+def test_an_engine_is_stopped_before_it_is_reversed(before: float) -> None:
+    order = -0.6 * np.sign(before)
+    t, n = revolutions(before, order, 120.0)
+    turned = t[np.argmax(n * np.sign(order) > 0.005)]
+    assert 0.9 * 25.0 < turned < 1.1 * 25.0
+    assert np.interp(12.0, t, np.abs(n)) < 0.06  # by 4 s of time constant
+    assert n[-1] == pytest.approx(order, abs=1e-3)
+
+
+def test_another_order_to_the_same_side_acts_at_once() -> None:
+    t, n = revolutions(1.0, 0.5, 20.0)
+    np.testing.assert_allclose(n, 0.5 + 0.5 * np.exp(-t / 4.0), atol=2e-3)
+
+
+def test_an_engine_in_trim_turns_as_ordered() -> None:
+    model = ship({"engine_telegraph": TELEGRAPH})
+    running = Running(Integrator(model), {"propeller.speed": 0.7 * N0}, {"initial.trim": 1.0})
+    assert running.state("engine_telegraph.speed") == pytest.approx(0.7 * N0, rel=1e-9)
+
+
+def test_astern_a_propeller_has_its_share_of_the_thrust_ahead() -> None:
+    whole = 77e-5 * 0.5 * RHO * L**2 * U0**2
+    found = added_forces("astern_thrust", {"factor": 0.6}, {**state(3.0, 0.0, 0.0), "propeller.speed": -0.5 * N0})
+    np.testing.assert_allclose(found, [whole * 0.4 * 0.25, 0.0, 0.0], rtol=1e-6, atol=1e-3)
+    ahead = added_forces("astern_thrust", {"factor": 0.6}, {**state(3.0, 0.0, 0.0), "propeller.speed": 0.5 * N0})
+    np.testing.assert_array_equal(ahead, [0.0, 0.0, 0.0])
