@@ -26,6 +26,7 @@ from tank2sim.cards.card import (
 )
 from tank2sim.cards.form import (
     CARD_FORMS,
+    CraftForm,
     EffectEntry,
     GliderForm,
     MmgForm,
@@ -39,6 +40,7 @@ from tank2sim.cards.form import (
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
 from tank2sim.cards.scaling import FileScales, file_factor
+from tank2sim.cards.small_craft import craft_card
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
@@ -119,6 +121,9 @@ def parse_card(text: str, source: str) -> Card:
         nominal = nominal_revolutions(card, form.propulsion.nominal_radps if form.propulsion else None)
         # X_nn, the effect of revolutions on surge, is that of the propeller's own equations.
         return replace(card, propulsion=Propulsion(nominal_radps=nominal, Xnn=0.0))
+    if isinstance(form, CraftForm):
+        _refuse_doubled_effects(form.effects, source)
+        return craft_card(form, text, source, spelt)
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
     return _si_card(form, kind, text, source)
@@ -229,6 +234,11 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
             places += [
                 (f"effects.{number}.{part}", entry[part]) for part in ("parameters", "uncertainty") if part in entry
             ]
+    thrusters = content.get("thrusters")
+    for number, entry in enumerate(thrusters if isinstance(thrusters, list) else []):
+        if isinstance(entry, dict):
+            places.append((f"thrusters.{number}", entry))
+            places.append((f"thrusters.{number}.uncertainty", entry.get("uncertainty")))
     for place, section in places:
         if not isinstance(section, dict):
             continue  # the form will refuse it

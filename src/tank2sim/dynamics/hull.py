@@ -98,7 +98,7 @@ def motion_quantities(hull: Hull, forces: tuple[Quantity, ...]) -> tuple[Quantit
     masses = _inertia_quantities(hull)
     matrix = Inertia(*(mass.symbol for mass in masses))
     motion = rigid_body_accelerations(matrix, X.symbol, Y.symbol, N.symbol)
-    return (*forces, *masses, *_acceleration_quantities(motion), *_water_speed_quantities(hull))
+    return (*forces, *masses, *acceleration_quantities(motion), *_water_speed_quantities(hull))
 
 
 def _scales_of_forces(hull: Hull) -> tuple[ca.SX, Scales]:
@@ -236,7 +236,9 @@ def polynomial_forces(hull: Hull) -> tuple[Quantity, ...]:
     return (*by_rudder, *force_quantities(_right_hand_sides(hull, by_rudder), equations))
 
 
-def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity, Quantity]:
+def force_quantities(
+    forces: Forces, equations: str, nominal: tuple[float, float] = (1e5, 1e7)
+) -> tuple[Quantity, Quantity, Quantity]:
     """``force.X``, ``force.Y``, ``force.N``: the right-hand sides f1, f2, f3 of the `equations` named.
 
     Parameters
@@ -245,6 +247,8 @@ def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity
         Their values: N, N, N m.
     equations : str
         What they are called, for the descriptions.
+    nominal : pair of float
+        Typical force (N) and moment (N m).
     """
     f1, f2, f3 = forces
     return (
@@ -252,21 +256,21 @@ def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity
             name="force.X",
             unit="N",
             description=f"Surge force except for that of acceleration, {equations}, positive forward",
-            nominal=1e5,
+            nominal=nominal[0],
             value=f1,
         ),
         Quantity(
             name="force.Y",
             unit="N",
             description=f"Sway force except for that of acceleration, {equations}, positive to starboard",
-            nominal=1e5,
+            nominal=nominal[0],
             value=f2,
         ),
         Quantity(
             name="force.N",
             unit="N.m",
             description=f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
-            nominal=1e7,
+            nominal=nominal[1],
             value=f3,
         ),
     )
@@ -278,7 +282,11 @@ def _inertia_quantities(hull: Hull) -> tuple[Quantity, ...]:
     added = {}
     for name in ACCELERATION_TERMS:
         added[name] = scales.derivative(known_term(name)) * hull.coefficient(name)
-    matrix = inertia(hull["ship.mass"], hull["ship.x_G"], hull["ship.yaw_inertia"], added)
+    return inertia_quantities(inertia(hull["ship.mass"], hull["ship.x_G"], hull["ship.yaw_inertia"], added))
+
+
+def inertia_quantities(matrix: Inertia) -> tuple[Quantity, ...]:
+    """``inertia.*`` of a mass matrix (kg, kg m, kg m2), in the order of :class:`Inertia`."""
     described = (
         ("inertia.surge", "kg", "Mass with added mass in surge, m - Xudot", matrix.surge),
         ("inertia.sway", "kg", "Mass with added mass in sway, m - Yvdot", matrix.sway),
@@ -292,7 +300,8 @@ def _inertia_quantities(hull: Hull) -> tuple[Quantity, ...]:
     )
 
 
-def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quantity, ...]:
+def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
+    """``motion.udot``, ``motion.vdot`` (m/s2), ``motion.rdot`` (rad/s2) of their values."""
     described = (
         ("motion.udot", "m/s2", "Rate of change of the surge velocity", None, 1e-2),
         ("motion.vdot", "m/s2", "Rate of change of the sway velocity", None, 1e-2),
@@ -304,7 +313,7 @@ def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quanti
     )
 
 
-def _inside(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
+def inside_margin(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
     """1 without excess, falling smoothly to 0 where it is the margin."""
     beyond = ca.fmax(0, ca.fmin(1, excess / margin))
     return 1 - beyond * beyond * (3 - 2 * beyond)
@@ -332,10 +341,10 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     u0 = hull["ship.speed"]
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
     inside = (
-        _inside(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
-        * _inside(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN)
-        * _inside(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN)
-        * _inside(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN)
+        inside_margin(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
+        * inside_margin(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN)
+        * inside_margin(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN)
+        * inside_margin(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN)
     )
     low = Quantity(
         name="low_speed.share",
