@@ -74,6 +74,7 @@ def plain() -> Files:
         "card.toml": (MODELS / "mariner" / "ship.toml").read_bytes(),
         "tanker.toml": (MODELS / "kvlcc2-captive" / "ship.toml").read_bytes(),
         "surge.toml": (MODELS / "wilinski-zellman" / "ship.toml").read_bytes(),
+        "craft.toml": (MODELS / "otter" / "ship.toml").read_bytes(),
         "glider.toml": (MODELS / "kulikovsky-velikanov" / "ship.toml").read_bytes(),
         "rig.toml": (MODELS / "alyshev" / "ship.toml").read_bytes(),
         "steering.toml": (MODELS / "poznyakov-yudin" / "steering.toml").read_bytes(),

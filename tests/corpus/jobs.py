@@ -22,6 +22,7 @@ RECIPES: dict[str, list[Recipe]] = {
         (["card.toml", "--manoeuvre", "zigzag:10/10", "--duration", "40", "--json", "out.json"], ["card.toml"]),
         (["card.toml", "--manoeuvre", "file:orders.csv", "--duration", "40"], ["orders.csv"]),
         (["tanker.toml", "--manoeuvre", "pullout:20", "--duration", "40"], ["tanker.toml"]),
+        (["craft.toml", "--manoeuvre", "difference:190", "--duration", "10", "--json", "out.json"], ["craft.toml"]),
     ],
     "reduce": [
         (["captive.toml", "-o", "out.toml"], ["captive.toml", "averages.csv"]),

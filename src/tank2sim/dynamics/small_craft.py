@@ -57,6 +57,17 @@ _STEPS_PER_LAG = 5
 _STILL = 1e-7
 """Speed over the cruising speed that counts as rest, so that the speed has a slope there (project choice)."""
 
+THRUSTER_PARAMETERS = {
+    "x_m": "x",
+    "y_m": "y",
+    "ahead_Ns2": "ahead",
+    "astern_Ns2": "astern",
+    "speed_loss_kg": "speed_loss",
+    "dead_band_radps": "dead_band",
+    "time_constant_s": "time_constant",
+}
+"""Key of ``[[thrusters]]`` to the last part of the name of the parameter that holds it."""
+
 _OUTPUTS = (
     *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
     *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
@@ -266,8 +277,10 @@ def _thrusters(card: CraftCard, s: Mapping[str, ca.SX]) -> tuple[list[Variable],
     for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True):
         variables, thrust, azimuth = _thruster(thruster, cruising if holds else 0.0, s)
         found += variables
+        places = {variable.name: variable.symbol for variable in variables}
+        x, y = (places[f"thrusters.{thruster.name}.{axis}"] for axis in "xy")
         along, across = thrust * ca.cos(azimuth), thrust * ca.sin(azimuth)
-        X, Y, N = X + along, Y + across, N + thruster.x_m * across - thruster.y_m * along
+        X, Y, N = X + along, Y + across, N + x * across - y * along
     return found, (X, Y, N)
 
 
@@ -312,10 +325,21 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
         nominal=thruster.max_radps,
         value=held * (ca.fabs(held) > band.symbol) if thruster.dead_band_radps else held,
     )
-    variables: list[Variable] = [command, order, ahead, astern, loss]
+    places = [
+        Parameter(
+            name=f"{prefix}.{axis}",
+            unit="m",
+            description=f"Place of {where}, positive {way} of midships",
+            nominal=abs(value) or 1.0,
+            start=value,
+            tunable=False,
+        )
+        for axis, way, value in (("x", "forward", thruster.x_m), ("y", "to starboard", thruster.y_m))
+    ]
+    variables: list[Variable] = [command, order, ahead, astern, loss, *places]
     if thruster.dead_band_radps:
         variables.append(band)
-    variables += (speed := _revolutions(thruster, prefix, where, order.symbol, start))
+    variables += (speed := _revolutions(thruster, prefix, where, order, start))
     turning, azimuth = _azimuth(thruster, prefix, where)
     variables += turning
     along = s["motion.u"] * ca.cos(azimuth) + s["motion.v"] * ca.sin(azimuth)
@@ -329,7 +353,7 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     return [*variables, thrust], thrust.symbol, azimuth
 
 
-def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: ca.SX, start: float) -> list[Variable]:
+def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: Quantity, start: float) -> list[Variable]:
     """``speed`` first: a state behind its lag, or the order itself."""
     described = {
         "name": f"{prefix}.speed",
@@ -339,7 +363,7 @@ def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: ca.S
         "nominal": thruster.max_radps,
     }
     if thruster.time_constant_s is None:
-        return [Quantity(value=order, **described)]  # type: ignore[arg-type]
+        return [Quantity(value=order.symbol, **described)]  # type: ignore[arg-type]
     first = Parameter(
         name=f"initial.{thruster.name}_speed",
         unit="rad/s",
@@ -357,13 +381,13 @@ def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: ca.S
         minimum=1e-6,
         start=thruster.time_constant_s,
     )
-    state = State(derivative=f"{prefix}.rate", start=first.symbol, trim=order, **described)  # type: ignore[arg-type]
+    state = State(derivative=f"{prefix}.rate", start=first.symbol, trim=order.value, **described)  # type: ignore[arg-type]
     rate = Quantity(
         name=f"{prefix}.rate",
         unit="rad/s2",
         description=f"Rate of change of the revolutions of {where}",
         nominal=thruster.max_radps,
-        value=(order - state.symbol) / lag.symbol,
+        value=(order.symbol - state.symbol) / lag.symbol,
     )
     return [state, rate, first, lag]
 
