@@ -119,6 +119,15 @@ def craft_prime(card: CraftCard) -> dict[str, float]:
 def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]) -> CraftCard:
     """The card of a form, in SI.
 
+    Parameters
+    ----------
+    form : CraftForm
+        Sections as in the file, angles and rates in SI.
+    text, source : str
+        Text of the file and its name, for messages.
+    spelt : mapping
+        Place of an angle or a rate in SI to its place in the file.
+
     Raises
     ------
     InputError
