@@ -1,10 +1,11 @@
 """Made-up craft with two thrusters from their logs to their cards: coverage of the estimates, and free predictions.
 
 Each seed makes another craft (2.5 to 5.5 m, hull, thrust curves, lag and dead band drawn at random), its voyage of ten
-minutes in a current and gusts, and a log of position, heading and revolutions at 5 Hz with the slow errors of a receiver
-and a compass. `tank2sim log` cuts it, every third trial is held out, and `identify` begins with a card whose numbers
-are off by 40 %. Printed: how many of the main coefficients lie within two standard errors of the truth, and R^2 of u,
-v, r of predictions of 30 s of held-out trials, all next to the truth. The simulation here shares no code with tank2sim.
+minutes in a current and gusts, and a log of position, heading and revolutions at 5 Hz with the slow errors of a
+receiver and a compass. `tank2sim log` cuts it, every third trial is held out, and `identify` begins with a card whose
+numbers are off by 40 %. Printed: how many of the main coefficients lie within two standard errors of the truth, and
+R^2 of u, v, r of predictions of 30 s of held-out trials, all next to the truth. The simulation here shares no code with
+tank2sim.
 
     python benchmarks/craft_log.py [NUMBER OF CRAFT] [FIRST SEED]
 
@@ -230,9 +231,9 @@ x_G = {c["x_G"]!r}
 
 
 def judged(
-    card: t2s.Ship, paths: list[Path], truth: dict[str, float], motion: dict[str, np.ndarray] | None, begin: datetime
-) -> tuple[dict[str, float], np.ndarray | None, list[np.ndarray]]:
-    """Error over standard error of the main coefficients, R^2 by the smoothed motion, and predictions with the truth."""
+    card: t2s.Ship, paths: list[Path], truth: dict[str, float], motion: dict[str, np.ndarray], begin: datetime
+) -> tuple[dict[str, float], list[np.ndarray]]:
+    """Error over standard error of the main coefficients, and predictions with the true motion."""
     held = paths[2::3]
     fitted = [path for path in paths if path not in held]
     found = t2s.identify_craft(card, fitted, holdout=held)
@@ -248,10 +249,9 @@ def judged(
         stamp = next(line for line in path.read_text().splitlines() if line.startswith("# begins"))
         first = datetime.fromisoformat(stamp.split(": ", 1)[1].replace("Z", "+00:00"))
         at = (first - begin).total_seconds() + entry.run.times[entry.rows]
-        if motion is not None:
-            true = np.column_stack([np.interp(at, motion["t"], motion[name]) for name in "uvr"])
-            pairs.append(np.stack([entry.predicted, true]))
-    return errors, None, pairs
+        true = np.column_stack([np.interp(at, motion["t"], motion[name]) for name in "uvr"])
+        pairs.append(np.stack([entry.predicted, true]))
+    return errors, pairs
 
 
 def r_squared(pairs: list[np.ndarray]) -> np.ndarray:
@@ -284,7 +284,7 @@ def shared_craft(folder: Path) -> None:
     motion = {"t": table["t_s"], "u": table["u_mps"], "v": table["v_mps"], "r": np.radians(table["r_degps"])}
     paths = trials(LOGS / "usv_22" / "voyage.csv", folder)
     begin = datetime.fromisoformat(truth["t_zero_utc"].replace("Z", "+00:00"))
-    errors, _, pairs = judged(first_card(c, np.random.default_rng(0)), paths, {k: c[k] for k in MAIN}, motion, begin)
+    errors, pairs = judged(first_card(c, np.random.default_rng(0)), paths, {k: c[k] for k in MAIN}, motion, begin)
     print("usv_22:", ", ".join(f"{name} {error:+.1f}" for name, error in errors.items()), "standard errors off")
     print("usv_22: R^2 of u, v, r:", ", ".join(f"{value:.3f}" for value in r_squared(pairs)))
 
@@ -310,11 +310,11 @@ def main() -> None:
             paths = trials(folder / "voyage.csv", folder / "voyage")
             begin = datetime(2024, 5, 4, 9, 30, tzinfo=UTC)
             truth = {name: craft[name] for name in MAIN}
-            errors, _, pairs = judged(first_card(craft, rng), paths, truth, motion, begin)
+            errors, pairs = judged(first_card(craft, rng), paths, truth, motion, begin)
         every.append(errors)
         all_pairs += pairs
         each.append(r_squared(pairs))
-        print(seed, {name: round(error, 1) for name, error in errors.items()}, each[-1].round(3), flush=True)
+        print(seed, {name: round(float(error), 1) for name, error in errors.items()}, each[-1].round(3), flush=True)
     within = {name: np.mean([abs(errors[name]) <= 2 for errors in every]) for name in MAIN}
     total = np.mean(list(within.values()))
     print(f"{number} craft: within two standard errors of the truth: {100 * total:.0f} %")

@@ -14,6 +14,8 @@ from tank2sim.cards import Card, CraftCard
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import (
+    LEAD_S,
+    SHORTEST_PREDICTION_S,
     CoefficientVerdict,
     CraftFit,
     FreePrediction,
@@ -41,13 +43,17 @@ class CraftIdentificationResult(Result):
     fit : CraftFit
     predictions : list of FreePrediction
         Of held-out trials.
+    held : sequence of str
+        Names of the held-out trials, those that are too short to be predicted with them.
     """
 
     command = "identify"
 
-    def __init__(self, before: Ship, fit: CraftFit, predictions: Sequence[FreePrediction]) -> None:
+    def __init__(
+        self, before: Ship, fit: CraftFit, predictions: Sequence[FreePrediction], held: Sequence[str] = ()
+    ) -> None:
         assert isinstance(before.card, CraftCard)
-        self.before, self.fit, self.predictions = before, fit, list(predictions)
+        self.before, self.fit, self.predictions, self.held = before, fit, list(predictions), list(held)
         self.card = identified_craft(before.card, fit)
         self.notices = tuple(self._notices())
 
@@ -60,6 +66,10 @@ class CraftIdentificationResult(Result):
         notices = []
         if of_thrust:
             notices.append(f"{CHECK} the trials do not determine {', '.join(of_thrust)}: it is that of the card")
+        if self.held and not self.predictions:
+            notices.append(
+                f"no held-out trial is longer than {LEAD_S + SHORTEST_PREDICTION_S:g} s: none of them is predicted"
+            )
         notices.append(
             "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
             "mass is one of all forces, in the same share"
@@ -115,7 +125,7 @@ class CraftIdentificationResult(Result):
             "coefficients": {str(name): dict(zip(keys, row, strict=True)) for name, *row in self._rows()},
             "noise": dict(self.fit.estimate.measurement_noise),
             "determination": self.determination,
-            "held_out": [entry.run.name for entry in self.predictions],
+            "held_out": self.held,
             "next_trials": [candidate.as_json() for candidate in self.next_trials],
             "notices": list(self.notices),
         }
@@ -159,7 +169,8 @@ def identify_craft(
     """Identify hull and thrust curves of a craft with thrusters from trials with position, heading and revolutions.
 
     The trials are those that :func:`tank2sim.log` cuts: columns ``t_s``, ``x_m``, ``y_m``, ``psi_deg`` and, of each
-    thruster, ``n_<name>_rpm``; ``r_degps`` is used where it is there. A current and a mean wind are estimated for each trial.
+    thruster, ``n_<name>_rpm``; ``r_degps`` is used where it is there. A current and a mean wind are estimated for each
+    trial.
 
     Parameters
     ----------
@@ -202,9 +213,14 @@ def identify_craft(
     read = [read_craft_trial(path, names) for path in (*fitted, *held)]
     problem = craft_problem(ship.card, read)
     runs = problem.runs
-    fit = fit_craft(problem.with_runs(runs[: len(fitted)]), progress)
+    try:
+        with np.errstate(all="ignore"):  # a step of the search may be one to an unstable craft
+            fit = fit_craft(problem.with_runs(runs[: len(fitted)]), progress)
+    except np.linalg.LinAlgError:
+        remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
+        raise InputError(ship.card.source, "", "does not move as the trials do, not even roughly", remedy) from None
     predictions = predict_free(fit, runs[len(fitted) :]) if held else []
-    return CraftIdentificationResult(ship, fit, predictions)
+    return CraftIdentificationResult(ship, fit, predictions, [run.name for run in runs[len(fitted) :]])
 
 
 def craft_trial_files(paths: CraftTrialPaths) -> list[Path]:

@@ -13,7 +13,7 @@ from enum import StrEnum
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.identification.craft.problem import DISTURBANCES
+from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
 from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, kalman
 from tank2sim.identification.trials.methods.kalman_gains import smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import Levels
@@ -26,7 +26,7 @@ PREDICTED_S = 30.0
 """Length of a free-running prediction, s: that of the published comparisons on small craft."""
 
 LEAD_S = 10.0
-"""Time of a held-out trial in which the filter finds its state, s. Project choice: several time constants of a craft."""
+"""Time of a held-out trial in which the filter finds its state, s: several time constants (project choice)."""
 
 SHORTEST_PREDICTION_S = 10.0
 """Shortest prediction that counts, s (project choice)."""
@@ -38,6 +38,12 @@ standard errors)."""
 TRIALS_SHARE = 0.5
 """Largest standard error after the trials over that before of a coefficient that they determine (project choice)."""
 
+
+FEWEST_TRIALS = 5
+"""Fewest trials whose currents and winds determine how much these differ (project choice)."""
+
+LEAST_SPREAD = 0.1
+"""Least spread of a disturbance between trials, over that before them (project choice)."""
 
 _LINEARISATIONS = 5
 """Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
@@ -101,6 +107,9 @@ class CraftFit:
 def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
+    Twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
+    trials the first time (empirical Bayes), for they change slowly.
+
     Parameters
     ----------
     problem : Problem
@@ -108,10 +117,23 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     progress : callable
         Called with each better estimate.
     """
-    estimate = kalman(problem, settings=KalmanSettings(drifting=True, scale_prior=False), progress=progress)
+    settings = KalmanSettings(drifting=True, scale_prior=False)
+    first = kalman(problem, settings=settings, progress=progress)
+    problem = with_disturbances(problem, *_disturbances_of(problem, first))
+    estimate = kalman(problem, first.values, settings, progress)
     levels = levels_of(problem, estimate)
     by_run = np.stack([information(problem.with_runs((run,)), estimate.values, levels) for run in problem.runs])
     return CraftFit(problem, estimate, levels, by_run)
+
+
+def _disturbances_of(problem: Problem, estimate: KalmanEstimate) -> tuple[Array, Array]:
+    """Mean and spread (5,) of the disturbances over the trials; the spread is within what is known without them."""
+    places = [problem.model.state_names.index(name) for name in DISTURBANCES]
+    wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
+    found = np.stack([smoothed.states[0, places] for smoothed in estimate.smoothed])
+    if len(found) < FEWEST_TRIALS:
+        return np.zeros(len(wide)), wide
+    return found.mean(axis=0), np.clip(found.std(axis=0, ddof=1), LEAST_SPREAD * wide, wide)
 
 
 def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
@@ -126,22 +148,14 @@ def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
 
 def information(problem: Problem, values: Array, levels: Levels) -> Array:
     """Information of the runs of a problem (k, k) at parameters and noise levels."""
-    task, point = _point(problem, values, levels, None)
+    task, point = _point(problem, values, levels)
     found: Array = normal(task, point)[0] - problem.prior_precision(problem.prior_error)
     return found
 
 
-def _point(
-    problem: Problem, values: Array, levels: Levels, disturbances: Array | None
-) -> tuple[SearchTask, SearchPoint]:
-    """A pass of the filter over the runs, its disturbances beginning at those given (5,)."""
-    task = task_of(problem, drifting=True)
-    if disturbances is not None:
-        starts = task.batch.starts.copy()
-        names = problem.model.state_names
-        starts[:, [names.index(name) for name in DISTURBANCES]] = disturbances
-        task = replace(task, batch=replace(task.batch, starts=starts))
-    task = replace(task, first=levels)
+def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:
+    """A pass of the filter over the runs."""
+    task = replace(task_of(problem, drifting=True), first=levels)
     point = task.first_point(values)
     for _ in range(_LINEARISATIONS):
         point = task.relinearise(point)
@@ -155,14 +169,14 @@ class FreePrediction:
     Parameters
     ----------
     run : SampledRun
-    rows : array (m,) of int
+    rows : sequence of int (m,)
         Instants predicted.
     predicted, smoothed : array (m, 3)
         u, v (m/s through the water) and r (rad/s).
     """
 
     run: SampledRun
-    rows: Array
+    rows: Sequence[int]
     predicted: Array
     smoothed: Array
 
@@ -180,9 +194,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     """
     problem = fit.problem.with_runs(tuple(runs))
     names = problem.model.state_names
-    places = [names.index(name) for name in DISTURBANCES]
-    usual = np.mean([smoothed.states[:, places].mean(axis=0) for smoothed in fit.estimate.smoothed], axis=0)
-    point = _point(problem, fit.estimate.values, fit.levels, usual)[1]
+    point = _point(problem, fit.estimate.values, fit.levels)[1]
     filtered, nx = point.filtered, len(names)
     tangents = filtered.tangents
     states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
@@ -202,7 +214,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
             begin = end
         if rows:
             at = np.concatenate(rows)
-            found.append(FreePrediction(run, at, np.concatenate(predicted), states[number, at][:, motion]))
+            found.append(FreePrediction(run, at.tolist(), np.concatenate(predicted), states[number, at][:, motion]))
     return found
 
 

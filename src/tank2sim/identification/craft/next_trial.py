@@ -93,7 +93,7 @@ def next_trials(card: CraftCard, fit: CraftFit) -> list[CandidateTrial]:
         return []
     open_places = [place for place, verdict in enumerate(fit.verdicts) if verdict is CoefficientVerdict.PRIOR]
     problem = fit.problem
-    # The reported errors allow for residuals that are not as the noise model has them: the candidate narrows both alike.
+    # The reported errors allow for residuals unlike the noise model: a candidate narrows both alike.
     so_far = fit.by_run.sum(axis=0) + problem.prior_precision(problem.prior_error)
     now = np.minimum(fit.estimate.standard_errors, problem.prior_error)
     found = []

@@ -16,6 +16,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.cards.card import CraftCard
 from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.dynamics.build import build
@@ -192,6 +193,29 @@ def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
         runs.append(replace(run, seen=(*seen, *(["gyro.rate"] if rated else []))))
     means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
     return Problem(model, tuple(prior), means, errors, tuple(runs))
+
+
+def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem:
+    """The problem in which the disturbances of a trial are `means` within `spreads` (5,) before it is looked at.
+
+    Parameters
+    ----------
+    problem : Problem
+        By :func:`craft_problem`.
+    means, spreads : array (5,)
+        Of :data:`DISTURBANCES`.
+    """
+    known = dict(zip(DISTURBANCES, zip(means.tolist(), spreads.tolist(), strict=True), strict=True))
+
+    def with_prior(state: State) -> State:
+        if state.name not in known:
+            return state
+        mean, spread = known[state.name]
+        changed = replace(state, start=mean, nominal=spread)
+        changed.__dict__["symbol"] = state.symbol  # the equations hold this one
+        return changed
+
+    return replace(problem, model=replace(problem.model, states=tuple(map(with_prior, problem.model.states))))
 
 
 def _unbounded(model: Model) -> Model:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -164,7 +164,10 @@ def maximise(
         levels = task.move_levels(point.levels, matrix, slope, damping)
         along = point.filtered.before, point.filtered.after
         with np.errstate(all="ignore"):  # too long a step may leave all bounds
-            return task.point(np.clip(values, *task.problem.bounds), levels, along)
+            try:
+                return task.point(np.clip(values, *task.problem.bounds), levels, along)
+            except np.linalg.LinAlgError:  # a motion so unstable that the covariance is not a number
+                return replace(point, cost=np.inf)
 
     def is_last(better: SearchPoint, gain: float) -> bool:
         report(better)
