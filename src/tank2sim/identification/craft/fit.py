@@ -39,6 +39,12 @@ TRIALS_SHARE = 0.5
 """Largest standard error after the trials over that before of a coefficient that they determine (project choice)."""
 
 
+STABILISING = ("derivatives.Yv", "derivatives.Yvabsv", "derivatives.Nr", "derivatives.Nrabsr")
+"""Coefficients whose damping holds a craft on its course."""
+
+STRONGER = (1.0, 2.0, 4.0, 8.0, 16.0)
+"""Factors on these with which the search begins, one after the other (project choice)."""
+
 FEWEST_TRIALS = 5
 """Fewest trials whose currents and winds determine how much these differ (project choice)."""
 
@@ -118,12 +124,33 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         Called with each better estimate.
     """
     settings = KalmanSettings(drifting=True, scale_prior=False)
-    first = kalman(problem, settings=settings, progress=progress)
+    first = _first_estimate(problem, settings, progress)
     problem = with_disturbances(problem, *_disturbances_of(problem, first))
     estimate = kalman(problem, first.values, settings, progress)
     levels = levels_of(problem, estimate)
     by_run = np.stack([information(problem.with_runs((run,)), estimate.values, levels) for run in problem.runs])
     return CraftFit(problem, estimate, levels, by_run)
+
+
+def _first_estimate(problem: Problem, settings: KalmanSettings, progress: SearchReport) -> KalmanEstimate:
+    """The estimate from the card; from one with stronger damping of sway and yaw if that craft is too unstable.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The covariance of the filter is not a number whatever the damping.
+    """
+    damping = np.array([name in STABILISING for name in problem.free])
+    task = task_of(problem, drifting=True)
+    for factor in STRONGER:
+        start = np.where(damping, factor * problem.prior_mean, problem.prior_mean)
+        try:
+            system = normal(task, task.first_point(start))
+        except np.linalg.LinAlgError:
+            continue
+        if all(np.isfinite(part).all() for part in system):
+            return kalman(problem, start, settings, progress)
+    raise np.linalg.LinAlgError("the covariance of the filter is not a number")
 
 
 def _disturbances_of(problem: Problem, estimate: KalmanEstimate) -> tuple[Array, Array]:

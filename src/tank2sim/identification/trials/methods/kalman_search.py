@@ -162,6 +162,8 @@ def maximise(
         (H, g), (matrix, slope) = system
         values = point.values - np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
         levels = task.move_levels(point.levels, matrix, slope, damping)
+        if np.isnan(values).any() or np.isnan(np.concatenate([levels.process, levels.time, levels.measurement])).any():
+            return replace(point, cost=np.inf)
         along = point.filtered.before, point.filtered.after
         with np.errstate(all="ignore"):  # too long a step may leave all bounds
             try:
