@@ -630,6 +630,14 @@ class LogStretchKeys(_Part):
     file: str | None
 
 
+class LogIdentifiedKeys(_Part):
+    """What the trials of a log say of the coefficients of a craft."""
+
+    coefficients: dict[str, CraftEstimateKeys]
+    next_trials: list[CandidateTrialKeys]
+    notices: list[str]
+
+
 class LogKeys(_Keys):
     """What a vessel's log holds."""
 
@@ -642,6 +650,7 @@ class LogKeys(_Keys):
     current: dict[str, str | float] | None
     track: Columns | None
     time_line: dict[str, Columns]
+    identified: NotRequired[LogIdentifiedKeys | None]
     findings: list[dict[str, Any]]
     notices: list[str]
 
