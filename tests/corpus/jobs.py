@@ -53,6 +53,7 @@ RECIPES: dict[str, list[Recipe]] = {
         (["card.toml", "zigzag.csv", *FAST, "recursive"], ["zigzag.csv"]),
         (["card.toml", "zigzag.csv", "turn.csv", *FAST, "output_error", "-o", "out.toml"], ["turn.csv"]),
         (["card.toml", "zigzag.csv", *FAST, "equation_error", "--holdout", "turn.csv"], ["turn.csv"]),
+        (["craft.toml", "craft.csv", "-o", "out.toml", "--json", "out.json"], ["craft.csv", "craft.toml"]),
     ],
     "gap": [(["card.toml", "zigzag.csv", "-o", "gap", "--workers", "1", "--effects", "current", "--max-effects", "1"],
              ["card.toml", "zigzag.csv", "zigzag.csv"])],

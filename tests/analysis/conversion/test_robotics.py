@@ -1,4 +1,4 @@
-"""A craft in the forms of Gazebo's and VRX's plugins: forces by the plugins' own sums, and what the simpler one loses."""
+"""A craft in the forms of Gazebo's and VRX's plugins: forces by their own sums, and what the simpler one loses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
 from tests.dynamics.test_small_craft import accelerations
 
-CROSS = "Yrdot = -9.0\nNvdot = -9.0\nYvabsr = -40.0\nYr = -8.0\nNv = -14.0\nNrabsv = -60.0\nNrabsu = -30.0\nXuabsu = -12.0\n"
+CROSS = (
+    "Yrdot = -9.0\nNvdot = -9.0\nYvabsr = -40.0\nYr = -8.0\nNv = -14.0\nNrabsv = -60.0\nNrabsu = -30.0\n"
+    "Xuabsu = -12.0\n"
+)
 
 
 @pytest.fixture(scope="module")
