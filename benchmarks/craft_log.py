@@ -27,6 +27,7 @@ import numpy as np
 
 import tank2sim as t2s
 from tank2sim.cards import parse_card
+from tank2sim.errors import InputError
 
 LOGS = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data" / "logs"
 MAIN = ("ahead", "astern", "Xu", "Xuabsu", "Yv", "Yvabsv", "Nr", "Nrabsr")
@@ -298,7 +299,7 @@ def main() -> None:
     """Print the figures of a number of craft."""
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     first = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
-    every, all_pairs, each = [], [], []
+    every, all_pairs, each, refused = [], [], [], 0
     begin_s = time.process_time()
     for seed in range(first, first + number):
         rng = np.random.default_rng(seed)
@@ -310,14 +311,19 @@ def main() -> None:
             paths = trials(folder / "voyage.csv", folder / "voyage")
             begin = datetime(2024, 5, 4, 9, 30, tzinfo=UTC)
             truth = {name: craft[name] for name in MAIN}
-            errors, pairs = judged(first_card(craft, rng), paths, truth, motion, begin)
+            try:
+                errors, pairs = judged(first_card(craft, rng), paths, truth, motion, begin)
+            except InputError as refusal:
+                refused += 1
+                print(seed, "refused:", refusal, flush=True)
+                continue
         every.append(errors)
         all_pairs += pairs
         each.append(r_squared(pairs))
         print(seed, {name: round(float(error), 1) for name, error in errors.items()}, each[-1].round(3), flush=True)
     within = {name: np.mean([abs(errors[name]) <= 2 for errors in every]) for name in MAIN}
     total = np.mean(list(within.values()))
-    print(f"{number} craft: within two standard errors of the truth: {100 * total:.0f} %")
+    print(f"{number} craft, {refused} refused; within two standard errors of the truth: {100 * total:.0f} %")
     print(", ".join(f"{name} {100 * share:.0f} %" for name, share in within.items()))
     print("R^2 of u, v, r, all predictions together:", ", ".join(f"{value:.3f}" for value in r_squared(all_pairs)))
     print("median of the craft:", ", ".join(f"{value:.3f}" for value in np.median(each, axis=0)))
