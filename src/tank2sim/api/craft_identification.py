@@ -14,7 +14,7 @@ from tank2sim.cards import Card, CraftCard
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import (
-    LEAD_S,
+    PREDICTION_LEAD_S,
     SHORTEST_PREDICTION_S,
     CoefficientVerdict,
     CraftFit,
@@ -68,7 +68,7 @@ class CraftIdentificationResult(Result):
             notices.append(f"{CHECK} the trials do not determine {', '.join(of_thrust)}: it is that of the card")
         if self.held and not self.predictions:
             notices.append(
-                f"no held-out trial is longer than {LEAD_S + SHORTEST_PREDICTION_S:g} s: none of them is predicted"
+                f"no held-out trial is longer than {PREDICTION_LEAD_S + SHORTEST_PREDICTION_S:g} s: none is predicted"
             )
         notices.append(
             "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "

@@ -15,7 +15,7 @@ from tank2sim.records.trials import Trial
 CRAFT_SIGNALS = ("x_m", "y_m", "psi_rad", "r_radps", "u_mps", "v_mps")
 """Signals that are compared with the motion of a craft; position and heading suffice."""
 
-LEAST_ROWS = 20
+LEAST_CRAFT_ROWS = 20
 """Fewest rows of a trial. Project choice: a few seconds at the rates of small receivers."""
 
 
@@ -38,8 +38,8 @@ def read_craft_trial(path: Path, thrusters: Sequence[str]) -> Trial:
     if "t_s" not in columns:
         raise InputError(path, "header", "lacks t_s", "give the time in s")
     time = columns["t_s"]
-    if len(time) < LEAST_ROWS:
-        raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_ROWS} are needed")
+    if len(time) < LEAST_CRAFT_ROWS:
+        raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
     if not np.all(np.diff(time) > 0):
         raise InputError(path, "column t_s", "does not rise", "sort the rows, and give each time once")
     driven = [f"n_{name}_radps" for name in thrusters]

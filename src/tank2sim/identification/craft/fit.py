@@ -25,7 +25,7 @@ from tank2sim.simulation.sensitivity import Sensitivity
 PREDICTED_S = 30.0
 """Length of a free-running prediction, s: that of the published comparisons on small craft."""
 
-LEAD_S = 10.0
+PREDICTION_LEAD_S = 10.0
 """Time of a held-out trial in which the filter finds its state, s: several time constants (project choice)."""
 
 SHORTEST_PREDICTION_S = 10.0
@@ -232,7 +232,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     for number, run in enumerate(runs):
         rows, predicted = [], []
         count, length = len(run.measured), round(PREDICTED_S / run.step_s)
-        begin = round(LEAD_S / run.step_s)
+        begin = round(PREDICTION_LEAD_S / run.step_s)
         while count - begin >= SHORTEST_PREDICTION_S / run.step_s:
             end = min(begin + length, count)
             free = sensitivity.motion(filtered.after[number, begin, :nx], run.inputs[begin : end - 1], p, run.step_s)
@@ -247,6 +247,10 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
 
 def determination(predicted: Array, truth: Array) -> Array:
     """R^2 of each column (n, m): 1 less the sum of squared errors over that about the mean.
+
+    Parameters
+    ----------
+    predicted, truth : array (n, m)
 
     Examples
     --------
