@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tank2sim.api.comparison import ComparisonResult, compare
     from tank2sim.api.convention import ConventionResult, convention
     from tank2sim.api.conversion import ConversionResult, convert
+    from tank2sim.api.craft_identification import CraftIdentificationResult, identify_craft
     from tank2sim.api.demo import DemoResult, run_demo
     from tank2sim.api.design import CampaignDesignResult, TrialDesignResult, design_campaign, design_trial
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
@@ -54,6 +55,7 @@ _HOMES = {
     "ComparisonResult": "api.comparison",
     "ConventionResult": "api.convention",
     "ConversionResult": "api.conversion",
+    "CraftIdentificationResult": "api.craft_identification",
     "DemoResult": "api.demo",
     "ExportResult": "api.fmu",
     "GapResult": "api.gap",
@@ -94,6 +96,7 @@ _HOMES = {
     "find_gap": "api.gap",
     "guess": "api.guess",
     "identify": "api.identification",
+    "identify_craft": "api.craft_identification",
     "json_schema": "api.schemas",
     "load": "api.ship",
     "log": "api.log",
@@ -121,6 +124,7 @@ __all__ = [
     "ComparisonResult",
     "ConventionResult",
     "ConversionResult",
+    "CraftIdentificationResult",
     "DemoResult",
     "ExportResult",
     "GapResult",
@@ -161,6 +165,7 @@ __all__ = [
     "find_gap",
     "guess",
     "identify",
+    "identify_craft",
     "json_schema",
     "load",
     "log",

@@ -114,6 +114,8 @@ UNITS: dict[str, Unit] = {
         Unit("kg/m3", {"kg": 1, "m": -3}, 1e5),
         Unit("kg/s", {"kg": 1, "s": -1}, 1e10),
         Unit("kg.m", {"kg": 1, "m": 1}, 1e13),
+        Unit("kg.m/s", {"kg": 1, "m": 1, "s": -1}, 1e13),
+        Unit("kg.m2/s", {"kg": 1, "m": 2, "s": -1}, 1e16),
         Unit("kg.m2", {"kg": 1, "m": 2}, 1e16),
         Unit("kg/m", {"kg": 1, "m": -1}, 1e10),
         Unit("kg.s/m2", {"kg": 1, "m": -2, "s": 1}, 1e10),

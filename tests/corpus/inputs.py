@@ -61,6 +61,17 @@ def simman(rows: int = 200) -> bytes:
 
 
 @functools.cache
+def craft_trial() -> bytes:
+    """A trial of the Otter: revolutions of both thrusters, position and heading."""
+    rows = ["t_s,x_m,y_m,psi_deg,n_port_rpm,n_starboard_rpm"]
+    for k in range(60):
+        turn = 3.0 * k * (k > 20)
+        rows.append(
+            f"{0.5 * k},{0.4 * k:.3f},{0.002 * turn:.3f},{turn:.2f},{600 + 100 * (k > 20)},{600 - 100 * (k > 20)}"
+        )
+    return ("\n".join(rows) + "\n").encode()
+
+
 def plain() -> Files:
     """Inputs that nothing has to compute."""
     oscillating = np.sin(np.linspace(0, 40, 400))
@@ -74,6 +85,8 @@ def plain() -> Files:
         "card.toml": (MODELS / "mariner" / "ship.toml").read_bytes(),
         "tanker.toml": (MODELS / "kvlcc2-captive" / "ship.toml").read_bytes(),
         "surge.toml": (MODELS / "wilinski-zellman" / "ship.toml").read_bytes(),
+        "craft.toml": (MODELS / "otter" / "ship.toml").read_bytes(),
+        "craft.csv": craft_trial(),
         "glider.toml": (MODELS / "kulikovsky-velikanov" / "ship.toml").read_bytes(),
         "rig.toml": (MODELS / "alyshev" / "ship.toml").read_bytes(),
         "steering.toml": (MODELS / "poznyakov-yudin" / "steering.toml").read_bytes(),

@@ -22,6 +22,7 @@ RECIPES: dict[str, list[Recipe]] = {
         (["card.toml", "--manoeuvre", "zigzag:10/10", "--duration", "40", "--json", "out.json"], ["card.toml"]),
         (["card.toml", "--manoeuvre", "file:orders.csv", "--duration", "40"], ["orders.csv"]),
         (["tanker.toml", "--manoeuvre", "pullout:20", "--duration", "40"], ["tanker.toml"]),
+        (["craft.toml", "--manoeuvre", "difference:190", "--duration", "10", "--json", "out.json"], ["craft.toml"]),
     ],
     "reduce": [
         (["captive.toml", "-o", "out.toml"], ["captive.toml", "averages.csv"]),
@@ -52,6 +53,7 @@ RECIPES: dict[str, list[Recipe]] = {
         (["card.toml", "zigzag.csv", *FAST, "recursive"], ["zigzag.csv"]),
         (["card.toml", "zigzag.csv", "turn.csv", *FAST, "output_error", "-o", "out.toml"], ["turn.csv"]),
         (["card.toml", "zigzag.csv", *FAST, "equation_error", "--holdout", "turn.csv"], ["turn.csv"]),
+        (["craft.toml", "craft.csv", "-o", "out.toml", "--json", "out.json"], ["craft.csv", "craft.toml"]),
     ],
     "gap": [(["card.toml", "zigzag.csv", "-o", "gap", "--workers", "1", "--effects", "current", "--max-effects", "1"],
              ["card.toml", "zigzag.csv", "zigzag.csv"])],

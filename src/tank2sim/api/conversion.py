@@ -19,11 +19,20 @@ from tank2sim.analysis.conversion.polynomial_fit import (
     scattered_motions,
 )
 from tank2sim.analysis.conversion.program_code import mss_function, pvs_class
+from tank2sim.analysis.conversion.robotics import (
+    VRX_MASSES,
+    VRX_TERMS,
+    craft_changes,
+    gazebo_model,
+    gazebo_text,
+    vrx_model,
+    vrx_text,
+)
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
-from tank2sim.cards.reading import changed_text, parse_card
+from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import write_together
@@ -33,11 +42,15 @@ LANGUAGES = {
     "mmg": "a card of the MMG method, in another scaling",
     "shipmmg": "a Python file with the parameters of shipmmg",
     "mmgdynamics": "a Python file with a vessel of mmgdynamics",
+    "small_craft": "a card of a small craft, in another scaling",
+    "gazebo": "SDF of Gazebo's hydrodynamics and thruster plugins for a small craft",
+    "vrx": "SDF of VRX's SimpleHydrodynamics for a small craft",
     "mss": "a function for MATLAB or Octave, as the ships of MSS are",
     "pvs": "a Python file with a vehicle for the Python Vehicle Simulator",
 }
 """What a card can be converted to."""
 
+_OF_CRAFT = ("small_craft", "gazebo", "vrx")
 _OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
 _SCALINGS = ("prime", "prime_ii", "bis", "dimensional")
 
@@ -47,7 +60,7 @@ class ConvertedText:
     """What was made: the text, and the card if it is one."""
 
     text: str
-    card: ManoeuvringCard | None = None
+    card: ManoeuvringCard | CraftCard | None = None
     fit: PolynomialFit | None = None
     changes: tuple[FigureChange, ...] = ()
 
@@ -143,7 +156,7 @@ class ConversionResult(Result):
             [change.manoeuvre, change.figure, change.before, change.after, _percent(change)]
             for change in self.made.changes
         ]
-        return (ResultTable("Standard manoeuvres", ("manoeuvre", "figure", "card", "polynomial", "error (%)"), rows),)
+        return (ResultTable("Standard manoeuvres", ("manoeuvre", "figure", "card", self.language, "error (%)"), rows),)
 
 
 def _percent(change: FigureChange) -> float | None:
@@ -205,7 +218,9 @@ def convert(
     if not 0 < scatter <= 10:
         raise InputError("--scatter", f"{scatter:g}", "is out of bounds", "give a number above 0, to 10")
     ship = as_ship(card)
-    given = ship.manoeuvring()
+    if isinstance(ship.card, CraftCard):
+        return _of_craft(ship, ship.card, to, Conventions(scaling, rudder_sign, origin_m))
+    given = _of_ship(ship, to)
     if abs(origin_m) > given.ship.length_m:
         raise InputError("--origin", f"{origin_m:g}", "is more than a length from midships", "give it in m")
     wanted = Conventions(scaling, rudder_sign, origin_m)
@@ -231,6 +246,43 @@ def convert(
     made = in_conventions(given, wanted)
     build(made)
     return ConversionResult(ship, to, ConvertedText(made.text, made), notices)
+
+
+def _of_ship(ship: Ship, to: str) -> ManoeuvringCard:
+    """The card of a ship; raises InputError if it is none, or the language is one of small craft."""
+    if to in _OF_CRAFT:
+        raise ship.card.fault("model.kind", f"is {ship.card.model.kind}, and {to} is for small_craft", "use mss or pvs")
+    return ship.manoeuvring()
+
+
+def _of_craft(ship: Ship, card: CraftCard, to: str, wanted: Conventions) -> ConversionResult:
+    if to not in _OF_CRAFT:
+        problem = "is small_craft, whose damping is not a polynomial about a speed"
+        raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")
+    if wanted.rudder_sign is not None or wanted.origin_m:
+        raise InputError("--to", to, "has neither a rudder nor another origin", "leave --rudder-sign, --origin out")
+    if to == "small_craft":
+        if wanted.scaling not in (None, "dimensional", "prime"):
+            raise InputError("--scaling", wanted.scaling or "", "is not of a small craft", "give dimensional or prime")
+        made = craft_in_scaling(card, wanted.scaling or card.model.scaling)
+        return ConversionResult(ship, to, ConvertedText(made.text, made), ())
+    if wanted.scaling is not None:
+        raise InputError("--to", to, "has conventions of its own", "leave --scaling out")
+    text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
+    notices = []
+    if card.effects:
+        notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+    if to == "gazebo":
+        notices.append(
+            "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
+            "dead band, nor the lag of the card"
+        )
+    else:
+        lost = [name for name, value in card.derivatives.items() if value and name not in (*VRX_TERMS, *VRX_MASSES)]
+        also = f", and {', '.join(lost)}" if lost else ""
+        notices.append(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}")
+    changes = craft_changes(card, model(card))
+    return ConversionResult(ship, to, ConvertedText(text(card), changes=changes), tuple(notices))
 
 
 def _fitted(

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialRecord
+from tank2sim.cards import CraftCard
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
 from tank2sim.logs.channel_file import CHANNELS_FILE, channels_text, read_channels
@@ -29,6 +33,8 @@ from tank2sim.records.thinning import thin_line
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tank2sim.api.craft_identification import CraftIdentificationResult
+
 VOYAGE_SAMPLES = 1500
 """Samples of the track and the time line in the JSON. Project choice: a chart is a few hundred pixels wide."""
 
@@ -37,7 +43,7 @@ _HEAD_LINES = 100
 
 NO_RUDDER_NOTICE = (
     "the vessel is steered by two thrusters: its files have columns n_port_rpm, n_starboard_rpm, order_port and "
-    "order_starboard in place of a rudder, and identify, gap and audit do not take them"
+    "order_starboard in place of a rudder; identify takes them with a card of kind small_craft, gap and audit do not"
 )
 """Notice of a craft without a rudder."""
 
@@ -48,12 +54,14 @@ class LogResult(PagedResult):
     Parameters
     ----------
     voyage : Voyage
+    craft : Ship, optional
+        With the card of a small craft: what the trials say of each of its coefficients.
     """
 
     command = "log"
 
-    def __init__(self, voyage: Voyage) -> None:
-        self.voyage = voyage
+    def __init__(self, voyage: Voyage, craft: Ship | None = None) -> None:
+        self.voyage, self.craft = voyage, craft
         self.found = find_stretches(voyage)
         self.cuts = cut_trials(voyage, self.found)
         notices = list(voyage.notices)
@@ -87,6 +95,25 @@ class LogResult(PagedResult):
     def trials(self) -> list[TrialRecord]:
         """The trials that were cut, those with a rudder."""
         return [TrialRecord(cut.trial) for cut in self.cuts if cut.steered]
+
+    @cached_property
+    def identified(self) -> CraftIdentificationResult | None:
+        """Coefficients of the craft from all trials, with a verdict on each; None without its card or trials.
+
+        Raises
+        ------
+        InputError
+            The trials lack a position, a heading or the revolutions of a thruster of the card.
+        """
+        from tank2sim.api.craft_identification import identify_craft
+
+        cut = [entry for entry in self.cuts if not entry.steered]
+        if self.craft is None or not cut:
+            return None
+        with tempfile.TemporaryDirectory() as name:
+            paths = [Path(name) / entry.trial.path.name for entry in cut]
+            write_together({path: entry.text for path, entry in zip(paths, cut, strict=True)})
+            return identify_craft(self.craft, paths)
 
     @property
     def series(self) -> dict[str, pd.DataFrame]:
@@ -149,6 +176,7 @@ class LogResult(PagedResult):
             "current": None if self.current is None else asdict(self.current),
             "track": self._track(),
             "time_line": self._time_line(),
+            "identified": self._identified_json(),
             "findings": [
                 {
                     "kind": finding.kind,
@@ -160,6 +188,13 @@ class LogResult(PagedResult):
             ],
             "notices": list(self.notices),
         }
+
+    def _identified_json(self) -> dict[str, object] | None:
+        found = self.identified
+        if found is None:
+            return None
+        content = found.content()
+        return {name: content[name] for name in ("coefficients", "next_trials", "notices")}
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -194,7 +229,8 @@ class LogResult(PagedResult):
             for entry in map(self._stretch_json, self.found)
         ]
         columns = ("stretch", "begins (s)", "lasts (s)", "steering", "heading change (deg)", "file")
-        return channels, ResultTable("Stretches", columns, stretches, wide=True)
+        verdicts = self.identified.tables if self.identified else ()
+        return channels, ResultTable("Stretches", columns, stretches, wide=True), *verdicts
 
     def _cut_of(self, stretch: Stretch) -> TrialCut | None:
         return next((cut for cut in self.cuts if cut.stretch is stretch), None)
@@ -265,7 +301,12 @@ def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
     return removed
 
 
-def log(files: str | Path | Sequence[str | Path], *, channels: str | Path | ChannelSet | None = None) -> LogResult:
+def log(
+    files: str | Path | Sequence[str | Path],
+    *,
+    channels: str | Path | ChannelSet | None = None,
+    card: Ship | str | Path | None = None,
+) -> LogResult:
     """Read logs of a vessel, find their channels and manoeuvres, and cut these into trials.
 
     Formats: NMEA 0183, NMEA 2000 (candump, Actisense), ROS 1 and ROS 2 bags, MCAP, ArduPilot ``.bin`` and ``.tlog``,
@@ -277,6 +318,8 @@ def log(files: str | Path | Sequence[str | Path], *, channels: str | Path | Chan
         Logs of one voyage.
     channels : path or ChannelSet, optional
         Which stream is which quantity, as ``channels.toml`` has it; by default they are found.
+    card : Ship, str or path, optional
+        Of a small craft: what the trials say of each of its coefficients is then in the result.
 
     Raises
     ------
@@ -298,7 +341,11 @@ def log(files: str | Path | Sequence[str | Path], *, channels: str | Path | Chan
     if not paths:
         raise InputError("log", "", "has no file", "give at least one log")
     stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
-    return LogResult(make_voyage([read_log(path) for path in paths], stated))
+    craft = None if card is None else as_ship(card)
+    if craft is not None and not isinstance(craft.card, CraftCard):
+        remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
+        raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
+    return LogResult(make_voyage([read_log(path) for path in paths], stated), craft)
 
 
 def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> str:

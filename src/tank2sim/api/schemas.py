@@ -407,6 +407,41 @@ class EstimateKeys(_Part):
     share_from_trials: Number
 
 
+class CraftEstimateKeys(_Part):
+    """A coefficient of a craft (SI), what the trials say of it, and which of them most."""
+
+    value: float
+    standard_error: float
+    before: float
+    prior_standard_error: float
+    verdict: str
+    by: str | None
+
+
+class CandidateTrialKeys(_Part):
+    """A manoeuvre of five minutes: its orders (shares of the largest revolutions), and what it would determine."""
+
+    words: str
+    t_s: list[float]
+    order_port: list[float]
+    order_starboard: list[float]
+    determines: list[str]
+
+
+class CraftIdentifyKeys(_Keys):
+    """Coefficients and thrust curves of a craft with thrusters."""
+
+    ship: str
+    method: str
+    trials: list[str]
+    coefficients: dict[str, CraftEstimateKeys]
+    noise: dict[str, float]
+    determination: dict[str, Number] | None
+    held_out: list[str]
+    next_trials: list[CandidateTrialKeys]
+    notices: list[str]
+
+
 class WindowErrorKeys(_Part):
     """Root mean square of an error over windows, and of the measured signal."""
 
@@ -603,6 +638,14 @@ class LogStretchKeys(_Part):
     file: str | None
 
 
+class LogIdentifiedKeys(_Part):
+    """What the trials of a log say of the coefficients of a craft."""
+
+    coefficients: dict[str, CraftEstimateKeys]
+    next_trials: list[CandidateTrialKeys]
+    notices: list[str]
+
+
 class LogKeys(_Keys):
     """What a vessel's log holds."""
 
@@ -615,6 +658,7 @@ class LogKeys(_Keys):
     current: dict[str, str | float] | None
     track: Columns | None
     time_line: dict[str, Columns]
+    identified: NotRequired[LogIdentifiedKeys | None]
     findings: list[dict[str, Any]]
     notices: list[str]
 
@@ -1072,7 +1116,7 @@ KEYS: dict[str, Any] = {
     "gap": GapKeys,
     "glide": GlideKeys,
     "guess": GuessKeys,
-    "identify": IdentifyKeys,
+    "identify": IdentifyKeys | CraftIdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
     "log": LogKeys,
     "pilotcard": BridgeKeys,

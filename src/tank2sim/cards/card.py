@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.cards.form import (
     BodySection,
+    CraftModel,
     EffectEntry,
     Environment,
     FittedTrial,
@@ -27,6 +28,7 @@ from tank2sim.cards.form import (
     SteeringGear,
     Surge,
     SurgeModel,
+    ThrusterSection,
     YawRig,
     YawRigModel,
 )
@@ -69,7 +71,7 @@ class Card:
     text: str
     ship: BodySection
     environment: Environment
-    model: ShipModel | SurgeModel | GliderModel | YawRigModel
+    model: ShipModel | CraftModel | SurgeModel | GliderModel | YawRigModel
     covariance: Covariance | None = field(default=None, kw_only=True, compare=False, repr=False)
 
     def files(self, path: Path) -> dict[Path, str | bytes]:
@@ -243,6 +245,45 @@ RUDDER_COEFFICIENTS = (
     *(*CROSS_FLOW_AT_RUDDER[0], *CROSS_FLOW_AT_RUDDER[1]),
 )
 """Keys of the coefficients in ``[propeller]`` and ``[rudder]``, which are parameters ``mmg.*`` of the model."""
+
+
+@dataclass(frozen=True)
+class CraftCard(Card):
+    """Card of a small craft with thrusters: Fossen's equations in three degrees of freedom, SI.
+
+    Parameters
+    ----------
+    rigid_body : RigidBody
+        m (kg), I_z (kg m2) about the origin, x_G (m, positive forward).
+    derivatives : mapping
+        Name (:data:`tank2sim.cards.small_craft.CRAFT_TERMS`) to value, SI; absent means 0.
+    uncertainty : mapping
+        Name to standard error, SI; absent means :data:`DEFAULT_RELATIVE_ERROR`.
+    thrusters : tuple of ThrusterSection
+    effects : tuple of EffectEntry
+        Current, wind and others that a craft can have.
+    spelt : mapping
+        As of :class:`ManoeuvringCard`.
+    """
+
+    ship: ShipSection
+    model: CraftModel
+    rigid_body: RigidBody
+    derivatives: Mapping[str, float]
+    thrusters: tuple[ThrusterSection, ...]
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    effects: tuple[EffectEntry, ...] = ()
+    spelt: Mapping[str, str] = field(default_factory=dict)
+    roll: None = None
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of a derivative (SI): as stated, or the default share of its value."""
+        return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
+
+    def in_file(self, place: str, value: float) -> tuple[str, float]:
+        """As of :class:`ManoeuvringCard`."""
+        spelling = self.spelt.get(place, place)
+        return spelling, from_si(spelling, value)
 
 
 @dataclass(frozen=True)

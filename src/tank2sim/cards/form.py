@@ -161,6 +161,31 @@ class YawRigModel(CardSection):
     valid_speed_mps: SpeedRange | None = None
 
 
+class CraftModel(CardSection):
+    """``[model]`` of a small craft with thrusters: Fossen's equations in three degrees of freedom.
+
+    Parameters
+    ----------
+    kind : str
+    speed_mps : float
+        Cruising speed, m/s: that of the start and, with ``scaling = "prime"``, V of the prime system.
+    scaling : str
+        Of ``[rigid_body]``, ``[derivatives]`` and ``[uncertainty]``: ``dimensional`` is SI.
+    valid_speed_mps : pair of float, optional
+        Speeds through the water at which the card holds; by default 0 to 1.2 times the cruising speed.
+    """
+
+    kind: Literal["small_craft"]
+    speed_mps: Speed
+    scaling: Literal["dimensional", "prime"] = "dimensional"
+    valid_speed_mps: SpeedRange | None = None
+
+    @property
+    def speed_range_mps(self) -> tuple[float, float]:
+        """Speeds (m/s) in which the card holds; by default rest to 1.2 times the cruising speed."""
+        return self.valid_speed_mps or (0.0, 1.2 * self.speed_mps)
+
+
 class RigidBody(CardSection):
     """``[rigid_body]``: mass, yaw inertia about the origin, and position of the centre of gravity."""
 
@@ -447,6 +472,60 @@ class ProgrammeSection(CardSection):
     humps: Annotated[int, Field(ge=1, le=1000)] = 5
 
 
+class ThrusterSection(CardSection):
+    """One of ``[[thrusters]]`` of a small craft: its place, thrust curve and limits, SI.
+
+    T = k n|n| - l max(n, 0) u_T, n its revolutions (rad/s, positive ahead), k ``ahead_Ns2`` for n > 0 and
+    ``astern_Ns2`` for n < 0, u_T (m/s) the craft's velocity through the water along the thruster.
+
+    Parameters
+    ----------
+    name : str
+        Small letters, digits and ``_``: it is in the names of the model's variables.
+    x_m, y_m : float
+        Place, m forward and to starboard of the origin.
+    azimuth_rad : float
+        Direction in which it pushes the craft with n > 0, rad clockwise from the bow.
+    ahead_Ns2, astern_Ns2 : float
+        Thrust over the square of the revolutions at rest, N s^2.
+    speed_loss_kg : float
+        l: loss of thrust by revolutions ahead (rad/s) and speed (m/s), N s^2/m = kg.
+    max_radps, max_astern_radps : float
+        Largest revolutions, either way; astern by default as ahead.
+    dead_band_radps : float
+        Orders that are no larger leave the propeller at rest.
+    time_constant_s : float, optional
+        Lag of the revolutions behind their order; by default none.
+    max_azimuth_rad : float, optional
+        An azimuth or outboard: how far it turns to either side of ``azimuth_rad``.
+    azimuth_time_constant_s, max_azimuth_rate_radps : float, optional
+        Lag and largest rate of that turn; the lag is required with ``max_azimuth_rad``.
+    uncertainty : dict
+        Standard errors of ``ahead_Ns2``, ``astern_Ns2``, ``speed_loss_kg``, ``dead_band_radps``, ``time_constant_s``.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
+    x_m: Annotated[float, Field(ge=-1e3, le=1e3)] = 0.0
+    y_m: Annotated[float, Field(ge=-1e3, le=1e3)] = 0.0
+    azimuth_rad: Annotated[float, Field(ge=-6.283185307179586, le=6.283185307179586)] = 0.0
+    ahead_Ns2: Annotated[float, Field(ge=1e-9, le=1e6)]
+    astern_Ns2: Annotated[float, Field(ge=0.0, le=1e6)]
+    speed_loss_kg: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    max_radps: AngularRate
+    max_astern_radps: AngularRate | None = None
+    dead_band_radps: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
+    time_constant_s: TimeConstant | None = None
+    max_azimuth_rad: Annotated[float, Field(gt=0, le=6.283185307179586)] | None = None
+    azimuth_time_constant_s: TimeConstant | None = None
+    max_azimuth_rate_radps: AngularRate | None = None
+    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
+
+    @property
+    def lowest_radps(self) -> float:
+        """Largest revolutions astern, rad/s, negative."""
+        return -(self.max_radps if self.max_astern_radps is None else self.max_astern_radps)
+
+
 class EffectEntry(CardSection):
     """One of ``[[effects]]``: its name, parameters (SI) and their standard errors."""
 
@@ -514,6 +593,20 @@ class MmgForm(ShipCard):
     rudder: MmgRudder
 
 
+class CraftForm(CardSection):
+    """The card of a small craft with thrusters, as in its file."""
+
+    format: Literal["tank2sim-ship/1"]
+    ship: ShipSection
+    environment: Environment = Environment()
+    model: CraftModel
+    rigid_body: RigidBody
+    derivatives: dict[str, float]
+    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
+    thrusters: Annotated[list[ThrusterSection], Field(min_length=1, max_length=8)]
+    effects: list[EffectEntry] = []
+
+
 class SurgeCard(CardSection):
     """The card of a body that only surges, as in its file."""
 
@@ -547,10 +640,11 @@ class YawRigForm(CardSection):
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
 
-CARD_FORMS: dict[str, type[ShipCard] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
+CARD_FORMS: dict[str, type[ShipCard] | type[CraftForm] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
     "linear": ShipCard,
     "abkowitz": ShipCard,
     "mmg": MmgForm,
+    "small_craft": CraftForm,
     "surge": SurgeCard,
     "glider": GliderForm,
     "yaw_rig": YawRigForm,

@@ -17,6 +17,7 @@ from tank2sim.bundled import bundled_cards
 from tank2sim.cards.card import (
     OPPOSITE,
     Card,
+    CraftCard,
     GliderCard,
     ManoeuvringCard,
     MmgCard,
@@ -26,6 +27,7 @@ from tank2sim.cards.card import (
 )
 from tank2sim.cards.form import (
     CARD_FORMS,
+    CraftForm,
     EffectEntry,
     GliderForm,
     MmgForm,
@@ -39,6 +41,7 @@ from tank2sim.cards.form import (
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
 from tank2sim.cards.scaling import FileScales, file_factor
+from tank2sim.cards.small_craft import craft_card, craft_scale, craft_scales
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
@@ -119,6 +122,9 @@ def parse_card(text: str, source: str) -> Card:
         nominal = nominal_revolutions(card, form.propulsion.nominal_radps if form.propulsion else None)
         # X_nn, the effect of revolutions on surge, is that of the propeller's own equations.
         return replace(card, propulsion=Propulsion(nominal_radps=nominal, Xnn=0.0))
+    if isinstance(form, CraftForm):
+        _refuse_doubled_effects(form.effects, source)
+        return craft_card(form, text, source, spelt)
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
     return _si_card(form, kind, text, source)
@@ -192,6 +198,24 @@ def linear_card(card: Card) -> ManoeuvringCard:
     return new
 
 
+def craft_in_scaling(card: CraftCard, scaling: str) -> CraftCard:
+    """The card of a small craft with its numbers in another scaling, ``dimensional`` or ``prime``: the same craft."""
+    to_prime, was_prime = scaling == "prime", card.model.scaling == "prime"
+    if to_prime == was_prime:
+        return card
+    scales, body = craft_scales(card), card.rigid_body
+    own = {"mass": float(scales.mass), "yaw_inertia": float(scales.inertia), "x_G": float(scales.length)}
+    changes: dict[str, object] = {"model.scaling": scaling}
+    for key, unit in own.items():
+        changes[f"rigid_body.{key}"] = getattr(body, key) / (unit if to_prime else 1.0)
+    for section, values in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
+        for name, value in values.items():
+            changes[f"{section}.{name}"] = value / (craft_scale(name, scales) if to_prime else 1.0)
+    made = parse_card(changed_text(card.text, card.source, changes), card.source)
+    assert isinstance(made, CraftCard)
+    return made
+
+
 def _content(text: str, source: str) -> dict[str, Any]:
     with faults_of_toml(source):
         content = tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
@@ -229,6 +253,11 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
             places += [
                 (f"effects.{number}.{part}", entry[part]) for part in ("parameters", "uncertainty") if part in entry
             ]
+    thrusters = content.get("thrusters")
+    for number, entry in enumerate(thrusters if isinstance(thrusters, list) else []):
+        if isinstance(entry, dict):
+            places.append((f"thrusters.{number}", entry))
+            places.append((f"thrusters.{number}.uncertainty", entry.get("uncertainty")))
     for place, section in places:
         if not isinstance(section, dict):
             continue  # the form will refuse it

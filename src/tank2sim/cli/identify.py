@@ -5,17 +5,61 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
+from tank2sim.api.craft_identification import craft_trial_files, identify_craft
 from tank2sim.api.identification import identify
-from tank2sim.api.ship import load
+from tank2sim.api.ship import Ship, load
 from tank2sim.api.trial import trial_files
+from tank2sim.cards import CraftCard
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import executor_option, page_option, plot_folder_option
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
+from tank2sim.errors import InputError
 from tank2sim.identification.trials.identify import TRIAL_METHODS
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
+
+_SHIP_OPTIONS = {
+    "method": "--method",
+    "structure": "--structure",
+    "campaign": "--campaign",
+    "inertia": "--inertia",
+    "piece": "--piece",
+    "workers": "--workers",
+    "executor": "--executor",
+    "members": "--members",
+    "bootstrap": "--bootstrap",
+    "posterior": "--posterior",
+    "draws": "--draws",
+    "hold": "--hold",
+    "force": "--force",
+    "trust_card": "--trust-card",
+    "plots": "--plots",
+}
+"""Parameters that are of a ship's trials alone."""
+
+
+def _of_craft(
+    ship: Ship,
+    trials: tuple[Path, ...],
+    holdout: tuple[Path, ...],
+    output: Path | None,
+    page: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Identify a craft with thrusters; refuse options that it does not have."""
+    context = click.get_current_context()
+    for name, option in _SHIP_OPTIONS.items():
+        if context.get_parameter_source(name) not in (None, ParameterSource.DEFAULT):
+            raise InputError(option, "", "is not for a craft with thrusters", "leave it out")
+    with showing_progress("fitting") as progress:
+        result = identify_craft(ship, trials, holdout=holdout, progress=progress)
+    files = result.card.files(output) if output else {}
+    inputs = [Path(ship.card.source), *craft_trial_files(trials), *craft_trial_files(holdout)]
+    write_result(result, inputs, json_file=json_file, page=page, files=files)
+    show_result(result)
 
 
 @click.command("identify", cls=TakesSeveral, several=("--holdout",))
@@ -104,6 +148,9 @@ def command(
 ) -> None:
     """Estimate the coefficients of CARD from the free-running TRIALs (CSV, SIMMAN .dat or Esso Osaka CSV)."""
     ship = load(card)
+    if isinstance(ship.card, CraftCard):
+        _of_craft(ship, trials, holdout, output, page, json_file)
+        return
     with showing_progress("fitting") as progress:
         result = identify(
             ship,

@@ -30,10 +30,21 @@ from tank2sim.logs.channel_file import CHANNELS_FILE
     metavar="FILE.toml",
     help=f"Which stream is which quantity; by default {CHANNELS_FILE} of the folder, if it is there, else found.",
 )
+@click.option(
+    "--card",
+    metavar="CARD",
+    help="Card of a small craft with thrusters: say of each coefficient whether these trials determine it, and which "
+    "five minutes would.",
+)
 @page_option()
 @json_option
 def command(
-    logs: tuple[Path, ...], output: Path, channels_file: Path | None, page: Path | None, json_file: Path | None
+    logs: tuple[Path, ...],
+    output: Path,
+    channels_file: Path | None,
+    card: str | None,
+    page: Path | None,
+    json_file: Path | None,
 ) -> None:
     """Read the logs of one voyage, find which stream is what, and cut its manoeuvres into trials.
 
@@ -44,7 +55,7 @@ def command(
     present = output / CHANNELS_FILE
     stated = channels_file or (present if present.is_file() else None)
     with folder_made(output):
-        result = log(logs, channels=stated)
+        result = log(logs, channels=stated, card=card)
         files = result.files(output)
         inputs = [*logs, *([stated] if stated else [])]
         write_result(result, inputs, json_file=json_file, page=page, files=files)

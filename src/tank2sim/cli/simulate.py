@@ -9,7 +9,7 @@ import click
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import ensemble_options, plot_option, set_option
-from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS
+from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS
 
 
 @click.command("simulate")
@@ -18,7 +18,8 @@ from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS
     "--manoeuvre",
     required=True,
     metavar="M",
-    help=f"{MANOEUVRE_FORMS}. Angles in deg, + to starboard; execute at t = 0.",
+    help=f"{MANOEUVRE_FORMS}; of a craft with thrusters {THRUSTER_FORMS}. Angles in deg, + to starboard; "
+    "execute at t = 0.",
 )
 @click.option(
     "--duration", type=float, metavar="S", help="Length of the run in s; by default what the manoeuvre needs."

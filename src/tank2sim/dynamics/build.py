@@ -5,14 +5,16 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import cast
 
-from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
+from tank2sim.cards.card import Card, CraftCard, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS, Effect
 from tank2sim.dynamics.glider import glider_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.simulator_interface import force_shares
+from tank2sim.dynamics.small_craft import craft_model
 from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.units import from_si
@@ -33,7 +35,7 @@ def build(card: Card) -> Model:
         The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
         singular; the message names the key.
     """
-    entries = card.effects if isinstance(card, ManoeuvringCard) else ()
+    entries = card.effects if isinstance(card, ManoeuvringCard | CraftCard) else ()
     effects = tuple(EFFECTS.get(entry.name) for entry in entries)
     content = pickle.dumps(replace(card, covariance=None))
     return _built(_Described(content, tuple(map(id, effects)), card, effects))
@@ -70,18 +72,23 @@ def _model(card: Card) -> Model:
         return glider_model(card)
     if isinstance(card, YawRigCard):
         return yaw_rig_model(card.ship.name, card.yaw_rig)
-    if not isinstance(card, ManoeuvringCard):
+    if not isinstance(card, ManoeuvringCard | CraftCard):
         raise TypeError(f"no model for {type(card).__name__}")
-    model = ship_model(card)
+    model = craft_model(card) if isinstance(card, CraftCard) else ship_model(card)
     for number, entry in enumerate(card.effects):
         model = _with_effect(model, card, entry, f"effects.{number}")
     return model
 
 
-def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place: str) -> Model:
+def _with_effect(model: Model, card: ManoeuvringCard | CraftCard, entry: EffectEntry, place: str) -> Model:
     effect = EFFECTS.get(entry.name)
     if effect is None:
         raise card.fault(f"{place}.name", f"{entry.name!r} is not an effect", EFFECTS.remedy(entry.name))
+    if isinstance(card, CraftCard) and not effect.fits_craft:
+        fitting = ", ".join(name for name, other in EFFECTS.items() if other.fits_craft)
+        raise card.fault(f"{place}.name", f"{entry.name} is not for a small craft", f"it can have {fitting}")
+    # What fits a craft reads nothing else of a card than what both kinds have.
+    shared = cast(ManoeuvringCard, card)
     known = {parameter.name: parameter for parameter in effect.parameters}
     for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
         for name in given:
@@ -94,11 +101,11 @@ def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place:
                 continue
             raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
         value = entry.parameters[name]
-        if not parameter.lowest(card) <= value <= parameter.maximum:
+        if not parameter.lowest(shared) <= value <= parameter.maximum:
             key, shown = card.in_file(f"{place}.parameters.{name}", value)
-            lowest, highest = (from_si(key, bound) for bound in (parameter.lowest(card), parameter.maximum))
+            lowest, highest = (from_si(key, bound) for bound in (parameter.lowest(shared), parameter.maximum))
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
-    changed = effect.apply(model, entry.parameters, card)
+    changed = effect.apply(model, entry.parameters, shared)
     # One that changes derivatives has no force of its own.
     if effect.acts_on != "force" or effect.reads_derivatives or effect.changes:
         return changed

@@ -103,7 +103,7 @@ def motion_quantities(hull: Hull, forces: tuple[Quantity, ...]) -> tuple[Quantit
     masses = _inertia_quantities(hull)
     matrix = Inertia(*(mass.symbol for mass in masses))
     motion = rigid_body_accelerations(matrix, X.symbol, Y.symbol, N.symbol)
-    return (*forces, *masses, *_acceleration_quantities(motion), *_water_speed_quantities(hull))
+    return (*forces, *masses, *acceleration_quantities(motion), *_water_speed_quantities(hull))
 
 
 def _scales_of_forces(hull: Hull) -> tuple[ca.SX, Scales]:
@@ -241,7 +241,9 @@ def polynomial_forces(hull: Hull) -> tuple[Quantity, ...]:
     return (*by_rudder, *force_quantities(_right_hand_sides(hull, by_rudder), equations))
 
 
-def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity, Quantity]:
+def force_quantities(
+    forces: Forces, equations: str, nominal: tuple[float, float] = (1e5, 1e7)
+) -> tuple[Quantity, Quantity, Quantity]:
     """``force.X``, ``force.Y``, ``force.N``: the right-hand sides f1, f2, f3 of the `equations` named.
 
     Parameters
@@ -250,6 +252,8 @@ def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity
         Their values: N, N, N m.
     equations : str
         What they are called, for the descriptions.
+    nominal : pair of float
+        Typical force (N) and moment (N m).
     """
     f1, f2, f3 = forces
     return (
@@ -257,21 +261,21 @@ def force_quantities(forces: Forces, equations: str) -> tuple[Quantity, Quantity
             name="force.X",
             unit="N",
             description=f"Surge force except for that of acceleration, {equations}, positive forward",
-            nominal=1e5,
+            nominal=nominal[0],
             value=f1,
         ),
         Quantity(
             name="force.Y",
             unit="N",
             description=f"Sway force except for that of acceleration, {equations}, positive to starboard",
-            nominal=1e5,
+            nominal=nominal[0],
             value=f2,
         ),
         Quantity(
             name="force.N",
             unit="N.m",
             description=f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
-            nominal=1e7,
+            nominal=nominal[1],
             value=f3,
         ),
     )
@@ -283,7 +287,11 @@ def _inertia_quantities(hull: Hull) -> tuple[Quantity, ...]:
     added = {}
     for name in ACCELERATION_TERMS:
         added[name] = scales.derivative(known_term(name)) * hull.coefficient(name)
-    matrix = inertia(hull["ship.mass"], hull["ship.x_G"], hull["ship.yaw_inertia"], added)
+    return inertia_quantities(inertia(hull["ship.mass"], hull["ship.x_G"], hull["ship.yaw_inertia"], added))
+
+
+def inertia_quantities(matrix: Inertia) -> tuple[Quantity, ...]:
+    """``inertia.*`` of a mass matrix (kg, kg m, kg m2), in the order of :class:`Inertia`."""
     described = (
         ("inertia.surge", "kg", "Mass with added mass in surge, m - Xudot", matrix.surge),
         ("inertia.sway", "kg", "Mass with added mass in sway, m - Yvdot", matrix.sway),
@@ -297,7 +305,8 @@ def _inertia_quantities(hull: Hull) -> tuple[Quantity, ...]:
     )
 
 
-def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quantity, ...]:
+def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
+    """``motion.udot``, ``motion.vdot`` (m/s2), ``motion.rdot`` (rad/s2) of their values."""
     described = (
         ("motion.udot", "m/s2", "Rate of change of the surge velocity", None, 1e-2),
         ("motion.vdot", "m/s2", "Rate of change of the sway velocity", None, 1e-2),

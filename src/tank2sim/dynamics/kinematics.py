@@ -65,6 +65,53 @@ def yaw_rate(nominal_radps: float) -> tuple[State, Parameter]:
     return state, start
 
 
+def body_states(speed: float, length: float) -> tuple[Variable, ...]:
+    """States ``motion.u``, ``.v``, ``.r`` of a vessel that starts straight ahead, and the parameters of their start.
+
+    Parameters
+    ----------
+    speed : float
+        Surge velocity at the start, m/s.
+    length : float
+        L, m, for the nominal yaw rate.
+    """
+    trim = Parameter(
+        name="initial.trim",
+        unit="1",
+        description="True: start in steady motion with the inputs given (initial.u, .v, .r are then a first guess)",
+        boolean=True,
+        start=0.0,
+        tunable=False,
+    )
+    surge = _velocity("u", "Surge", ", positive forward", start=speed, nominal=speed)
+    sway = _velocity("v", "Sway", ", positive to starboard", nominal=0.1 * speed)
+    states, starts = zip(surge, sway, yaw_rate(speed / length), strict=True)
+    return (*states, *starts, trim)
+
+
+def _velocity(letter: str, name: str, sign: str, *, nominal: float, start: float = 0.0) -> tuple[State, Parameter]:
+    described = f"{name} velocity through the water"
+    first = Parameter(
+        name=f"initial.{letter}",
+        unit="m/s",
+        description=f"{described} at the start{sign}",
+        display_unit="knots",
+        start=start,
+        tunable=False,
+    )
+    state = State(
+        name=f"motion.{letter}",
+        unit="m/s",
+        description=f"{described}{sign}",
+        display_unit="knots",
+        nominal=nominal,
+        derivative=f"motion.{letter}dot",
+        start=first.symbol,
+        steady=True,
+    )
+    return state, first
+
+
 def heel(*, at_rest: bool = False) -> tuple[tuple[State, State], tuple[Parameter, ...]]:
     """States ``motion.phi`` (rad) and ``motion.p`` (rad/s), and their starts ``initial.phi``, ``initial.p``.
 

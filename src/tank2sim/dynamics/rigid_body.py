@@ -68,3 +68,21 @@ def inertial_forces(mass: Scalar, x_G: Scalar, u: Scalar, v: Scalar, r: Scalar) 
     In the linear equations (3.5) u is the speed of expansion, in (3.8) the instantaneous one.
     """
     return mass * (v * r + x_G * r * r), -mass * u * r, -mass * x_G * u * r
+
+
+def added_mass_forces(added: dict[str, Scalar], u: Scalar, v: Scalar, r: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """-C_A nu of Fossen (2021), 6.3.1: what the water's inertia leaves on the right, the moment of Munk with it.
+
+        X = -(Yvdot v + Yrdot r) r,  Y = Xudot u r,  N = (Yvdot v + Yrdot r) u - Xudot u v
+
+    Yrdot is the mean of Yrdot and Nvdot, which are equal in theory.
+
+    Parameters
+    ----------
+    added : dict
+        ``Xudot Yvdot Yrdot Nvdot``, kg and kg m.
+    u, v, r : number or expression
+        Velocities through the water (m/s) and yaw rate (rad/s).
+    """
+    across = added["Yvdot"] * v + (added["Yrdot"] + added["Nvdot"]) / 2 * r
+    return -across * r, added["Xudot"] * u * r, across * u - added["Xudot"] * u * v

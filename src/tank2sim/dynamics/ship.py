@@ -16,7 +16,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import VALIDITY_FACTOR, Hull, motion_quantities, polynomial_forces
-from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
+from tank2sim.dynamics.kinematics import body_states, planar_kinematics
 from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.mmg.ship import MmgShip, mmg_forces, mmg_parameters, sides
@@ -54,7 +54,7 @@ def ship_model(card: ManoeuvringCard) -> Model:
     """
     names, notices = _derivative_names(card)
     _refuse_singular_mass(card)
-    body = _body_states(card)
+    body = body_states(card.model.speed_mps, card.ship.length_m)
     gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
     engine: tuple[Variable, ...] = ()
     if isinstance(card, MmgCard):
@@ -273,43 +273,3 @@ def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Par
         )
         for name in names
     )
-
-
-def _body_states(card: ManoeuvringCard) -> tuple[Variable, ...]:
-    """States ``motion.u``, ``.v``, ``.r``, and the parameters of their start."""
-    speed = card.model.speed_mps
-    trim = Parameter(
-        name="initial.trim",
-        unit="1",
-        description="True: start in steady motion with the inputs given (initial.u, .v, .r are then a first guess)",
-        boolean=True,
-        start=0.0,
-        tunable=False,
-    )
-    surge = _velocity("u", "Surge", ", positive forward", start=speed, nominal=speed)
-    sway = _velocity("v", "Sway", ", positive to starboard", nominal=0.1 * speed)
-    states, starts = zip(surge, sway, yaw_rate(speed / card.ship.length_m), strict=True)
-    return (*states, *starts, trim)
-
-
-def _velocity(letter: str, name: str, sign: str, *, nominal: float, start: float = 0.0) -> tuple[State, Parameter]:
-    described = f"{name} velocity through the water"
-    first = Parameter(
-        name=f"initial.{letter}",
-        unit="m/s",
-        description=f"{described} at the start{sign}",
-        display_unit="knots",
-        start=start,
-        tunable=False,
-    )
-    state = State(
-        name=f"motion.{letter}",
-        unit="m/s",
-        description=f"{described}{sign}",
-        display_unit="knots",
-        nominal=nominal,
-        derivative=f"motion.{letter}dot",
-        start=first.symbol,
-        steady=True,
-    )
-    return state, first

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from tank2sim.cards.card import Card, ManoeuvringCard
+from tank2sim.cards.card import Card, CraftCard, ManoeuvringCard
 from tank2sim.fmu.provenance import ValueOrigin, origins
 
 
@@ -42,7 +42,7 @@ def documents_without_card(card: Card) -> Documents:
 
 def documents_of(card: Card) -> Documents:
     """Source, validity, the origin of every coefficient and the card itself, to lie in the FMU."""
-    speeds = card.model.speed_range_mps if isinstance(card, ManoeuvringCard) else card.model.valid_speed_mps
+    speeds = card.model.speed_range_mps if isinstance(card, ManoeuvringCard | CraftCard) else card.model.valid_speed_mps
     validity = f"The card holds for speeds through the water of {speeds[0]:g} to {speeds[1]:g} m/s." if speeds else ""
     if isinstance(card, ManoeuvringCard) and card.propulsion is None:
         validity += (

@@ -8,10 +8,11 @@ from typing import Any
 
 import tomlkit
 
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, ManoeuvringCard, SurgeBodyCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, CraftCard, ManoeuvringCard, SurgeBodyCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.particulars import estimated_from
 from tank2sim.dynamics.low_speed import SOURCES
+from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.units import to_si
 
 NOT_STATED = "not stated"
@@ -93,6 +94,8 @@ def origins(card: Card) -> dict[str, ValueOrigin]:
         if comment is not None:
             error, whence = _surge_error(card, key)
             found[variable] = ValueOrigin(card.ship.source, comment, error, whence)
+    if isinstance(card, CraftCard):
+        return found | dict(_of_craft(card, document)) | dict(_of_effects(card, document))
     if not isinstance(card, ManoeuvringCard):
         return found
     found = _of_low_speed() | found
@@ -101,6 +104,21 @@ def origins(card: Card) -> dict[str, ValueOrigin]:
         whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
         found[f"derivatives.{name}"] = ValueOrigin(card.ship.source, comment or "", card.standard_error(name), whence)
     return found | dict(_of_effects(card, document))
+
+
+def _of_craft(card: CraftCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
+    """Derivatives and thrust curves of a small craft."""
+    for name in card.derivatives:
+        comment = _line_comment(document.get("derivatives"), name)
+        whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
+        yield f"derivatives.{name}", ValueOrigin(card.ship.source, comment or "", card.standard_error(name), whence)
+    for thruster, table in zip(card.thrusters, document["thrusters"], strict=True):
+        for key, name in THRUSTER_PARAMETERS.items():
+            comment = _line_comment(table, key)
+            if comment is not None:
+                error = thruster.uncertainty.get(key)
+                whence = NOT_STATED if error is None else STATED_ERROR
+                yield f"thrusters.{thruster.name}.{name}", ValueOrigin(card.ship.source, comment, error, whence)
 
 
 def _of_low_speed() -> dict[str, ValueOrigin]:
@@ -121,7 +139,7 @@ def _surge_error(card: Card, key: str) -> tuple[float | None, str]:
     return None, NOT_STATED
 
 
-def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
+def _of_effects(card: ManoeuvringCard | CraftCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
     for entry, table in zip(card.effects, document.get("effects", ()), strict=True):
         effect = EFFECTS[entry.name]
         for name, variable in effect.model_names().items():

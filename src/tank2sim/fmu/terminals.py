@@ -11,6 +11,7 @@ _DESCRIPTIONS = {
     "motion": "Motion of the ship: position and heading, velocities through the water and over the ground",
     "position": "Geographic position (WGS 84)",
     "steering": "Steering gear: rudder order and angle, failure",
+    "thrusters": "Thrusters: orders, revolutions and thrust of each",
     "propulsion": "Propulsion: ordered and actual revolutions",
     "force": "Hydrodynamic forces and moment on the ship",
     "validity_by": "Factors of validity, one for each cause",

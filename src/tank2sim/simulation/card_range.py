@@ -129,7 +129,8 @@ def _how(run: Trajectory, values: Mapping[str, float]) -> str:
     moving = np.maximum(run["motion.speed"], _STILL * values["ship.speed"])
     rate = run["motion.r"] * values["ship.length"] / moving
     drift = np.arcsin(np.clip(run["motion.v"] / moving, -1.0, 1.0))
-    return exceeded_range(values, run["motion.speed"], rate, drift, run["rudder.angle"])
+    rudder = run["rudder.angle"] if "rudder.angle" in run.model else np.zeros_like(rate)
+    return exceeded_range(values, run["motion.speed"], rate, drift, rudder)
 
 
 def exceeded_range(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 
 Figures = dict[str, object]
@@ -24,6 +25,10 @@ steady turns; smaller ones are residuals of the waiting time."""
 STEADY_SHARE = 0.01
 """Change of yaw rate and speed over two ship lengths, relative to themselves, below which a turn is steady. Project
 choice."""
+
+REACHED_SPEED = 0.9
+"""Share of the last speed of a straight run at which it counts as reached. Project choice: the last tenth takes for
+ever."""
 
 REST_SPEED = 1e-6
 """Share of the run's largest speed below which a speed counts as zero: project choice, above rounding."""
@@ -44,6 +49,12 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
     match manoeuvre:
         case Turn(rudder=rudder):
             return _turn(trajectory, math.copysign(1.0, rudder), length)
+        case DifferenceTurn(difference):
+            return _turn(trajectory, math.copysign(1.0, difference), length)
+        case Spin(revolutions):
+            return _spin(trajectory, math.copysign(1.0, revolutions), length)
+        case StraightRun():
+            return _straight(trajectory, length)
         case Zigzag():
             return _zigzag(trajectory, manoeuvre, length)
         case PullOut(rudder):
@@ -115,6 +126,33 @@ def _turn(run: Trajectory, side: float, length: float) -> Figures:
         "steady_speed_mps": speed if steady else None,
         "speed_loss_percent": _speed_loss(run, speed) if steady else None,
         **_largest_heel(run),
+    }
+
+
+def _spin(run: Trajectory, side: float, length: float) -> Figures:
+    """Times to a half and to a whole turn, the rate at the end, and how far the origin went from its place."""
+    execute = _Execute(run, side)
+    away = np.hypot(run["motion.x"] - run["motion.x"][0], run["motion.y"] - run["motion.y"][0])
+    whole = execute.time_of(2 * math.pi)
+    return {
+        "time_180_s": execute.time_of(math.pi),
+        "time_360_s": whole,
+        "final_rate_degps": math.degrees(run["motion.r"][-1]),
+        "largest_distance_m": float(away.max()),
+        "largest_distance_lengths": float(away.max()) / length,
+    }
+
+
+def _straight(run: Trajectory, length: float) -> Figures:
+    """The speed at the end of a run from rest, and the time and distance to nine tenths of it."""
+    final = float(run["motion.u"][-1])
+    time = _first(run.crossings("motion.u", "motion.udot", REACHED_SPEED * final))
+    distance = math.hypot(*_Execute(run, 1.0).place(time)) if time else None
+    return {
+        "final_speed_mps": final,
+        "time_to_90_percent_s": time,
+        "distance_to_90_percent_m": distance,
+        "distance_to_90_percent_lengths": distance and distance / length,
     }
 
 

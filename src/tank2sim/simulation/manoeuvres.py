@@ -21,11 +21,21 @@ from tank2sim.dynamics.model import Input
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, read_table
 from tank2sim.simulation.running import Running
+from tank2sim.simulation.thruster_manoeuvres import (
+    DifferenceTurn,
+    Spin,
+    StraightRun,
+    ThrusterManoeuvre,
+    thruster_commands,
+)
 
 MANOEUVRE_FORMS = (
     "turn:35, turn:-35, zigzag:20/20, zigzag:-10/10, pullout:20, spiral, spiral:20, stop, stop:-60 (rpm), "
     "file:orders.csv"
 )
+
+THRUSTER_FORMS = "straight:600, difference:200, difference:-200, spin:400 (rpm), stop, stop:-600, file:orders.csv"
+"""Manoeuvres of a craft with thrusters."""
 
 TURN_HEADING = math.radians(540.0)
 """Heading change of a turning circle: 1.5 turns, so that its last half turn is steady (ITTC 7.5-04-02-01)."""
@@ -235,6 +245,15 @@ class Stop:
         InputError
             The ship has no propulsion.
         """
+        if commands := thruster_commands(running.model):
+            orders = {
+                command.name: -FULL_ASTERN * command.start if self.revolutions is None else self.revolutions
+                for command in commands
+                if command.start
+            }
+            running.order(orders)
+            self._until_stopped(running, ship_time, duration)
+            return
         if "propeller.speed" not in running.model.input_names:
             problem = "is missing: the ship's engine cannot be stopped or reversed"
             raise InputError(running.model.origin, "propulsion", problem, "add [propulsion] to the card")
@@ -243,6 +262,9 @@ class Stop:
         running.order(
             {"propeller.speed": -FULL_ASTERN * nominal.start if self.revolutions is None else self.revolutions}
         )
+        self._until_stopped(running, ship_time, duration)
+
+    def _until_stopped(self, running: Running, ship_time: float, duration: float | None) -> None:
         if duration is not None:
             running.run(duration)
             return
@@ -278,6 +300,8 @@ class Orders:
         for name in self.inputs:
             if name not in running.model.input_names:
                 remedy = "add [propulsion] to the card, or leave the column out"
+                if commands := thruster_commands(running.model):
+                    remedy = f"its inputs are {', '.join(command.name for command in commands)}"
                 raise InputError(self.source, name, "is not an input of this ship", remedy)
         end = float(self.times[-1]) if duration is None else duration
         if end <= 0:
@@ -293,11 +317,13 @@ class Orders:
         running.run(end - running.time)
 
 
-Manoeuvre = Turn | Zigzag | PullOut | SpiralManoeuvre | Stop | Orders
+Manoeuvre = Turn | Zigzag | PullOut | SpiralManoeuvre | Stop | Orders | ThrusterManoeuvre
 
 
 def parse_manoeuvre(text: str) -> Manoeuvre:
-    """Parse a manoeuvre: one of :data:`MANOEUVRE_FORMS`, angles in deg, positive to starboard, rpm ahead.
+    """Parse a manoeuvre: one of :data:`MANOEUVRE_FORMS` or of :data:`THRUSTER_FORMS`.
+
+    Angles are in deg, revolutions in rpm, turns positive to starboard.
 
     Raises
     ------
@@ -310,6 +336,8 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
     if kind == "stop":
         return _parse_stop(text)
     number = r"([+-]?\d+(?:\.\d+)?)"
+    if kind in _BY_THRUSTERS:
+        return _parse_thrusters(kind, re.fullmatch(number, argument), text)
     makers: dict[str, tuple[str, Callable[[list[float]], Manoeuvre]]] = {
         "turn": (number, lambda a: Turn(math.radians(a[0]))),
         "zigzag": (f"{number}/{number}", lambda a: Zigzag(math.radians(a[0]), math.radians(a[1]))),
@@ -318,9 +346,10 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
     }
     found = re.fullmatch(makers[kind][0], argument) if kind in makers else None
     if found is None:
-        close = difflib.get_close_matches(kind, [*makers, "stop", "file"], n=1)
+        close = difflib.get_close_matches(kind, [*makers, *_BY_THRUSTERS, "stop", "file"], n=1)
         hint = f"did you mean {close[0]}? " if close and close[0] != kind else ""
-        raise InputError("--manoeuvre", "", f"{text!r} is not a manoeuvre", f"{hint}one of: {MANOEUVRE_FORMS}")
+        remedy = f"{hint}one of: {MANOEUVRE_FORMS}; with thrusters {THRUSTER_FORMS}"
+        raise InputError("--manoeuvre", "", f"{text!r} is not a manoeuvre", remedy)
     angles = [float(group) for group in found.groups() if group is not None]
     if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
         remedy = (
@@ -328,6 +357,20 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
         )
         raise InputError("--manoeuvre", "", f"{text!r} has an angle out of bounds", remedy)
     return makers[kind][1](angles)
+
+
+_BY_THRUSTERS: dict[str, Callable[[float], ThrusterManoeuvre]] = {
+    "straight": StraightRun,
+    "difference": DifferenceTurn,
+    "spin": Spin,
+}
+
+
+def _parse_thrusters(kind: str, found: re.Match[str] | None, text: str) -> Manoeuvre:
+    rpm = float(found[1]) if found else 0.0
+    if rpm == 0:
+        raise InputError("--manoeuvre", "", f"{text!r} has no revolutions", f"give them in rpm: {THRUSTER_FORMS}")
+    return _BY_THRUSTERS[kind](rpm * math.tau / 60)
 
 
 def read_orders(path: Path) -> Orders:
@@ -342,13 +385,15 @@ def read_orders(path: Path) -> Orders:
     found = orders_from_columns(table.si().columns, path)
     if not any(key.lower() == "rudder_sign" for key in table.comments):
         table.refuse_misspelt_keys(("rudder_sign",))
-    if _rudder_sign(path, table.comments) == "port":
+    if "rudder.command" in found.inputs and _rudder_sign(path, table.comments) == "port":
         found.inputs["rudder.command"] = -found.inputs["rudder.command"]
     return found
 
 
 def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Orders:
     """Orders from columns (n,) in SI: ``t_s``, ``delta_order_rad`` to starboard, ``n_radps``; `source` is for messages.
+
+    Of a craft with thrusters ``n_<name>_radps`` and ``azimuth_<name>_rad`` in place of these.
 
     Raises
     ------
@@ -357,11 +402,16 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
     """
     names = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
     for name in columns:
+        if found := re.fullmatch(r"(n|azimuth)_([a-z][a-z0-9_]*)_(radps|rad)", name):
+            names[name] = f"thrusters.{found[2]}.{'command' if found[1] == 'n' else 'azimuth_command'}"
+    kinds = "orders are t_s, delta_order_deg and n_rpm, or of thrusters n_port_rpm, n_starboard_rpm and so on"
+    for name in columns:
         if name not in {"t_s", *names}:
-            raise InputError(source, f"column {name}", "is not an order", "orders are t_s, delta_order_deg and n_rpm")
+            raise InputError(source, f"column {name}", "is not an order", kinds)
     rudders = {"delta_order_rad", "delta_rad"} & set(columns)
-    if "t_s" not in columns or not rudders:
-        raise InputError(source, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")
+    by_thrusters = any(names.get(name, "").startswith("thrusters.") for name in columns)
+    if "t_s" not in columns or not (rudders or by_thrusters):
+        raise InputError(source, "header", "lacks t_s or delta_order_deg", kinds)
     if len(rudders) > 1:
         raise InputError(source, "header", "has two rudder columns", "give delta_order_deg alone")
     times = columns["t_s"]

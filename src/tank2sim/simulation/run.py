@@ -13,8 +13,9 @@ from tank2sim.records.csv_table import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
-from tank2sim.simulation.manoeuvres import Manoeuvre, Orders
+from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS, Manoeuvre, Orders, Stop
 from tank2sim.simulation.running import Running
+from tank2sim.simulation.thruster_manoeuvres import ThrusterManoeuvre, thruster_commands
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words
 
@@ -70,17 +71,15 @@ def simulate(
     InputError
         The model is not a ship, the duration is not positive, or the motion leaves all bounds.
     """
-    if "rudder.command" not in model:
-        raise InputError(
-            model.origin, "", "has no rudder", "manoeuvres need the card of a ship (kind linear, abkowitz or mmg)"
-        )
+    _refuse_other_steering(model, manoeuvre)
     if duration_s is not None and not 0 < duration_s < LONGEST_RUN_S:
         raise InputError(
             "--duration", "", f"is {duration_s:g} s", f"more than 0 and less than {LONGEST_RUN_S:g} s was expected"
         )
     integrator = integrator or Integrator(model)
     values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
-    running = Running(integrator, inputs, parameters)
+    start = manoeuvre.start(model) if isinstance(manoeuvre, ThrusterManoeuvre) else {}
+    running = Running(integrator, inputs, {**start, **(parameters or {})})
     manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)
     trajectory = running.trajectory()
     figures = figures_of(manoeuvre, trajectory, values["ship.length"])
@@ -93,14 +92,34 @@ def simulate(
     return Run(trajectory, figures, tuple(notices), read)
 
 
+def _refuse_other_steering(model: Model, manoeuvre: Manoeuvre) -> None:
+    """Raise InputError if the model cannot do the manoeuvre: without rudder or thrusters, or with the other of them."""
+    if isinstance(manoeuvre, ThrusterManoeuvre):
+        if not thruster_commands(model):
+            remedy = f"it takes {MANOEUVRE_FORMS}" if "rudder.command" in model else "give the card of a small craft"
+            raise InputError(model.origin, manoeuvre.words, "needs thrusters, and it has none", remedy)
+        return
+    if "rudder.command" in model:
+        return
+    if not thruster_commands(model):
+        raise InputError(
+            model.origin, "", "has no rudder", "manoeuvres need the card of a ship (kind linear, abkowitz or mmg)"
+        )
+    if not isinstance(manoeuvre, Stop | Orders):
+        remedy = f"it is steered by thrusters: {THRUSTER_FORMS}"
+        raise InputError(model.origin, manoeuvre.words, "needs a rudder, and it has none", remedy)
+
+
 def _not_shown(trajectory: Trajectory, figures: Figures) -> list[str]:
     missing = [in_words(name)[0] for name, value in figures.items() if value is None]
     return [f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}"] if missing else []
 
 
 def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[str]:
+    if largest is None:
+        return []
     ordered = float(np.max(np.abs(trajectory["rudder.command"])))
-    if largest is None or ordered <= largest * (1 + 1e-9):
+    if ordered <= largest * (1 + 1e-9):
         return []
     return [
         f"the rudder was ordered to {np.degrees(ordered):.4g} deg, but its gear stops at {np.degrees(largest):.4g} deg"

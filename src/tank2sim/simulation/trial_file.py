@@ -8,6 +8,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.records.thinning import drawn_columns
+from tank2sim.simulation.thruster_manoeuvres import thruster_commands
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
@@ -28,9 +29,14 @@ _COLUMNS = {
 
 def trial_columns(trajectory: Trajectory) -> dict[str, Array]:
     """Columns (n,) of a run by their names in the trial format, ``t_s`` first, for the signals of the model."""
-    model = trajectory.model
+    model, names = trajectory.model, dict(_COLUMNS)
+    for command in thruster_commands(model):
+        thruster = command.name.split(".")[1]
+        names[f"n_{thruster}_rpm"] = f"thrusters.{thruster}.speed"
+        if f"thrusters.{thruster}.azimuth" in model:
+            names[f"azimuth_{thruster}_deg"] = f"thrusters.{thruster}.azimuth"
     known = {*model.outputs, *model.state_names, *model.input_names}
-    columns = {name: from_si(name, 1.0) * trajectory[signal] for name, signal in _COLUMNS.items() if signal in known}
+    columns = {name: from_si(name, 1.0) * trajectory[signal] for name, signal in names.items() if signal in known}
     return {"t_s": trajectory.t, **columns}
 
 

@@ -199,6 +199,9 @@ class Effect:
     sought : bool
         False if it is not to be tried on trials: what it describes is given, not found, or another effect is sought in
         its place.
+    of_craft : bool
+        True if a small craft with thrusters can have it: it reads nothing of a card but ``ship`` and ``environment``,
+        and nothing of a model that only a hull in the prime system or a rudder has.
     terminal : str
         What its inputs are together, a few words for the FMI terminal that joins them.
     """
@@ -219,6 +222,7 @@ class Effect:
     mistaken_for: str = ""
     measured_as: Mapping[str, str] = field(default_factory=dict)
     terminal: str = ""
+    of_craft: bool = False
     in_mmg: bool = False
     in_roll: bool = False
     sought: bool = True
@@ -238,6 +242,11 @@ class Effect:
         """True for a wind or a current: its speed and direction are inputs of the model, and each trial has its own."""
         inputs = {parameter.name for parameter in self.parameters if parameter.input_name}
         return inputs == set(self.measured_as) == {"speed_mps", "direction_rad"}
+
+    @property
+    def fits_craft(self) -> bool:
+        """True if a small craft with thrusters can have it: it says so, or only a sensor is at fault."""
+        return self.of_craft or self.readings is not None
 
     def required(self) -> tuple[str, ...]:
         """Names of the parameters without a default."""

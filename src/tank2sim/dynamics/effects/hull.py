@@ -32,7 +32,8 @@ def _with_cross_flow_drag(model: Model, given: EffectSymbols, card: ManoeuvringC
         across = model.symbol("motion.v") + x * model.symbol("motion.r")
         drag = half * float(weight) * ca.fabs(across) * across
         Y, N = Y + drag, N + x * drag
-    kept = 1 - model.symbol("low_speed.share")
+    # A small craft's own terms hold at rest, too.
+    kept = 1 - model.symbol("low_speed.share") if "low_speed.share" in model else 1
     pressure = -0.5 * model.symbol("ship.water_density") * draught * given["drag_coefficient"] * kept
     return with_forces(model, Y=pressure * Y, N=pressure * N)
 
@@ -55,6 +56,7 @@ CROSS_FLOW_DRAG = Effect(
         ),
     ),
     equations=_with_cross_flow_drag,
+    of_craft=True,
 )
 
 

@@ -55,6 +55,7 @@ CURRENT = Effect(
         ),
     ),
     equations=_with_current,
+    of_craft=True,
     measured_as={"speed_mps": "current_speed_mps", "direction_rad": "current_direction_rad"},
     terminal="Current of the water over the ground",
 )
@@ -182,6 +183,7 @@ WIND = Effect(
         ),
     ),
     equations=_with_wind,
+    of_craft=True,
     measured_as={"speed_mps": "wind_speed_mps", "direction_rad": "wind_direction_rad"},
     terminal="True wind",
 )
@@ -242,6 +244,7 @@ WAVE_DRIFT = Effect(
         ),
     ),
     equations=_with_wave_drift,
+    of_craft=True,
 )
 
 

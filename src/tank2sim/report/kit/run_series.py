@@ -8,6 +8,7 @@ import altair as alt
 
 from tank2sim.dynamics.model import Model
 from tank2sim.report.kit.charts import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.simulation.thruster_manoeuvres import thruster_commands
 from tank2sim.simulation.trajectory import Trajectory
 
 SHIP_SIGNALS = {
@@ -21,9 +22,16 @@ SHIP_SIGNALS = {
 
 
 def shown_signals(model: Model) -> dict[str, str]:
-    """What the time histories of a model of a ship show: :data:`SHIP_SIGNALS`, and heel if it has it."""
+    """What the time histories of a model of a ship show: :data:`SHIP_SIGNALS`, and heel if it has it.
+
+    Revolutions of each thruster take the place of the rudder of a craft without one.
+    """
     heel = {"motion.phi": "heel, + to starboard"} if "motion.phi" in model else {}
-    return SHIP_SIGNALS | heel
+    if "rudder.angle" in model:
+        return SHIP_SIGNALS | heel
+    propellers = [command.name.replace("command", "speed") for command in thruster_commands(model)]
+    revolutions = {name: f"{name.split('.')[1]} revolutions" for name in propellers}
+    return revolutions | {name: words for name, words in SHIP_SIGNALS.items() if name != "rudder.angle"}
 
 
 def track_data(label: str, run: Trajectory) -> TrackData:

@@ -57,6 +57,7 @@ def log_page(found: Json) -> Page:
     sections = [*notices_section(found["notices"]), *_map(found), *_time_line(found)]
     sections.append(PageSection(heading="Stretches", tables=[_stretch_table(stretches)]))
     sections.append(PageSection(heading="Channels", tables=[_channel_table(channels)]))
+    sections += _verdicts(found.get("identified"))
     sections.append(PageSection(heading="Logs", tables=[_log_table(found["logs"])]))
     names = ", ".join(PurePath(str(entry["file"])).name for entry in found["logs"])
     subtitle = f"Voyage from {found['begins_utc']}" if found["begins_utc"] else "Voyage without a date"
@@ -138,6 +139,35 @@ def _channel_table(channels: Json) -> PageTable:
     keys = ("quantity", "stream", "unit", "sign", "confidence", "use", "why")
     rows: list[list[Cell]] = [[channel[key] for key in keys] for channel in channels]
     return PageTable(caption="Channels, to be confirmed or corrected in channels.toml", columns=heads, rows=rows)
+
+
+def _verdicts(identified: Json) -> list[PageSection]:
+    """What the trials say of each coefficient of a craft, and the five minutes that would say more."""
+    if not identified:
+        return []
+    heads = [
+        Column(title="coefficient (SI)"),
+        Column(title="value", digits=4),
+        Column(title="standard error", digits=2),
+        Column(title="verdict"),
+        Column(title="mostly by"),
+    ]
+    rows: list[list[Cell]] = [
+        [name, entry["value"], entry["standard_error"], entry["verdict"], entry["by"] or "-"]
+        for name, entry in identified["coefficients"].items()
+    ]
+    tables = [PageTable(caption="Coefficients", columns=heads, rows=rows)]
+    if identified["next_trials"]:
+        further = [Column(title="five minutes of (port/starboard, % of full)"), Column(title="would determine")]
+        orders: list[list[Cell]] = [
+            [entry["words"], ", ".join(entry["determines"]) or "-"] for entry in identified["next_trials"]
+        ]
+        tables.append(PageTable(caption="Next trial", columns=further, rows=orders))
+    text = (
+        "Identified: the standard error is at most a quarter of the value. Bounded: the trials have at least halved "
+        "what was uncertain before. Not determined: the value is the card's."
+    )
+    return [PageSection(heading="What the trials determine", text=text, tables=tables)]
 
 
 def _log_table(logs: Json) -> PageTable:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -162,9 +162,14 @@ def maximise(
         (H, g), (matrix, slope) = system
         values = point.values - np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
         levels = task.move_levels(point.levels, matrix, slope, damping)
+        if np.isnan(values).any() or np.isnan(np.concatenate([levels.process, levels.time, levels.measurement])).any():
+            return replace(point, cost=np.inf)
         along = point.filtered.before, point.filtered.after
         with np.errstate(all="ignore"):  # too long a step may leave all bounds
-            return task.point(np.clip(values, *task.problem.bounds), levels, along)
+            try:
+                return task.point(np.clip(values, *task.problem.bounds), levels, along)
+            except np.linalg.LinAlgError:  # a motion so unstable that the covariance is not a number
+                return replace(point, cost=np.inf)
 
     def is_last(better: SearchPoint, gain: float) -> bool:
         report(better)

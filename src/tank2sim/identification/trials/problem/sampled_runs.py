@@ -159,8 +159,13 @@ def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
 
 def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
     given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
-    angle = trial.signals.get("delta_rad")
-    given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
+    if "rudder.command" in model:
+        angle = trial.signals.get("delta_rad")
+        given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
+    for name in model.input_names:  # revolutions of a craft's thrusters, as measured
+        signal = f"n_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
+        if name.startswith("thrusters.") and signal in trial.signals:
+            given[name] = trial.signals[signal]
     return {
         name: _continuous(values) if name.endswith("direction") else values
         for name, values in given.items()

@@ -1,0 +1,465 @@
+"""A small craft with thrusters: Fossen's equations in three degrees of freedom, SI.
+
+    M nu' = -C_RB(nu) nu - C_A(nu) nu + D(nu) + sum of thrusts,    nu = (u, v, r) through the water
+
+    X = Xu u + Xuabsu u|u|
+    Y = Yv v + Yvabsv v|v| + Yvabsr v|r| + Yvabsu v|u| + Yr r + Yrabsr r|r| + Yrabsv r|v| + Yrabsu r|u|,   N likewise
+    T = k n|n| - l max(n, 0) u_T    (one thruster; k ahead or astern)
+    X = T cos a,  Y = T sin a,  N = x Y - y X
+
+with M, C_RB (:mod:`tank2sim.dynamics.rigid_body`), C_A (:func:`.added_mass_forces`), the azimuth a of a thruster at
+x, y, and u_T = u cos a + v sin a, the craft's velocity along it; what the yaw rate adds at its place is left out. The
+order is held within the largest revolutions, and one within the dead band leaves the propeller at rest; the revolutions
+follow with a lag of the first order.
+
+Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., 6.1 to 6.5 (equations), 9.1 (thrust:
+T_nn n|n| - T_nu |n| u_a). That a reversed propeller loses nothing by speed is a project choice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import casadi as ca
+
+from tank2sim.cards.card import CraftCard
+from tank2sim.cards.form import ThrusterSection
+from tank2sim.cards.small_craft import (
+    CRAFT_ADDED_MASSES,
+    CRAFT_TERMS,
+    VELOCITY_TERMS,
+    cruising_revolutions,
+    pushes_ahead,
+)
+from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
+from tank2sim.dynamics.hull import (
+    VALIDITY_MARGIN,
+    acceleration_quantities,
+    force_quantities,
+    inertia_quantities,
+    inside_range,
+)
+from tank2sim.dynamics.kinematics import body_states, planar_kinematics
+from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
+from tank2sim.dynamics.rigid_body import (
+    Inertia,
+    added_mass_forces,
+    inertia,
+    inertial_forces,
+    rigid_body_accelerations,
+)
+
+_STEPS_PER_LENGTH = 200
+_STEPS_PER_LAG = 5
+"""Integration steps while the craft covers its length, and in the shortest lag: as of a ship, project choices."""
+
+_STILL = 1e-7
+"""Speed over the cruising speed that counts as rest, so that the speed has a slope there (project choice)."""
+
+THRUSTER_PARAMETERS = {
+    "x_m": "x",
+    "y_m": "y",
+    "ahead_Ns2": "ahead",
+    "astern_Ns2": "astern",
+    "speed_loss_kg": "speed_loss",
+    "dead_band_radps": "dead_band",
+    "time_constant_s": "time_constant",
+}
+"""Key of ``[[thrusters]]`` to the last part of the name of the parameter that holds it."""
+
+_OUTPUTS = (
+    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
+    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
+    *("motion.udot", "motion.vdot", "motion.rdot"),
+    *("force.X", "force.Y", "force.N", "validity"),
+)
+
+
+def craft_model(card: CraftCard) -> Model:
+    """The model of a small craft without its effects.
+
+    Inputs are ``thrusters.<name>.command`` (rad/s, positive ahead) and, of one that turns,
+    ``thrusters.<name>.azimuth_command`` (rad clockwise from the bow); outputs the motion, ``thrusters.<name>.speed``
+    (rad/s) and ``.thrust`` (N).
+
+    Raises
+    ------
+    InputError
+        Mass with added mass is not positive.
+    """
+    body = body_states(card.model.speed_mps, card.ship.length_m)
+    position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
+    symbols = {variable.name: variable.symbol for variable in position}
+    position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
+    constants = (*_craft_particulars(card), *_craft_derivatives(card))
+    s = {variable.name: variable.symbol for variable in (*position, *body, *constants)}
+    thrusters, pushes = _thrusters(card, s)
+    matrix = _craft_inertia(s)
+    _refuse_mass(card)
+    masses = inertia_quantities(matrix)
+    forces = force_quantities(_craft_forces(s, pushes), "right-hand side of Fossen's equations", _nominal_forces(card))
+    X, Y, N = forces
+    motion = rigid_body_accelerations(Inertia(*(mass.symbol for mass in masses)), X.symbol, Y.symbol, N.symbol)
+    described = ", ".join(thruster.name for thruster in card.thrusters)
+    empty = Model(
+        name=card.ship.name,
+        description=f"{card.ship.name}: small craft in surge, sway and yaw with thrusters {described}",
+        states=(),
+        inputs=(),
+        parameters=(),
+        quantities=(),
+        outputs=(),
+        step_s=_craft_step(card),
+    )
+    shown = [f"thrusters.{thruster.name}.{what}" for thruster in card.thrusters for what in ("speed", "thrust")]
+    return empty.extend(
+        *(*position, *body, *constants, *thrusters),
+        *(*forces, *masses, *acceleration_quantities(motion), *_craft_speed(s)),
+        outputs=(*_OUTPUTS, *shown),
+    )
+
+
+def _craft_step(card: CraftCard) -> float:
+    """Step of integration, s: 1, 2 or 5 times a power of ten."""
+    lags = [thruster.time_constant_s for thruster in card.thrusters]
+    lags += [thruster.azimuth_time_constant_s for thruster in card.thrusters]
+    wanted = card.ship.length_m / card.model.speed_mps / _STEPS_PER_LENGTH
+    wanted = min(wanted, *(lag / _STEPS_PER_LAG for lag in lags if lag), math.inf)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return float(max(digit * decade for digit in (1, 2, 5) if digit * decade <= wanted * (1 + 1e-9)))
+
+
+def _refuse_mass(card: CraftCard) -> None:
+    body = card.rigid_body
+    added = {name: card.derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
+    matrix = inertia(body.mass, body.x_G, body.yaw_inertia, added)
+    if min(matrix.surge, matrix.sway, matrix.yaw, matrix.determinant) <= 0:
+        problem = "with added mass is not positive (m - Xudot, m - Yvdot, I_z - Nrdot, determinant of sway and yaw)"
+        raise card.fault("rigid_body", problem, "check mass, yaw_inertia, x_G and the signs of the added masses")
+
+
+def _nominal_forces(card: CraftCard) -> tuple[float, float]:
+    """Thrust (N) of all thrusters at their largest revolutions, and its moment (N m) at half the length."""
+    thrust = sum(thruster.ahead_Ns2 * thruster.max_radps**2 for thruster in card.thrusters)
+    return thrust, thrust * card.ship.length_m / 2
+
+
+def _craft_particulars(card: CraftCard) -> tuple[Parameter, ...]:
+    slowest, fastest = card.model.speed_range_mps
+    described = (
+        ("ship.length", "m", "Length between perpendiculars", card.ship.length_m),
+        ("ship.speed", "m/s", "Cruising speed", card.model.speed_mps),
+        ("ship.mass", "kg", "Mass", card.rigid_body.mass),
+        ("ship.x_G", "m", "Centre of gravity forward of midships", card.rigid_body.x_G),
+        ("ship.yaw_inertia", "kg.m2", "Yaw inertia I_z about midships", card.rigid_body.yaw_inertia),
+        ("ship.water_density", "kg/m3", "Density of the water", card.environment.water_density_kgpm3),
+        ("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest),
+        ("ship.fastest", "m/s", "Highest speed at which the card holds", fastest),
+    )
+    may_vanish = ("ship.x_G", "ship.slowest")
+    return tuple(
+        Parameter(
+            name=name,
+            unit=unit,
+            description=description,
+            start=start,
+            tunable=False,
+            nominal=abs(start) or 1.0,
+            minimum=None if name in may_vanish else 1e-6,
+            display_unit="knots" if unit == "m/s" else None,
+        )
+        for name, unit, description, start in described
+    )
+
+
+_ADDED_UNITS = {"Xudot": "kg", "Yvdot": "kg", "Yrdot": "kg.m", "Nvdot": "kg.m", "Nrdot": "kg.m2"}
+
+_DAMPING_UNITS = {0: ("kg/s", "kg.m/s", "kg.m2/s"), 1: ("kg/m", "kg", "kg.m", "kg.m2")}
+"""Unit of a linear and of a quadratic term by the powers of m that the moment and the yaw rates add."""
+
+
+def craft_unit(name: str) -> str:
+    """Unit of a derivative of a small craft.
+
+    Examples
+    --------
+    >>> craft_unit("Xuabsu"), craft_unit("Nr")
+    ('kg/m', 'kg.m2/s')
+    """
+    if name in _ADDED_UNITS:
+        return _ADDED_UNITS[name]
+    term = next(term for term in VELOCITY_TERMS if term.name == name)
+    lengths = (term.force == "N") + (term.factor == "r") + (term.size == "r")
+    return _DAMPING_UNITS[int(bool(term.size))][lengths]
+
+
+def _craft_derivatives(card: CraftCard) -> tuple[Parameter, ...]:
+    velocity = {term.name: term for term in VELOCITY_TERMS}
+
+    def described(name: str) -> str:
+        if name not in velocity:
+            return f"Acceleration derivative {name}, negative for an added mass"
+        term = velocity[name]
+        return f"Coefficient of {term.factor}{f'|{term.size}|' * bool(term.size)} in {term.force}"
+
+    return tuple(
+        Parameter(
+            name=f"derivatives.{name}",
+            unit=craft_unit(name),
+            description=described(name),
+            nominal=abs(card.derivatives.get(name, 0.0)) or 1.0,
+            start=card.derivatives.get(name, 0.0),
+        )
+        for name in CRAFT_TERMS
+    )
+
+
+def _craft_inertia(s: Mapping[str, ca.SX]) -> Inertia:
+    added = {name: s[f"derivatives.{name}"] for name in CRAFT_ADDED_MASSES}
+    return inertia(s["ship.mass"], s["ship.x_G"], s["ship.yaw_inertia"], added)
+
+
+def craft_damping(coefficients: Mapping[str, ca.SX], u: ca.SX, v: ca.SX, r: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """X, Y (N) and N (N m) of the velocity terms.
+
+    Parameters
+    ----------
+    coefficients : mapping
+        Name of each of :data:`tank2sim.cards.small_craft.VELOCITY_TERMS` to its value, SI.
+    u, v, r : casadi.SX
+        m/s through the water, rad/s.
+    """
+    velocities = {"u": u, "v": v, "r": r}
+    sums = {force: ca.SX(0) for force in "XYN"}
+    for term in VELOCITY_TERMS:
+        size = ca.fabs(velocities[term.size]) if term.size else 1
+        sums[term.force] += coefficients[term.name] * velocities[term.factor] * size
+    return sums["X"], sums["Y"], sums["N"]
+
+
+def _craft_forces(s: Mapping[str, ca.SX], pushes: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX]:
+    u, v, r = s["motion.u"], s["motion.v"], s["motion.r"]
+    known = {name: s[f"derivatives.{name}"] for name in CRAFT_TERMS}
+    parts = (
+        inertial_forces(s["ship.mass"], s["ship.x_G"], u, v, r),
+        added_mass_forces(known, u, v, r),
+        craft_damping(known, u, v, r),
+        pushes,
+    )
+    X, Y, N = (sum(column, ca.SX(0)) for column in zip(*parts, strict=True))
+    return X, Y, N
+
+
+def thrust_of(n: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, loss: ca.SX) -> ca.SX:
+    """T (N) = k n|n| - l max(n, 0) u_T of a thruster.
+
+    Parameters
+    ----------
+    n : casadi.SX
+        Revolutions, rad/s, positive ahead.
+    along : casadi.SX
+        u_T, velocity of the craft through the water along the thruster, m/s.
+    ahead, astern : casadi.SX
+        k for n > 0 and for n < 0, N s^2.
+    loss : casadi.SX
+        l, N s^2/m.
+    """
+    # k n|n| of both sides without a comparison, to which a solver would have to step up.
+    return (ahead + astern) / 2 * n * ca.fabs(n) + (ahead - astern) / 2 * n * n - loss * ca.fmax(n, 0) * along
+
+
+def _thrusters(card: CraftCard, s: Mapping[str, ca.SX]) -> tuple[list[Variable], tuple[ca.SX, ca.SX, ca.SX]]:
+    """Variables of all thrusters, and their X, Y (N) and N (N m)."""
+    cruising = cruising_revolutions(card)
+    found: list[Variable] = []
+    X, Y, N = ca.SX(0), ca.SX(0), ca.SX(0)
+    for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True):
+        variables, thrust, azimuth = _thruster(thruster, cruising if holds else 0.0, s)
+        found += variables
+        places = {variable.name: variable.symbol for variable in variables}
+        x, y = (places[f"thrusters.{thruster.name}.{axis}"] for axis in "xy")
+        along, across = thrust * ca.cos(azimuth), thrust * ca.sin(azimuth)
+        X, Y, N = X + along, Y + across, N + x * across - y * along
+    return found, (X, Y, N)
+
+
+def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -> tuple[list[Variable], ca.SX, ca.SX]:
+    """Variables of a thruster, the symbol of its thrust (N), and its azimuth (rad)."""
+    prefix = f"thrusters.{thruster.name}"
+    where = f"thruster {thruster.name}"
+
+    def constant(name: str, unit: str, description: str, value: float, shown: str | None = None) -> Parameter:
+        return Parameter(
+            name=f"{prefix}.{name}",
+            unit=unit,
+            description=f"{description} of {where}",
+            display_unit=shown,
+            nominal=abs(value) or 1.0,
+            minimum=0.0,
+            start=value,
+        )
+
+    ahead = constant("ahead", "kg.m", "Thrust ahead over the square of the revolutions (rad/s)", thruster.ahead_Ns2)
+    astern = constant("astern", "kg.m", "Thrust astern over the square of the revolutions", thruster.astern_Ns2)
+    loss = constant("speed_loss", "kg", "Thrust lost by revolutions ahead and speed", thruster.speed_loss_kg)
+    band = constant(
+        "dead_band", "rad/s", "Largest order that leaves the propeller at rest", thruster.dead_band_radps, "rpm"
+    )
+    command = Input(
+        name=f"{prefix}.command",
+        unit="rad/s",
+        description=f"Ordered revolutions of {where}, positive ahead",
+        display_unit="rpm",
+        nominal=thruster.max_radps / 2,
+        minimum=thruster.lowest_radps,
+        maximum=thruster.max_radps,
+        start=start,
+    )
+    held = ca.fmax(thruster.lowest_radps, ca.fmin(thruster.max_radps, command.symbol))
+    order = Quantity(
+        name=f"{prefix}.order",
+        unit="rad/s",
+        description=f"Revolutions that {where} goes to: its order within its limits, 0 in the dead band",
+        display_unit="rpm",
+        nominal=thruster.max_radps,
+        value=held * (ca.fabs(held) > band.symbol) if thruster.dead_band_radps else held,
+    )
+    places = [
+        Parameter(
+            name=f"{prefix}.{axis}",
+            unit="m",
+            description=f"Place of {where}, positive {way} of midships",
+            nominal=abs(value) or 1.0,
+            start=value,
+            tunable=False,
+        )
+        for axis, way, value in (("x", "forward", thruster.x_m), ("y", "to starboard", thruster.y_m))
+    ]
+    variables: list[Variable] = [command, order, ahead, astern, loss, *places]
+    if thruster.dead_band_radps:
+        variables.append(band)
+    variables += (speed := _revolutions(thruster, prefix, where, order, start))
+    turning, azimuth = _azimuth(thruster, prefix, where)
+    variables += turning
+    along = s["motion.u"] * ca.cos(azimuth) + s["motion.v"] * ca.sin(azimuth)
+    thrust = Quantity(
+        name=f"{prefix}.thrust",
+        unit="N",
+        description=f"Thrust of {where}, positive with revolutions ahead",
+        nominal=thruster.ahead_Ns2 * thruster.max_radps**2,
+        value=thrust_of(speed[0].symbol, along, ahead.symbol, astern.symbol, loss.symbol),
+    )
+    return [*variables, thrust], thrust.symbol, azimuth
+
+
+def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: Quantity, start: float) -> list[Variable]:
+    """``speed`` first: a state behind its lag, or the order itself."""
+    described = {
+        "name": f"{prefix}.speed",
+        "unit": "rad/s",
+        "description": f"Revolutions of {where}, positive ahead",
+        "display_unit": "rpm",
+        "nominal": thruster.max_radps,
+    }
+    if thruster.time_constant_s is None:
+        return [Quantity(value=order.symbol, **described)]  # type: ignore[arg-type]
+    first = Parameter(
+        name=f"initial.{thruster.name}_speed",
+        unit="rad/s",
+        description=f"Revolutions of {where} at the start, positive ahead",
+        display_unit="rpm",
+        nominal=thruster.max_radps,
+        start=start,
+        tunable=False,
+    )
+    lag = Parameter(
+        name=f"{prefix}.time_constant",
+        unit="s",
+        description=f"Lag of the revolutions of {where}",
+        nominal=thruster.time_constant_s,
+        minimum=1e-6,
+        start=thruster.time_constant_s,
+    )
+    state = State(derivative=f"{prefix}.rate", start=first.symbol, trim=order.value, **described)  # type: ignore[arg-type]
+    rate = Quantity(
+        name=f"{prefix}.rate",
+        unit="rad/s2",
+        description=f"Rate of change of the revolutions of {where}",
+        nominal=thruster.max_radps,
+        value=(order.symbol - state.symbol) / lag.symbol,
+    )
+    return [state, rate, first, lag]
+
+
+def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[Variable], ca.SX]:
+    """Variables of a thruster that turns, and its azimuth (rad); none, and the number, of one that is fixed."""
+    middle, reach = thruster.azimuth_rad, thruster.max_azimuth_rad
+    if reach is None or thruster.azimuth_time_constant_s is None:
+        return [], ca.SX(middle)
+    command = Input(
+        name=f"{prefix}.azimuth_command",
+        unit="rad",
+        description=f"Ordered direction in which {where} pushes the craft, clockwise from the bow",
+        display_unit="deg",
+        nominal=min(reach, 0.5),
+        minimum=middle - reach,
+        maximum=middle + reach,
+        start=middle,
+    )
+    lag = thruster.azimuth_time_constant_s
+    state = State(
+        name=f"{prefix}.azimuth",
+        unit="rad",
+        description=f"Direction in which {where} pushes the craft, clockwise from the bow",
+        display_unit="deg",
+        nominal=min(reach, 0.5),
+        derivative=f"{prefix}.azimuth_rate",
+        start=middle,
+        trim=command.symbol,
+    )
+    rate = (ca.fmax(middle - reach, ca.fmin(middle + reach, command.symbol)) - state.symbol) / lag
+    if thruster.max_azimuth_rate_radps:
+        limit = thruster.max_azimuth_rate_radps
+        rate = ca.fmax(-limit, ca.fmin(limit, rate))
+    turn = Quantity(
+        name=f"{prefix}.azimuth_rate",
+        unit="rad/s",
+        description=f"Rate at which {where} turns, clockwise",
+        display_unit="deg/s",
+        value=rate,
+    )
+    return [command, state, turn], state.symbol
+
+
+def _craft_speed(s: Mapping[str, ca.SX]) -> tuple[Quantity, ...]:
+    u, v, u0 = s["motion.u"], s["motion.v"], s["ship.speed"]
+    still = _STILL * u0
+    speed = Quantity(
+        name="motion.speed",
+        unit="m/s",
+        description="Speed U through the water",
+        display_unit="knots",
+        value=ca.sqrt(u**2 + v**2 + still**2),
+    )
+    drift = Quantity(
+        name="motion.beta",
+        unit="rad",
+        description="Drift angle -asin(v/U), positive when the water comes from port",
+        display_unit="deg",
+        nominal=0.1,
+        value=-ca.atan2(v, ca.sqrt(u**2 + still**2)),
+    )
+    margin = VALIDITY_MARGIN * u0
+    inside = inside_range(speed.symbol - s["ship.fastest"], margin) * inside_range(
+        s["ship.slowest"] - speed.symbol, margin
+    )
+    validity = Quantity(
+        name="validity",
+        unit="1",
+        description="1 in the range of speeds in which the card holds, falling to 0 beyond",
+        minimum=0.0,
+        maximum=1.0,
+        value=inside,
+    )
+    return speed, drift, validity

@@ -1,0 +1,262 @@
+"""The fit of a craft by the Kalman smoother, what each trial contributed, and free-running predictions.
+
+Gusts are random accelerations, slow errors of receiver and compass are drifts of the sensors, current and mean wind
+are constant in a trial: :mod:`tank2sim.identification.trials.methods.kalman`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
+from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, kalman
+from tank2sim.identification.trials.methods.kalman_gains import smooth_states
+from tank2sim.identification.trials.methods.kalman_pass import Levels
+from tank2sim.identification.trials.methods.kalman_search import SearchPoint, SearchTask, normal, task_of
+from tank2sim.identification.trials.problem.estimation_problem import Problem, SearchReport, silent
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.sensitivity import Sensitivity
+
+PREDICTED_S = 30.0
+"""Length of a free-running prediction, s: that of the published comparisons on small craft."""
+
+PREDICTION_LEAD_S = 10.0
+"""Time of a held-out trial in which the filter finds its state, s: several time constants (project choice)."""
+
+SHORTEST_PREDICTION_S = 10.0
+"""Shortest prediction that counts, s (project choice)."""
+
+IDENTIFIED_SHARE = 0.25
+"""Largest standard error of an identified coefficient, over its value (project choice: its sign is then certain at four
+standard errors)."""
+
+TRIALS_SHARE = 0.5
+"""Largest standard error after the trials over that before of a coefficient that they determine (project choice)."""
+
+
+STABILISING = ("derivatives.Yv", "derivatives.Yvabsv", "derivatives.Nr", "derivatives.Nrabsr")
+"""Coefficients whose damping holds a craft on its course."""
+
+STRONGER = (1.0, 2.0, 4.0, 8.0, 16.0)
+"""Factors on these with which the search begins, one after the other (project choice)."""
+
+FEWEST_TRIALS = 5
+"""Fewest trials whose currents and winds determine how much these differ (project choice)."""
+
+LEAST_SPREAD = 0.1
+"""Least spread of a disturbance between trials, over that before them (project choice)."""
+
+_LINEARISATIONS = 5
+"""Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
+
+
+class CoefficientVerdict(StrEnum):
+    """What the trials say of a coefficient."""
+
+    IDENTIFIED = "identified"
+    BOUNDED = "bounded"
+    PRIOR = "not determined"
+
+
+@dataclass(frozen=True, eq=False)
+class CraftFit:
+    """Fit of a craft.
+
+    Parameters
+    ----------
+    problem : Problem
+    estimate : KalmanEstimate
+        Of the k free parameters.
+    levels : Levels
+        Noise levels.
+    by_run : array (runs, k, k)
+        Information of each run.
+    """
+
+    problem: Problem
+    estimate: KalmanEstimate
+    levels: Levels
+    by_run: Array
+
+    @property
+    def verdicts(self) -> tuple[CoefficientVerdict, ...]:
+        """Of each free parameter (k,).
+
+        Identified: the error is at most :data:`IDENTIFIED_SHARE` of the value. Bounded: the trials have narrowed it to
+        :data:`TRIALS_SHARE` of what was known before. Else it is not determined.
+        """
+        found = []
+        for value, error, before in zip(
+            self.estimate.values, self.estimate.standard_errors, self.problem.prior_error, strict=True
+        ):
+            if error > TRIALS_SHARE * before:
+                found.append(CoefficientVerdict.PRIOR)
+            elif error <= IDENTIFIED_SHARE * abs(value):
+                found.append(CoefficientVerdict.IDENTIFIED)
+            else:
+                found.append(CoefficientVerdict.BOUNDED)
+        return tuple(found)
+
+    def best_run(self, place: int) -> int:
+        """The run without which the standard error of a free parameter would grow most."""
+        prior = self.problem.prior_precision(self.problem.prior_error)
+        whole = self.by_run.sum(axis=0) + prior
+        variances = [np.linalg.inv(whole - share)[place, place] for share in self.by_run]
+        return int(np.argmax(variances))
+
+
+def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
+    """Estimate the free parameters of a craft with the noise levels.
+
+    Twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
+    trials the first time (empirical Bayes), for they change slowly.
+
+    Parameters
+    ----------
+    problem : Problem
+        By :func:`.craft_problem`.
+    progress : callable
+        Called with each better estimate.
+    """
+    settings = KalmanSettings(drifting=True, scale_prior=False)
+    first = _first_estimate(problem, settings, progress)
+    problem = with_disturbances(problem, *_disturbances_of(problem, first))
+    estimate = kalman(problem, first.values, settings, progress)
+    levels = levels_of(problem, estimate)
+    by_run = np.stack([information(problem.with_runs((run,)), estimate.values, levels) for run in problem.runs])
+    return CraftFit(problem, estimate, levels, by_run)
+
+
+def _first_estimate(problem: Problem, settings: KalmanSettings, progress: SearchReport) -> KalmanEstimate:
+    """The estimate from the card; from one with stronger damping of sway and yaw if that craft is too unstable.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The covariance of the filter is not a number whatever the damping.
+    """
+    damping = np.array([name in STABILISING for name in problem.free])
+    task = task_of(problem, drifting=True)
+    for factor in STRONGER:
+        start = np.where(damping, factor * problem.prior_mean, problem.prior_mean)
+        try:
+            system = normal(task, task.first_point(start))
+        except np.linalg.LinAlgError:
+            continue
+        if all(np.isfinite(part).all() for part in system):
+            return kalman(problem, start, settings, progress)
+    raise np.linalg.LinAlgError("the covariance of the filter is not a number")
+
+
+def _disturbances_of(problem: Problem, estimate: KalmanEstimate) -> tuple[Array, Array]:
+    """Mean and spread (5,) of the disturbances over the trials; the spread is within what is known without them."""
+    places = [problem.model.state_names.index(name) for name in DISTURBANCES]
+    wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
+    found = np.stack([smoothed.states[0, places] for smoothed in estimate.smoothed])
+    if len(found) < FEWEST_TRIALS:
+        return np.zeros(len(wide)), wide
+    return found.mean(axis=0), np.clip(found.std(axis=0, ddof=1), LEAST_SPREAD * wide, wide)
+
+
+def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
+    """The noise levels of an estimate, as the filter takes them."""
+    correlated = [*estimate.process_noise.values(), *(estimate.drift[name] for name in problem.seen)]
+    return Levels(
+        np.log([noise.deviation for noise in correlated]),
+        np.log([noise.time_s for noise in correlated]),
+        np.log([estimate.measurement_noise[name] for name in problem.seen]),
+    )
+
+
+def information(problem: Problem, values: Array, levels: Levels) -> Array:
+    """Information of the runs of a problem (k, k) at parameters and noise levels."""
+    task, point = _point(problem, values, levels)
+    found: Array = normal(task, point)[0] - problem.prior_precision(problem.prior_error)
+    return found
+
+
+def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:
+    """A pass of the filter over the runs."""
+    task = replace(task_of(problem, drifting=True), first=levels)
+    point = task.first_point(values)
+    for _ in range(_LINEARISATIONS):
+        point = task.relinearise(point)
+    return task, point
+
+
+@dataclass(frozen=True, eq=False)
+class FreePrediction:
+    """Free-running predictions of a held-out run, and the motion that the smoother gives.
+
+    Parameters
+    ----------
+    run : SampledRun
+    rows : sequence of int (m,)
+        Instants predicted.
+    predicted, smoothed : array (m, 3)
+        u, v (m/s through the water) and r (rad/s).
+    """
+
+    run: SampledRun
+    rows: Sequence[int]
+    predicted: Array
+    smoothed: Array
+
+
+def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePrediction]:
+    """Predictions of :data:`PREDICTED_S` of each run by recorded revolutions, from the state that the filter has there.
+
+    Nothing measured after its beginning enters a prediction; current and wind stay as they were found until then.
+
+    Parameters
+    ----------
+    fit : CraftFit
+    runs : sequence of SampledRun
+        Held-out trials, of the same problem.
+    """
+    problem = fit.problem.with_runs(tuple(runs))
+    names = problem.model.state_names
+    point = _point(problem, fit.estimate.values, fit.levels)[1]
+    filtered, nx = point.filtered, len(names)
+    tangents = filtered.tangents
+    states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
+    motion = [names.index(f"motion.{letter}") for letter in "uvr"]
+    sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
+    p = problem.parameters(fit.estimate.values)
+    found = []
+    for number, run in enumerate(runs):
+        rows, predicted = [], []
+        count, length = len(run.measured), round(PREDICTED_S / run.step_s)
+        begin = round(PREDICTION_LEAD_S / run.step_s)
+        while count - begin >= SHORTEST_PREDICTION_S / run.step_s:
+            end = min(begin + length, count)
+            free = sensitivity.motion(filtered.after[number, begin, :nx], run.inputs[begin : end - 1], p, run.step_s)
+            rows.append(np.arange(begin + 1, end))
+            predicted.append(free[1:, motion])
+            begin = end
+        if rows:
+            at = np.concatenate(rows)
+            found.append(FreePrediction(run, at.tolist(), np.concatenate(predicted), states[number, at][:, motion]))
+    return found
+
+
+def determination(predicted: Array, truth: Array) -> Array:
+    """R^2 of each column (n, m): 1 less the sum of squared errors over that about the mean.
+
+    Parameters
+    ----------
+    predicted, truth : array (n, m)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> determination(np.array([[1.0], [2.0], [3.0]]), np.array([[1.0], [2.0], [4.0]])).round(3)
+    array([0.786])
+    """
+    errors: Array = ((predicted - truth) ** 2).sum(axis=0)
+    return np.asarray(1 - errors / ((truth - truth.mean(axis=0)) ** 2).sum(axis=0))

@@ -1,0 +1,231 @@
+"""The problem of a craft with thrusters: what is estimated, what is known before, and the model that is fitted.
+
+The model is that of the card, driven by the revolutions that were measured, with five states that do not
+change within a trial: the velocity of the current to north and to east, an earth-fixed force to north and to east,
+which is the mean wind's, and the bias of the gyro. So they may differ from trial to trial.
+
+Motion alone determines forces over masses; their scale comes from the mass, which is taken as known, through the
+added masses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import CraftCard
+from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.sampled_runs import prepare
+from tank2sim.records.trials import Trial
+
+CURRENT_SPREAD = 0.3
+"""Standard deviation of a component of the current before the trials, m/s: sheltered waters (project choice)."""
+
+FORCE_SPREAD = 0.05
+"""Standard deviation of a component of the wind's force before the trials, over the largest thrust: a fresh breeze on a
+small craft (project choice)."""
+
+RATE_BIAS_SPREAD = 0.01
+"""Standard deviation of the bias of a rate gyro before the trials, rad/s: 0.6 deg/s, a cheap one (project choice)."""
+
+MASS_SPREAD = 0.5
+"""Standard error of an added mass on the card, over its value, where the card states none: strip theory and empirical
+formulas of slender hulls differ by as much on catamarans (project choice)."""
+
+COUPLED_SPREAD = 0.02
+"""Standard error of an added mass that the card leaves out, Yrdot or Nvdot, over (m - Yvdot) L (project choice)."""
+
+DAMPING_SPREAD = 1.0
+"""Standard error of a damping coefficient on the card, over its value, where the card states none (project choice)."""
+
+CROSS_FLOW_SPREAD = 0.5
+"""Standard error of a damping coefficient that the card leaves out, over that of cross-flow drag with C_D = 1 at half
+the length and half the cruising speed (project choice)."""
+
+THRUST_SPREAD = 1.0
+"""Standard error of a thrust curve on the card, over its value, where the card states none (project choice)."""
+
+LOSS_SPREAD = 0.5
+"""Standard error of the loss of thrust by speed, over half of the thrust at the cruising revolutions over the cruising
+speed (project choice)."""
+
+DRAUGHT_OF_CRAFT = 0.06
+"""Draught over length where the card states none: between that of a planing hull and of a displacement one (project
+choice)."""
+
+DISTURBANCES = ("current.north", "current.east", "disturbance.north", "disturbance.east", "gyro.bias")
+"""States of the model that do not change in a trial: m/s, m/s, N, N, rad/s."""
+
+OBSERVED_STEP_S = 0.2
+"""Step of the fit, s, or that of the record if it is longer: five in the shortest time constant of a craft of 2 m
+(project choice)."""
+
+
+def craft_fit_model(card: CraftCard) -> Model:
+    """The model of a card driven by measured revolutions, with disturbances as constant states.
+
+    Parameters
+    ----------
+    card : CraftCard
+        Its lag and dead band are left out: both lie before the revolutions.
+    """
+    thrusters = tuple(
+        thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0}) for thruster in card.thrusters
+    )
+    model = build(replace(card, thrusters=thrusters))
+    # Added masses are symmetric in theory (Fossen 2021, 6.3).
+    if card.derivatives.get("Yrdot", 0.0) == card.derivatives.get("Nvdot", 0.0):
+        model = model.substitute("derivatives.Nvdot", model.symbol("derivatives.Yrdot"))
+    for name, keys in twins(card).items():
+        for key in keys:
+            first = f"thrusters.{card.thrusters[0].name}.{key}"
+            model = model.substitute(f"thrusters.{name}.{key}", model.symbol(first))
+    thrust = sum(thruster.ahead_Ns2 * thruster.max_radps**2 for thruster in card.thrusters)
+    described = (
+        ("current.north", "m/s", "m/s2", CURRENT_SPREAD, "Velocity of the water to north"),
+        ("current.east", "m/s", "m/s2", CURRENT_SPREAD, "Velocity of the water to east"),
+        ("disturbance.north", "N", "N", FORCE_SPREAD * thrust, "Force of the wind to north"),
+        ("disturbance.east", "N", "N", FORCE_SPREAD * thrust, "Force of the wind to east"),
+        ("gyro.bias", "rad/s", "rad/s2", RATE_BIAS_SPREAD, "Bias of the rate gyro, positive to starboard"),
+    )
+    states, rates = [], []
+    for name, unit, rate_unit, nominal, description in described:
+        states.append(
+            State(name=name, unit=unit, description=description, nominal=nominal, derivative=f"{name}_rate", start=0.0)
+        )
+        rates.append(Quantity(name=f"{name}_rate", unit=rate_unit, description=f"Rate: {description}", value=ca.SX(0)))
+    north, east, force_north, force_east, bias = (state.symbol for state in states)
+    forward, starboard = earth_velocity(force_north, force_east, -model.symbol("motion.psi"))
+    shown = Quantity(
+        name="gyro.rate",
+        unit="rad/s",
+        description="Yaw rate that the gyro shows, positive to starboard",
+        value=model.symbol("motion.r") + bias,
+    )
+    return (
+        model.extend(*states, *rates, shown)
+        .redefine("motion.xdot", lambda speed: speed + north)
+        .redefine("motion.ydot", lambda speed: speed + east)
+        .redefine("force.X", lambda force: force + forward)
+        .redefine("force.Y", lambda force: force + starboard)
+    )
+
+
+def twins(card: CraftCard) -> dict[str, tuple[str, ...]]:
+    """Thruster to the parameters that it shares with the first one, because the card states the same numbers."""
+    keys = {"ahead_Ns2": "ahead", "astern_Ns2": "astern", "speed_loss_kg": "speed_loss"}
+    first, *others = card.thrusters
+    return {
+        other.name: tuple(keys.values())
+        for other in others
+        if all(getattr(other, key) == getattr(first, key) for key in keys)
+    }
+
+
+def craft_prior(card: CraftCard, model: Model) -> dict[str, tuple[float, float]]:
+    """Free parameter to its value and standard error before the trials, SI.
+
+    All terms of the hull are free but the mass, the yaw inertia and its centre; thrust curves and the loss of thrust by
+    speed of each thruster, where they are not shared.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    length, mass, speed = card.ship.length_m, card.rigid_body.mass, card.model.speed_mps
+    known = card.derivatives
+    sway = mass - known.get("Yvdot", 0.0)
+    for name in CRAFT_ADDED_MASSES:
+        if f"derivatives.{name}" not in model:
+            continue
+        value = known.get(name, 0.0)
+        spread = MASS_SPREAD * abs(value) or COUPLED_SPREAD * sway * length
+        found[f"derivatives.{name}"] = value, card.uncertainty.get(name, spread)
+    draught = card.ship.draught_m or DRAUGHT_OF_CRAFT * length
+    drag = 0.5 * card.environment.water_density_kgpm3 * length * draught
+    for term in VELOCITY_TERMS:
+        value = known.get(term.name, 0.0)
+        arms = (term.force == "N") + (term.factor == "r") + (term.size == "r")
+        usual = drag * (length / 2) ** arms / (1 + arms) * (1.0 if term.size else speed / 2)
+        spread = max(DAMPING_SPREAD * abs(value), CROSS_FLOW_SPREAD * usual)
+        found[f"derivatives.{term.name}"] = value, card.uncertainty.get(term.name, spread)
+    for thruster in card.thrusters:
+        prefix = f"thrusters.{thruster.name}"
+        spreads = {
+            "ahead": ("ahead_Ns2", THRUST_SPREAD * thruster.ahead_Ns2),
+            "astern": ("astern_Ns2", THRUST_SPREAD * max(thruster.astern_Ns2, 0.5 * thruster.ahead_Ns2)),
+            "speed_loss": ("speed_loss_kg", LOSS_SPREAD * 0.5 * thruster.ahead_Ns2 * thruster.max_radps / speed),
+        }
+        for part, (key, spread) in spreads.items():
+            if f"{prefix}.{part}" in model:
+                found[f"{prefix}.{part}"] = getattr(thruster, key), thruster.uncertainty.get(key, spread)
+    return found
+
+
+def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
+    """The problem of a card and trials.
+
+    Parameters
+    ----------
+    card : CraftCard
+    trials : sequence of Trial
+        By :func:`tank2sim.records.craft_trials.read_craft_trial`.
+
+    Raises
+    ------
+    InputError
+        A trial is too short.
+    """
+    model = _unbounded(craft_fit_model(card))
+    prior = craft_prior(card, model)
+    names = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}
+    signals = {signal for trial in trials for signal in trial.signals}
+    seen = [variable for signal, variable in names.items() if signal in signals]
+    rated = "r_radps" in signals
+    runs = []
+    for trial in trials:
+        run = prepare(model, trial, [*seen, *(["motion.r"] if rated else [])], step_s=OBSERVED_STEP_S)
+        runs.append(replace(run, seen=(*seen, *(["gyro.rate"] if rated else []))))
+    means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
+    return Problem(model, tuple(prior), means, errors, tuple(runs))
+
+
+def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem:
+    """The problem in which the disturbances of a trial are `means` within `spreads` (5,) before it is looked at.
+
+    Parameters
+    ----------
+    problem : Problem
+        By :func:`craft_problem`.
+    means, spreads : array (5,)
+        Of :data:`DISTURBANCES`.
+    """
+    known = dict(zip(DISTURBANCES, zip(means.tolist(), spreads.tolist(), strict=True), strict=True))
+
+    def with_prior(state: State) -> State:
+        if state.name not in known:
+            return state
+        mean, spread = known[state.name]
+        changed = replace(state, start=mean, nominal=spread)
+        changed.__dict__["symbol"] = state.symbol  # the equations hold this one
+        return changed
+
+    return replace(problem, model=replace(problem.model, states=tuple(map(with_prior, problem.model.states))))
+
+
+def _unbounded(model: Model) -> Model:
+    """The model without bounds on the loss of thrust: an estimate near zero has an error to both sides."""
+
+    def without_bound(parameter: Parameter) -> Parameter:
+        if not parameter.name.endswith(".speed_loss"):
+            return parameter
+        unbounded = replace(parameter, minimum=None)
+        unbounded.__dict__["symbol"] = parameter.symbol  # the equations hold this one
+        return unbounded
+
+    return replace(model, parameters=tuple(map(without_bound, model.parameters)))

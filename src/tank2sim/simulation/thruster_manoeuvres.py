@@ -1,0 +1,171 @@
+"""Manoeuvres of a craft with thrusters: a straight run, a turn by difference of revolutions, a spin.
+
+Each drives a :class:`~tank2sim.simulation.running.Running` simulation of a model with inputs
+``thrusters.<name>.command``. Revolutions are in rad/s. Which thruster is on which side is read off the model: one at
+port (``thrusters.<name>.y`` < 0) that pushes ahead turns the craft to starboard.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tank2sim.dynamics.model import Input, Model, Parameter
+from tank2sim.errors import InputError
+from tank2sim.simulation.running import Running
+
+SPIN_HEADING = 4 * math.pi
+"""Heading change of a spin: two turns, the second of which is steady. Project choice."""
+
+DIFFERENCE_HEADING = math.radians(540.0)
+"""Heading change of a turn by difference: that of a turning circle (ITTC 7.5-04-02-01)."""
+
+_LONGEST_LENGTHS = 150.0
+_STRAIGHT_LENGTHS = 30.0
+"""Longest turn or spin, and length of a straight run, without a given duration, L/u0: project choices. Small craft
+reach their speed within ten lengths."""
+
+
+def thruster_commands(model: Model) -> tuple[Input, ...]:
+    """The inputs of the revolutions of a craft's thrusters; none of a model without."""
+    return tuple(
+        variable
+        for variable in model.inputs
+        if variable.name.startswith("thrusters.") and variable.name.endswith(".command")
+    )
+
+
+def thruster_sides(model: Model) -> dict[str, float]:
+    """Command of each thruster that pushes ahead to the side of the yaw moment it gives, 1 to starboard, -1, or 0."""
+    sides = {}
+    for command in thruster_commands(model):
+        place = model[command.name.replace(".command", ".y")]
+        assert isinstance(place, Parameter)
+        if command.start:
+            sides[command.name] = 0.0 if place.start == 0 else -math.copysign(1.0, place.start)
+    return sides
+
+
+def _opposed(model: Model, words: str) -> dict[str, float]:
+    """As :func:`thruster_sides`.
+
+    Raises
+    ------
+    InputError
+        The craft has no thruster at one of the sides.
+    """
+    sides = thruster_sides(model)
+    if not {1.0, -1.0} <= set(sides.values()):
+        raise InputError(
+            model.origin, "thrusters", f"are not on both sides, and {words} needs them", "give orders with file:"
+        )
+    return sides
+
+
+def _within(model: Model, orders: dict[str, float], words: str) -> dict[str, float]:
+    """The orders, checked.
+
+    Raises
+    ------
+    InputError
+        One is beyond the largest revolutions.
+    """
+    for name, value in orders.items():
+        low, high = model[name].minimum, model[name].maximum
+        assert low is not None and high is not None
+        if not low * (1 + 1e-9) <= value <= high * (1 + 1e-9):
+            rpm = 60 / math.tau
+            problem = f"orders {value * rpm:.4g} rpm of {name.split('.')[1]}"
+            raise InputError(model.origin, words, problem, f"it turns at {low * rpm:.4g} to {high * rpm:.4g} rpm")
+    return orders
+
+
+def _at_rest(model: Model) -> dict[str, float]:
+    """Parameters of a start at rest with stopped propellers."""
+    names = [name for name in model.parameter_names if name.startswith("initial.") and name.endswith("_speed")]
+    return {"initial.u": 0.0, **dict.fromkeys(names, 0.0)}
+
+
+@dataclass(frozen=True)
+class StraightRun:
+    """From rest, the thrusters that push ahead at `revolutions` (rad/s; negative: astern)."""
+
+    revolutions: float
+
+    @property
+    def words(self) -> str:
+        """The text form of a manoeuvre, in rpm."""
+        return f"straight:{self.revolutions * 60 / math.tau:.10g}"
+
+    def start(self, model: Model) -> dict[str, float]:
+        """Parameters of the start."""
+        return _at_rest(model)
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, by default 30 L/u0."""
+        orders = dict.fromkeys(thruster_sides(running.model), self.revolutions)
+        running.order(_within(running.model, orders, self.words))
+        running.run(_STRAIGHT_LENGTHS * ship_time if duration is None else duration)
+
+
+@dataclass(frozen=True)
+class DifferenceTurn:
+    """Turn from the cruising speed by a difference of revolutions, rad/s, port less starboard.
+
+    Half of it is added to the cruising revolutions at one side and taken off at the other; positive turns to starboard.
+    """
+
+    difference: float
+
+    @property
+    def words(self) -> str:
+        """The text form of a manoeuvre, in rpm."""
+        return f"difference:{self.difference * 60 / math.tau:.10g}"
+
+    def start(self, model: Model) -> dict[str, float]:
+        """Parameters of the start: those of the model, at the cruising speed."""
+        return {}
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or until the heading has changed by :data:`DIFFERENCE_HEADING` (at most 150 L/u0)."""
+        model = running.model
+        starts = {command.name: command.start for command in thruster_commands(model)}
+        sides = _opposed(model, self.words)
+        orders = {name: starts[name] + side * self.difference / 2 for name, side in sides.items()}
+        running.order(_within(model, orders, self.words))
+        _turn_on(running, self.difference, DIFFERENCE_HEADING, ship_time, duration)
+
+
+@dataclass(frozen=True)
+class Spin:
+    """From rest, port thrusters at `revolutions` (rad/s) and those at starboard at as many astern; + to starboard."""
+
+    revolutions: float
+
+    @property
+    def words(self) -> str:
+        """The text form of a manoeuvre, in rpm."""
+        return f"spin:{self.revolutions * 60 / math.tau:.10g}"
+
+    def start(self, model: Model) -> dict[str, float]:
+        """Parameters of the start."""
+        return _at_rest(model)
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or until the heading has changed by :data:`SPIN_HEADING` (at most 150 L/u0)."""
+        sides = _opposed(running.model, self.words)
+        orders = {name: side * self.revolutions for name, side in sides.items()}
+        running.order(_within(running.model, orders, self.words))
+        _turn_on(running, self.revolutions, SPIN_HEADING, ship_time, duration)
+
+
+def _turn_on(running: Running, order: float, heading: float, ship_time: float, duration: float | None) -> None:
+    if duration is not None:
+        running.run(duration)
+        return
+    side = math.copysign(1.0, order)
+    goal = running.state("motion.psi") + side * heading
+    running.run_until("motion.psi", goal, rising=side > 0, at_most=_LONGEST_LENGTHS * ship_time)
+
+
+ThrusterManoeuvre = StraightRun | DifferenceTurn | Spin

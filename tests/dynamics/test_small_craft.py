@@ -1,0 +1,250 @@
+"""A small craft moves as an independent program has the Otter, by Fossen's matrices, and as thrusters push."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tank2sim.cards import CraftCard, parse_card, read_card
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.running import Running
+
+OTTER = read_card("otter")
+TEXT = OTTER.text
+RPM = math.tau / 60
+
+
+def accelerations(model: Model, motion: dict[str, float], inputs: dict[str, float]) -> np.ndarray:
+    """udot, vdot, rdot at a state; propellers turn as ordered unless `motion` says otherwise."""
+    names = ("motion.udot", "motion.vdot", "motion.rdot")
+    function = ca.Function("f", [model.x, model.u, model.p], [model.expand(ca.vcat([model.symbol(n) for n in names]))])
+    p = model.parameter_values()
+    x = np.array(model.initial(p)).ravel()
+    for name, value in motion.items():
+        x[model.state_names.index(name)] = value
+    return np.array(function(x, model.input_values(inputs), p)).ravel()
+
+
+def changed(*pairs: tuple[str, str]) -> Model:
+    text = TEXT
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    return build(parse_card(text, "changed.toml"))
+
+
+@pytest.fixture(scope="module")
+def otter() -> Integrator:
+    return Integrator(build(OTTER))
+
+
+def driven_by_reference(
+    otter: Integrator, folder: Path, name: str
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """The reference, and the model's motion under the same revolutions, at the same times."""
+    path = folder.parent / "reference" / f"otter_{name}.csv"
+    if not path.is_file():
+        pytest.skip(f"no {path}")
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    columns = dict(zip(lines[0].split(","), np.genfromtxt(lines[1:], delimiter=",").T, strict=True))
+    orders = columns["n_port_rpm"] * RPM, columns["n_stbd_rpm"] * RPM
+    current = {"current.speed": 0.3 if "current" in name else 0.0, "current.direction": math.radians(30)}
+
+    def order(row: int) -> dict[str, float]:
+        return {"thrusters.port.command": orders[0][row], "thrusters.starboard.command": orders[1][row]}
+
+    start = {"initial.u": columns["u_mps"][0], "initial.v": columns["v_mps"][0]}
+    running = Running(otter, {**order(0), **current}, start)
+    time = columns["t_s"]
+    for row in np.flatnonzero(np.diff(orders[0])) + 1:
+        running.run(time[row] - running.time)
+        running.order(order(row))
+    running.run(time[-1] - running.time)
+    found = running.trajectory()
+    names = {"u_mps": 1.0, "v_mps": 1.0, "r_degps": 180 / math.pi, "psi_deg": 180 / math.pi, "x_m": 1.0, "y_m": 1.0}
+    return columns, {
+        key: factor * np.interp(time, found.t, found[f"motion.{key.split('_')[0]}"]) for key, factor in names.items()
+    }
+
+
+@pytest.mark.parametrize("name", ["straight", "straight_current", "turn", "turn_current", "spin"])
+def test_the_otter_moves_as_mss_has_it_in_six_degrees_of_freedom(otter: Integrator, data: Path, name: str) -> None:
+    """Within what pitch and roll make of it: 0.5 % of the steady rate of the turn, 2.5 cm/s while pitch settles."""
+    reference, found = driven_by_reference(otter, data / "gap_cases", name)
+    for signal, bound in {"u_mps": 0.025, "v_mps": 0.003, "r_degps": 0.06, "x_m": 0.25, "y_m": 0.25}.items():
+        assert np.abs(found[signal] - reference[signal]).max() < bound, signal
+    assert abs(found["u_mps"][-1] - reference["u_mps"][-1]) < 5e-4
+    assert abs(found["psi_deg"][-1] - reference["psi_deg"][-1]) < 0.005 * abs(reference["psi_deg"][-1]) + 0.02
+
+
+def test_accelerations_are_those_of_fossens_matrices() -> None:
+    """M nu' = tau - C_RB nu - C_A nu + D, with the matrices written out (Fossen 2021, 6.1 to 6.5)."""
+    rng = np.random.default_rng(3)
+    names = {
+        "Xudot": -6.0, "Yvdot": -70.0, "Yrdot": -8.0, "Nvdot": -8.0, "Nrdot": -21.0,
+        "Xu": -30.0, "Xuabsu": -22.0, "Yv": -80.0, "Yvabsv": -300.0, "Yvabsr": -40.0, "Yvabsu": -12.0, "Yr": -9.0,
+        "Yrabsr": -7.0, "Yrabsv": -33.0, "Yrabsu": 21.0, "Nv": -14.0, "Nvabsv": -11.0, "Nvabsr": -5.0, "Nvabsu": 17.0,
+        "Nr": -50.0, "Nrabsr": -90.0, "Nrabsv": -60.0, "Nrabsu": -35.0,
+    }  # fmt: skip
+    head, rest = TEXT.split("[derivatives]")
+    tail = rest[rest.index("[[thrusters]]") : rest.index("[[effects]]")]
+    body = "\n".join(f"{name} = {value}" for name, value in names.items())
+    model = build(parse_card(f"{head}[derivatives]\n{body}\n\n{tail}", "made.toml"))
+    m, inertia, g = 80.0, 16.0125, 0.153125
+    d = names
+    M = np.array(
+        [
+            [m - d["Xudot"], 0, 0],
+            [0, m - d["Yvdot"], m * g - d["Yrdot"]],
+            [0, m * g - d["Nvdot"], inertia - d["Nrdot"]],
+        ]
+    )
+    for _ in range(10):
+        u, v, r = nu = rng.uniform(-1, 1, 3) * [2.0, 0.7, 0.6]
+        n = rng.uniform(-80, 80, 2)
+        C_RB = np.array([[0, 0, -m * (g * r + v)], [0, 0, m * u], [m * (g * r + v), -m * u, 0]])
+        a2 = d["Yvdot"] * v + d["Yrdot"] * r
+        C_A = np.array([[0, 0, a2], [0, 0, -d["Xudot"] * u], [-a2, d["Xudot"] * u, 0]])
+        D = [
+            d["Xu"] * u + d["Xuabsu"] * u * abs(u),
+            *(
+                (d[f"{f}v"] + d[f"{f}vabsv"] * abs(v) + d[f"{f}vabsr"] * abs(r) + d[f"{f}vabsu"] * abs(u)) * v
+                + (d[f"{f}r"] + d[f"{f}rabsr"] * abs(r) + d[f"{f}rabsv"] * abs(v) + d[f"{f}rabsu"] * abs(u)) * r
+                for f in "YN"
+            ),
+        ]  # fmt: skip
+        T = [0.01108 * n_i**2 if n_i > 0 else -0.006445 * n_i**2 for n_i in n]
+        tau = np.array([T[0] + T[1], 0, 0.395 * (T[0] - T[1])])
+        expected = np.linalg.solve(M, tau - C_RB @ nu - C_A @ nu + D)
+        motion = {"motion.u": u, "motion.v": v, "motion.r": r}
+        orders = {"thrusters.port.command": n[0], "thrusters.starboard.command": n[1]}
+        assert accelerations(model, motion, orders) == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_dead_band_leaves_small_orders_without_thrust_and_large_ones_as_they_are() -> None:
+    banded = changed(("max_radps = 103.930864", "max_radps = 103.930864\ndead_band_radps = 8.0"))
+    rest = {"motion.u": 0.0}
+
+    def surge(model: Model, n: float) -> float:
+        orders = {"thrusters.port.command": n, "thrusters.starboard.command": n}
+        return float(accelerations(model, rest, orders)[0])
+
+    assert surge(banded, 7.9) == surge(banded, -7.9) == 0.0
+    for n in (8.1, 50.0, -50.0):
+        assert surge(banded, n) == surge(build(OTTER), n) != 0.0
+
+
+def test_thrust_ahead_falls_with_speed_and_thrust_astern_does_not() -> None:
+    losing = changed(("ahead_Ns2 = 0.01108", "ahead_Ns2 = 0.01108\nspeed_loss_kg = 0.05"))
+    for n, loss in ((60.0, 2 * 0.05 * 60.0 * 1.2), (-60.0, 0.0)):
+        orders = {"thrusters.port.command": n, "thrusters.starboard.command": n}
+        motion = {"motion.u": 1.2}
+        less = accelerations(build(OTTER), motion, orders)[0] - accelerations(losing, motion, orders)[0]
+        assert less == pytest.approx(loss / 85.281521, abs=1e-12)
+
+
+def test_an_outboard_at_the_stern_that_pushes_to_port_turns_the_craft_to_starboard() -> None:
+    at = TEXT.index("[[thrusters]]")
+    outboard = (
+        '[[thrusters]]\nname = "stern"\nx_m = -1.0\nahead_Ns2 = 0.02216\nastern_Ns2 = 0.01\nmax_rpm = 990\n'
+        "max_azimuth_deg = 30\nazimuth_time_constant_s = 0.4\nmax_azimuth_rate_degps = 20\n"
+    )
+    model = build(parse_card(f"{TEXT[:at]}{outboard}", "outboard.toml"))
+    state = {"motion.u": 0.0, "thrusters.stern.azimuth": math.radians(-30)}
+    _, vdot, rdot = accelerations(model, state, {"thrusters.stern.command": 50.0})
+    T = 0.02216 * 50.0**2
+    Y, N = T * math.sin(math.radians(-30)), 1.0 * T * math.sin(math.radians(30))
+    assert (vdot, rdot) == pytest.approx(np.linalg.solve([[162.5, 12.25], [12.25, 40.044924]], [Y, N]), rel=1e-9)
+    assert rdot > 0 > vdot
+    running = Running(Integrator(model, compiled=False), {"thrusters.stern.azimuth_command": math.radians(30)})
+    running.run(1.0)
+    assert math.degrees(running.state("thrusters.stern.azimuth")) == pytest.approx(20.0, abs=0.3)  # by its rate
+
+
+def test_revolutions_follow_their_order_with_the_lag_of_the_card() -> None:
+    lagging = changed(("max_radps = 103.930864", "max_radps = 103.930864\ntime_constant_s = 0.3"))
+    assert lagging.step_s <= 0.06
+    running = Running(Integrator(lagging, compiled=False), {"thrusters.port.command": 90.0})
+    first = running.state("thrusters.port.speed")
+    running.run(0.3)
+    assert running.state("thrusters.port.speed") == pytest.approx(90 + (first - 90) * math.exp(-1), rel=1e-6)
+
+
+def test_a_craft_on_a_prime_card_is_the_same_craft() -> None:
+    """By the scales of the prime system by hand: 1/2 rho L^2 V^2, L/V."""
+    rho, L, V = 1025.0, 2.0, 1.5
+    scale = {
+        "mass = 80.0": ("mass", 80.0, 0.5 * rho * L**3),
+        "yaw_inertia = 16.0125": ("yaw_inertia", 16.0125, 0.5 * rho * L**5),
+        "x_G = 0.153125": ("x_G", 0.153125, L),
+        "Xudot = -5.281521": ("Xudot", -5.281521, 0.5 * rho * L**3),
+        "Yvdot = -82.5": ("Yvdot", -82.5, 0.5 * rho * L**3),
+        "Nrdot = -24.032424": ("Nrdot", -24.032424, 0.5 * rho * L**5),
+        "Xu = -77.5544": ("Xu", -77.5544, 0.5 * rho * L**2 * V),
+        "Yv = -162.5": ("Yv", -162.5, 0.5 * rho * L**2 * V),
+        "Yvabsv = -10.04": ("Yvabsv", -10.04, 0.5 * rho * L**2),
+        "Nr = -40.044922": ("Nr", -40.044922, 0.5 * rho * L**4 * V),
+        "Nrabsr = -410.99": ("Nrabsr", -410.99, 0.5 * rho * L**5),
+    }
+    prime = changed(
+        ("speed_mps = 1.5\n", 'speed_mps = 1.5\nscaling = "prime"\n'),
+        *((old, f"{name} = {value / unit!r}") for old, (name, value, unit) in scale.items()),
+    )
+    motion = {"motion.u": 1.1, "motion.v": -0.2, "motion.r": 0.3}
+    inputs = {"thrusters.port.command": 70.0, "thrusters.starboard.command": -20.0}
+    assert accelerations(prime, motion, inputs) == pytest.approx(accelerations(build(OTTER), motion, inputs), rel=1e-12)
+
+
+def test_the_cruising_revolutions_hold_the_cruising_speed() -> None:
+    for model in (build(OTTER), changed(("ahead_Ns2 = 0.01108", "ahead_Ns2 = 0.01108\nspeed_loss_kg = 0.1"))):
+        assert accelerations(model, {}, {}) == pytest.approx([0, 0, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("Xu = -77.5544", "Xu = 77.5544", "derivatives.Xu"),
+        ("Yv = -162.5", "Yvv = -162.5", "derivatives.Yvv"),
+        ("Yvdot = -82.5", "Yvdot = 82.5", "rigid_body"),
+        ("x_G = 0.153125", "x_G = 1.53125", "rigid_body.x_G"),
+        ("mass = 80.0", "mass = 80000.0", "rigid_body.mass"),
+        ('name = "starboard"', 'name = "port"', "thrusters.1.name"),
+        ("speed_mps = 1.5", "speed_mps = 3.5", "model.speed_mps"),
+        ("y_m = 0.395", "y_m = 395.0", "thrusters.1.x_m"),
+        ('name = "cross_flow_drag"', 'name = "rudder_stall"', "effects.0.name"),
+        ("y_m = 0.395", "y_m = 0.395\nmax_azimuth_deg = 30", "thrusters.1.azimuth_time_constant_s"),
+        ("y_m = 0.395", "y_m = 0.395\ndead_band_rpm = 1000", "thrusters.1.dead_band_rpm"),
+    ],
+)
+def test_a_card_at_fault_is_refused_at_its_place(old: str, new: str, place: str) -> None:
+    assert TEXT.count(old) >= 1
+    with pytest.raises(InputError) as caught:
+        build(parse_card(TEXT.replace(old, new, 1), "card.toml"))
+    assert caught.value.place == place
+
+
+def test_a_craft_without_thrust_only_loses_energy() -> None:
+    model = build(OTTER)
+    body = np.array([[85.281521, 0, 0], [0, 162.5, 12.25], [0, 12.25, 40.044924]])
+    running = Running(
+        Integrator(model, compiled=False),
+        {"thrusters.port.command": 0.0, "thrusters.starboard.command": 0.0},
+        {"initial.u": 1.5, "initial.v": 0.4, "initial.r": -0.5},
+    )
+    running.run(10.0)
+    run = running.trajectory()
+    nu = np.column_stack([run[f"motion.{letter}"] for letter in "uvr"])
+    energy = np.einsum("ni,ij,nj->n", nu, body, nu)
+    assert np.all(np.diff(energy) < 0) and energy[-1] < 1e-3 * energy[0]
+
+
+def test_the_otter_is_a_craft_of_the_card_format() -> None:
+    assert isinstance(OTTER, CraftCard)
+    assert [thruster.name for thruster in OTTER.thrusters] == ["port", "starboard"]

@@ -1,0 +1,145 @@
+"""Hull and thrust curves of a craft from trials: against a truth that another simulation has, and honest verdicts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import craft_log
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.cards import CraftCard
+from tank2sim.errors import InputError
+from tank2sim.identification.craft.fit import CoefficientVerdict, determination
+
+ROWS = {
+    "straight": [(12.0, 0.7, 0.7), (8.0, 0.0, 0.0)],
+    "spin": [(10.0, 0.5, -0.5), (10.0, -0.4, 0.4)],
+    "astern": [(10.0, -0.5, -0.5), (8.0, 0.4, 0.4)],
+    "steps": [(5.0, 0.8, 0.3), (5.0, 0.1, 0.7), (5.0, 0.6, 0.6), (5.0, 0.9, -0.2), (8.0, 0.2, 0.8), (6.0, 0.7, 0.4)],
+    "zigzag": [
+        (6.0, 0.7, 0.5),
+        (5.0, 0.45, 0.75),
+        (5.0, 0.75, 0.45),
+        (5.0, 0.45, 0.75),
+        (6.0, 0.9, 0.5),
+        (6.0, 0.3, 0.7),
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def craft() -> dict[str, float]:
+    return craft_log.random_craft(np.random.default_rng(7))
+
+
+def written(folder: Path, craft: dict[str, float], names: list[str], *, scale: float = 1.0) -> list[Path]:
+    """Trials by the integration of the benchmark, without wind or current, with 1 cm and 0.1 deg of noise."""
+    rng, paths = np.random.default_rng(11), []
+    full = craft["rpm"] * np.pi / 30
+    for name in names:
+        state, n, rows, t = np.zeros(6), np.zeros(2), [], 0.0
+        for seconds, *orders in ROWS[name]:
+            goal = np.array(orders) * full
+            for _ in range(round(seconds / 0.02)):
+                if round(t / 0.02) % 10 == 0:
+                    rows.append([t, *state[:3], *n])
+                n = goal + (n - goal) * np.exp(-0.02 / craft["lag"])
+                psi, u, v, r = state[2:]
+                speed = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
+                state = state + 0.02 * np.array([*speed, *craft_log.rates(craft, state[3:], n, np.zeros(3))])
+                t += 0.02
+        table = np.array(rows)
+        table[:, 1:3] += 0.01 * rng.normal(size=(len(table), 2))
+        table[:, 3] = np.degrees(table[:, 3]) + 0.1 * rng.normal(size=len(table))
+        table[:, 4:] *= scale * 30 / np.pi
+        path = folder / f"{name}.csv"
+        np.savetxt(path, table, delimiter=",", header="t_s,x_m,y_m,psi_deg,n_port_rpm,n_starboard_rpm", comments="")
+        paths.append(path)
+    return paths
+
+
+@pytest.fixture(scope="module")
+def found(craft, tmp_path_factory) -> t2s.CraftIdentificationResult:
+    folder = tmp_path_factory.mktemp("trials")
+    *fitted, held = written(folder, craft, ["straight", "spin", "astern", "steps", "zigzag"])
+    first = craft_log.first_card(craft, np.random.default_rng(5))
+    return t2s.identify_craft(first, fitted, holdout=held)
+
+
+@pytest.mark.slow
+def test_position_and_heading_alone_give_thrust_curve_and_damping(craft, found) -> None:
+    coefficients = found.content()["coefficients"]
+    for name in ("port.ahead", "port.astern", "Xu", "Xuabsu", "Nr", "Nrabsr"):
+        entry, truth = coefficients[name], craft[name.rpartition(".")[2]]
+        assert abs(entry["value"] - truth) < 3 * entry["standard_error"], name
+    assert coefficients["port.ahead"]["value"] == pytest.approx(craft["ahead"], rel=0.1)
+    assert abs(coefficients["port.ahead"]["before"] / craft["ahead"] - 1) > 0.1
+
+
+@pytest.mark.slow
+def test_the_card_written_is_a_craft_with_the_estimates_and_their_errors(found) -> None:
+    card, fit = found.card, found.fit
+    assert isinstance(card, CraftCard)
+    values = dict(zip(fit.problem.free, fit.estimate.values, strict=True))
+    errors = dict(zip(fit.problem.free, fit.estimate.standard_errors, strict=True))
+    assert card.derivatives["Xu"] == pytest.approx(values["derivatives.Xu"], rel=1e-9)
+    assert card.uncertainty["Nr"] == pytest.approx(errors["derivatives.Nr"], rel=1e-9)
+    for thruster in card.thrusters:
+        assert thruster.ahead_Ns2 == pytest.approx(values["thrusters.port.ahead"], rel=1e-9)
+        assert thruster.uncertainty["astern_Ns2"] == pytest.approx(errors["thrusters.port.astern"], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_held_out_trial_is_predicted(found) -> None:
+    r_squared = found.determination
+    assert r_squared["u"] > 0.9 and r_squared["r"] > 0.9
+    assert found.content()["held_out"] == ["zigzag"]
+
+
+@pytest.mark.slow
+def test_what_straight_runs_do_not_show_is_said_and_a_manoeuvre_that_would_is_named(craft, tmp_path) -> None:
+    paths = written(tmp_path, craft, ["straight"])
+    found = t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), paths)
+    verdicts = dict(zip(found.fit.problem.free, found.fit.verdicts, strict=True))
+    for name in ("derivatives.Nr", "derivatives.Nrabsr", "derivatives.Yvabsv", "thrusters.port.astern"):
+        assert verdicts[name] is CoefficientVerdict.PRIOR, name
+    assert found.marks and "astern" in found.marks[0]
+    best = found.next_trials[0]
+    assert {"Nr", "Nrabsr"} <= set(best.determines)
+    assert max(best.as_json()["t_s"]) < 300
+    straight = next(entry for entry in found.next_trials if entry.words.startswith("straight"))
+    assert "Nrabsr" not in straight.determines and "port.astern" not in straight.determines
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (("n_port_rpm", "rpm_links"), "lacks n_port_rpm"),
+        (("psi_deg", "heading"), "lacks psi_deg"),
+        (("t_s", "time"), "lacks t_s"),
+    ],
+)
+def test_a_trial_that_lacks_a_column_is_refused_by_its_name(craft, tmp_path, change, problem) -> None:
+    (path,) = written(tmp_path, craft, ["spin"])
+    path.write_text(path.read_text().replace(*change, 1))
+    with pytest.raises(InputError, match=problem):
+        t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), path)
+
+
+def test_a_trial_is_not_fitted_and_held_out_at_once(craft, tmp_path) -> None:
+    (path,) = written(tmp_path, craft, ["spin"])
+    with pytest.raises(InputError, match="held out"):
+        t2s.identify_craft("otter", path, holdout=path)
+
+
+def test_a_ship_with_a_rudder_is_refused(tmp_path) -> None:
+    with pytest.raises(InputError, match="small_craft"):
+        t2s.identify_craft("mariner", tmp_path)
+
+
+def test_the_share_explained_is_one_without_error_and_zero_for_the_mean() -> None:
+    truth = np.array([[1.0], [2.0], [6.0]])
+    assert determination(truth, truth)[0] == 1.0
+    assert determination(np.full((3, 1), 3.0), truth)[0] == pytest.approx(0.0)
