@@ -7,21 +7,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomlkit
 from gap_truth import Made, Setting, make, write
+from identify_esso_osaka import spans
 
 from tank2sim.api.gap import GapResult
-from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import surroundings_by_trial
 from tank2sim.gap.inference.batch import batch_trials
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis, TrialSurroundings
-from tank2sim.gap.outcome.improve_card import add_effects_to_card
-from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surroundings
+from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
+from tank2sim.gap.outcome.surroundings import fit_common_surroundings, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import MISSING, Gap, Surroundings
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
+from tank2sim.records.trials import window, with_signals
 
 TRIALS = ("zigzag20_20", "turn35_stbd", "straight")
 HELD = ("turn35_port",)
@@ -114,6 +117,52 @@ def test_the_current_of_a_trial_is_found_from_its_replay(tmp_path: Path) -> None
     before = replay_by_card(card, fitted)
     for trial, still in zip(after, before, strict=True):
         assert trial.misfit("before") < 0.1 * still.misfit("before")
+
+
+def test_the_winds_of_all_trials_and_their_coefficients_are_found_from_replays(windy: tuple) -> None:
+    made, card, fitted, _ = windy
+    with_wind = add_effects_to_card(card, [("wind", at_rest("wind"), {})])
+    found = fit_common_surroundings(with_wind, fitted, "wind", NOISE)
+    assert sorted(found.by_trial) == sorted(TRIALS)
+    for name in ("zigzag20_20", "turn35_stbd"):  # a straight course shows little of a wind along it
+        speed, direction = (made.parameters["wind"][f"{key} in {name}"] for key in SIGNALS)
+        at = found.by_trial[name]
+        away = (np.rad2deg(at.direction_rad) - direction + 180) % 360 - 180
+        assert abs(at.speed_mps - speed) < 0.25 * speed and abs(away) < 12.0
+    assert set(found.values) == set(found.errors) >= {"surge_coefficient", "sway_coefficient", "yaw_coefficient"}
+    assert np.median(found.predicted) < 0.2
+
+
+def test_a_wind_of_the_first_half_predicts_nothing_where_there_is_none(tmp_path: Path) -> None:
+    _, card, fitted, _ = case(tmp_path, Setting((), 44, manoeuvres=TRIALS[:2]))
+    with_wind = add_effects_to_card(card, [("wind", at_rest("wind"), {})])
+    assert np.median(fit_common_surroundings(with_wind, fitted, "wind", NOISE).predicted) > 0.9
+
+
+@pytest.mark.slow
+def test_the_wind_of_a_pond_is_named_by_simulation(data) -> None:
+    bundled = read_card("esso-osaka")
+    assert isinstance(bundled, ManoeuvringCard)
+    document = tomlkit.parse(bundled.text)
+    del document["effects"][[entry["name"] for entry in document["effects"]].index("wind")]
+    calm = parse_card(tomlkit.dumps(document), bundled.source)
+    assert isinstance(calm, ManoeuvringCard)
+    trials = measured(sorted((data / "data/esso_osaka/zigzag").glob("*31-Jul-2020*.csv")), calm).trials
+    blind = []
+    for trial in trials:
+        begin, end = max(spans(trial, calm.model.speed_range_mps[0]), key=lambda span: span[1] - span[0])
+        recorded = [name for name in trial.signals if name.startswith("wind_")]
+        blind.append(window(with_signals(trial, dict.fromkeys(recorded), "wind left out"), begin, end))
+    fitted, held = (Measured(tuple(group), "angle", ()) for group in (blind[:-1], blind[-1:]))
+    gap = run_gap_workflow(
+        calm, fitted, held, GapOptions(workers=1, effects=("wind", "current", "wave_drift", "rudder_bias"))
+    )
+    assert [effect.name for effect in gap.effects] == ["wind"]
+    north_east = np.mean([at.speed_mps * np.exp(1j * at.direction_rad) for at in gap.effects[0].by_trial.values()])
+    assert abs((np.rad2deg(np.angle(north_east)) - 287 + 180) % 360 - 180) < 25  # measured: 1.8 m/s from 287 deg
+    assert 1.0 < abs(north_east) < 2.8
+    before, after = (gap.misfit(version, held_out=True) for version in ("before", "after"))
+    assert before is not None and after is not None and after < 0.4 * before
 
 
 @pytest.mark.slow

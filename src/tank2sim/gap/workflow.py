@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import softmax
 from threadpoolctl import threadpool_limits
 
 from tank2sim.cards.card import ManoeuvringCard
@@ -31,7 +32,13 @@ from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.refit import refit_coefficients
-from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
+from tank2sim.gap.outcome.surroundings import (
+    ByTrial,
+    CommonSurroundings,
+    fit_common_surroundings,
+    fit_surroundings,
+    with_surroundings,
+)
 from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import (
@@ -46,10 +53,11 @@ from tank2sim.gap.result import (
     Passed,
     Refitted,
     Rival,
+    Surroundings,
 )
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
-from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, Decision, Strange, decide
+from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, TEMPER, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import lowered_bound_notice, polynomial_over_trials
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
@@ -82,6 +90,11 @@ are not asked for (project choice: odds of 1 to e^20)."""
 CLEARLY = 0.7
 """Largest share of the misfit that may remain where a second explanation, or one next to something unknown, is named
 (project choice)."""
+
+PREDICTS = 0.5
+"""Share of the misfit of the second half of a trial that a wind or current fitted to its first half may leave, as the
+median over the trials, where it is named by simulation alone (project choice): two numbers to a trial follow much
+that is no wind, but do not predict it."""
 
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
@@ -205,6 +218,7 @@ def _search_once(
     progress("proving")
     replays = TrialReplays({name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, pool)
     judged = _judge_by_simulation(card, trials, found, decision, replays, options.false_discovery)
+    judged = _surroundings_by_simulation(card, trials, found, judged, replays, names)
     progress("where and how much")
     return _assemble_gap(card, trials, found, judged, replays.noise)
 
@@ -339,12 +353,14 @@ def _assemble_gap(
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """A decision after the simulations with its names, and the names that brought none closer."""
+    """A decision after the simulations with its names, the names that brought none closer, and what is to be said of a
+    name that simulations alone gave."""
 
     decision: Decision
     estimated: list[Found]
     proof: _Proof
     withheld: tuple[str, ...]
+    by_simulation: str = ""
 
 
 def _judge_by_simulation(
@@ -394,6 +410,98 @@ def _judge_by_simulation(
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
     return _Judged(decision, [], proof, tuple(withheld))
+
+
+def _surroundings_by_simulation(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    judged: _Judged,
+    replays: TrialReplays,
+    names: Sequence[str],
+) -> _Judged:
+    """The decision, or in its place a wind or current of each trial that simulations follow much more closely with.
+
+    A weak force that lasts turns a ship within minutes and is not seen from instant to instant, where random forces
+    of the same size explain it as well. So where the trials are still missed by far (:data:`MUCH`), each wind or
+    current that was not recorded is fitted to the free-running simulations. It is named if less than :data:`CLEARLY`
+    of the misfit of the decision is left, and if the first half of the trials predicts the second (:data:`PREDICTS`).
+    """
+    reached = _misfit_of(judged.proof.results, "after")
+    surroundings = [name for name in names if EFFECTS[name].surroundings and name not in found.none.hypothesis.recorded]
+    if reached <= MUCH or any(EFFECTS[name].surroundings for name, *_ in judged.estimated):
+        return judged
+    tried: dict[str, tuple[ExplanationFit, CommonSurroundings, _Proof]] = {}
+    for name in surroundings:
+        fit = next((fit for fit in found.fits if fit.hypothesis.effects == (name,)), None)
+        if fit is None:
+            continue
+        at_sea = add_effects_to_card(card, [(name, at_rest(name), {})])
+        common = fit_common_surroundings(at_sea, trials[0], name, replays.noise)
+        if np.median(common.predicted) < PREDICTS:
+            named = _NamedEffects([(name, common.values, common.errors)], {name: common.by_trial})
+            proof = _prove(card, trials, named, replays, found, fit)
+            if _misfit_of(proof.results, "after") < CLEARLY * reached and closes_gap(proof.results, CLEARLY):
+                tried[name] = _at(fit, common, found.likelihood.motion.names), common, proof
+    if not tried:
+        return judged
+    proofs: dict[tuple[str, ...], _Proof] = {(): judged.proof}
+    proofs |= {(name,): proof for name, (*_, proof) in tried.items()}
+    best, *others = sorted(tried, key=lambda name: _misfit_of(tried[name][2].results, "after"))
+    fit, common, proof = tried[best]
+    alike = tuple(
+        tried[name][0]
+        for name in others
+        if CLEARLY * _misfit_of(tried[name][2].results, "after") < _misfit_of(proof.results, "after")
+    )
+    decision = replace(
+        judged.decision,
+        verdict=AMBIGUOUS if alike else MISSING,
+        best=fit,
+        alike=alike,
+        probabilities=_probabilities_by_simulation(card, trials[0], proofs),
+    )
+    estimated: list[Found] = [(best, common.values, common.errors)]
+    said = (
+        f"{best}: named by free-running simulations, not from instant to instant; fitted to the first half of each "
+        f"trial, it leaves {np.median(common.predicted):.0%} of the misfit of the second half (median)"
+    )
+    boxed = replace(proof, results=_with_black_box(card, proof, estimated, replays))
+    return _Judged(decision, estimated, boxed, judged.withheld, said)
+
+
+def _at(fit: ExplanationFit, common: CommonSurroundings, trials: Sequence[str]) -> ExplanationFit:
+    """A fit with the wind or current that simulations gave in the place of its own."""
+    parts = {
+        name: one.speed_mps * np.array([np.cos(one.direction_rad), np.sin(one.direction_rad)])
+        for name, one in common.by_trial.items()
+    }
+    mean = Surroundings.of_parts(np.mean(list(parts.values()), axis=0), np.zeros(2))
+    same = {"speed_mps": mean.speed_mps, "direction_rad": mean.direction_rad, **common.values}
+    theta = [
+        same.get(one.parameter.name, value) if one.run is None else parts[trials[one.run]][one.axis]
+        for one, value in zip(fit.hypothesis.estimated, fit.theta, strict=True)
+    ]
+    return replace(fit, theta=np.array(theta))
+
+
+def _probabilities_by_simulation(
+    card: ManoeuvringCard, fitted: Measured, proofs: Mapping[tuple[str, ...], _Proof]
+) -> dict[tuple[str, ...], float]:
+    """Probability of each explanation by the misfits of the fitted trials.
+
+    Their errors are of an unknown size and independent once in a passage of L/u0; an explanation has two numbers to a
+    trial, or none, which cost what Schwarz's criterion asks.
+    """
+    passage = card.ship.length_m / card.model.speed_mps
+    readings = np.array([(trial.time_s[-1] - trial.time_s[0]) / passage for trial in fitted.trials])
+    scores = []
+    for effects, proof in proofs.items():
+        misfits = np.array([result.misfit("after") for result in proof.results if not result.held_out])
+        numbers = 2 * len(fitted.trials) * len(effects)
+        scores.append(2 * readings @ np.log(np.maximum(misfits, 1.0)) + numbers * np.log(np.sum(readings)))
+    logs = -0.5 * np.array(scores) / TEMPER
+    return dict(zip(proofs, map(float, softmax(logs)), strict=True))
 
 
 def _closes_clearly(results: Sequence[Passed]) -> bool:
@@ -590,6 +698,7 @@ def _notices(
     decision, results, withheld = judged.decision, judged.proof.results, judged.withheld
     own_surroundings = tuple(judged.proof.by_trial) if trials[1].trials else ()
     notices = [*trials[0].notices, *trials[1].notices]
+    notices += [judged.by_simulation] if judged.by_simulation else []
     notices += [_in_words(strange) for strange in decision.strange]
     notices += [
         f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -25,6 +26,10 @@ _TURNS = 15
 
 _SETTLED = 3e-3
 """A turn that moves the surroundings by less than this share of the typical speed is the last (project choice)."""
+
+_CONVERGED = 1e-3
+"""Share by which a step lowers the sum of squares of all trials together when it is the last (project choice: initial
+states are found again after it)."""
 
 _DIRECTIONS, _SHARES = 8, (0.5, 1.0, 1.5)
 """Directions, and shares of the typical speed, at which a search for the surroundings of a trial begins, in addition to
@@ -83,46 +88,233 @@ def fit_surroundings(
     return found
 
 
-def _of_trial(
-    card: ManoeuvringCard, driven_by: str, trial: Trial, effects: Sequence[str], noise: Mapping[str, float]
-) -> dict[str, Surroundings]:
-    replayer = Replayer(card, driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
-    p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in replayer.seen])
-    typical = np.repeat([_typical_speed(card, name) for name in effects], 2)
+@dataclass(frozen=True, eq=False)
+class CommonSurroundings:
+    """A wind or current that acts in all trials, in each with a speed and direction of its own, found by simulation.
 
-    def of(parts: Array) -> dict[str, Surroundings]:
-        pairs = zip(effects, np.reshape(parts, (-1, 2)), strict=True)
-        return {name: Surroundings.of_parts(pair, np.zeros(2)) for name, pair in pairs}
+    Parameters
+    ----------
+    effect : str
+        Its name.
+    values, errors : mapping
+        Coefficients of its forces, which hold in all trials, by the names of the parameters, SI, with standard errors.
+    by_trial : mapping
+        Name of each trial to its wind or current.
+    predicted : array (trials,)
+        Root mean square of simulated less measured over the second half of each trial, with the wind or current fitted
+        to the first half, over that without any.
+    """
 
-    def record_with(parts: Array) -> InputRecord:
-        return input_record(replayer, _with(trial, {name: {trial.name: at} for name, at in of(parts).items()}))
+    effect: str
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    by_trial: Mapping[str, Surroundings]
+    predicted: Array
 
-    known = ~np.isnan(record_with(np.zeros(len(typical))).readings)
-    state = replayer.guess_initial_state(record_with(np.zeros(len(typical))), sigma, p)
 
-    def residuals(parts: Array) -> Array:
-        record = record_with(parts)
-        away = ((replayer.motion(record, state, p) - record.readings) / sigma)[compared]
-        return np.concatenate([np.nan_to_num(away, nan=_FAR), parts / typical])
+def fit_common_surroundings(
+    card: ManoeuvringCard, measured: Measured, effect: str, noise: Mapping[str, float]
+) -> CommonSurroundings:
+    """One effect of the surroundings with the coefficients of its forces, which are the same in all trials.
 
-    def slopes(parts: Array) -> Array:
-        return difference_slopes(residuals, parts, residuals(parts), _STEP * typical)
+    By least squares of the free-running simulations of all trials together. A trial weighs as many independent
+    readings as its errors hold, in units of their own size; the coefficients are normal beforehand with the spreads of
+    the effect.
 
-    angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-    around = [
-        share * np.tile([np.cos(angle), np.sin(angle)], len(effects)) * typical for angle in angles for share in _SHARES
-    ]
-    compared = known & (np.arange(len(known)) < max(_FIRST_PART * len(known), 1))[:, None]
-    at = min([np.zeros(len(typical)), *around], key=lambda parts: float(np.sum(residuals(parts) ** 2)))
-    at = least_squares(residuals, at, slopes, x_scale=typical).x
-    compared = known
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        With the effect, whose wind or current is an input of its model.
+    measured : Measured
+        The trials.
+    effect : str
+        Its name.
+    noise : mapping
+        Variable to the standard deviation of one reading, SI; others are not compared.
+    """
+    shared = [one for one in EFFECTS[effect].parameters if one.spread_value(card)]
+    names = [one.name for one in shared]
+    keys = [EFFECTS[effect].model_names()[name] for name in names]
+    centre = np.array([one.value({}, card) for one in shared])
+    spread = np.array([one.spread_value(card) for one in shared])
+    trials = [_Trial(card, measured.driven_by, trial, (effect,), noise) for trial in measured.trials]
+    model, typical = trials[0].replayer.model, _typical_speed(card, effect)
+    scale = np.concatenate([spread, np.full(2 * len(trials), typical)])
+    anywhere = np.full(2 * len(trials), np.inf)
+    low = np.concatenate([[one.lowest(card) for one in shared], -anywhere])
+    high = np.concatenate([[one.maximum for one in shared], anywhere])
+
+    def parameters(at: Array) -> Array:
+        return model.parameter_values(dict(zip(keys, map(float, at[: len(names)]), strict=True)))
+
+    def parts(at: Array, place: int) -> Array:
+        return at[len(names) + 2 * place :][:2]
+
+    at = np.concatenate([centre, *(trial.parts(model.parameter_values()) for trial in trials)])
+    weights = np.ones(len(trials))
+
+    def residuals(at: Array) -> Array:
+        p = parameters(at)
+        away = [
+            w * trial.away(parts(at, place), p) for place, (trial, w) in enumerate(zip(trials, weights, strict=True))
+        ]
+        return np.concatenate([*away, (at[: len(names)] - centre) / spread])
+
+    def slopes(at: Array) -> Array:
+        p, begin = parameters(at), len(names)
+        blocks = np.zeros((sum(trial.count for trial in trials) + begin, len(at)))
+        row = 0
+        for place, (trial, weight) in enumerate(zip(trials, weights, strict=True)):
+            rows = slice(row, row + trial.count)
+            now, own = trial.away(parts(at, place), p), slice(begin + 2 * place, begin + 2 * place + 2)
+            blocks[rows, own] = weight * trial.slopes(parts(at, place), p)
+            for column in range(begin):
+                moved = at.copy()
+                moved[column] += _STEP * spread[column]
+                change = trial.away(parts(at, place), parameters(moved)) - now
+                blocks[rows, column] = weight * change / (_STEP * spread[column])
+            row += trial.count
+        blocks[row:, :begin] = np.diag(1 / spread)
+        return blocks
+
     for _ in range(_TURNS):
-        solved = least_squares(residuals, at, slopes, x_scale=typical)
-        moved, at = float(np.max(np.abs(solved.x - at) / typical)), solved.x
-        state = replayer.fit_initial_state(record_with(at), sigma, p)
+        p = parameters(at)
+        weights = np.array([trial.weight(parts(at, place), p) for place, trial in enumerate(trials)])
+        solved = least_squares(residuals, at, slopes, bounds=(low, high), x_scale=scale, ftol=_CONVERGED)
+        moved, at = float(np.max(np.abs(solved.x - at) / scale)), solved.x
+        for place, trial in enumerate(trials):
+            trial.begin(parts(at, place), parameters(at))
         if moved < _SETTLED:
             break
-    size = max(float(np.mean(residuals(at) ** 2)), 1.0)
+    errors = np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac)))
+    p = parameters(at)
+    gone = [value if one.absent is None else one.absent for one, value in zip(shared, centre, strict=True)]
+    absent = parameters(np.array(gone))
+    return CommonSurroundings(
+        effect,
+        dict(zip(names, map(float, at), strict=False)),
+        dict(zip(names, map(float, errors), strict=False)),
+        {
+            trial.name: Surroundings.of_parts(parts(at, place), parts(errors, place))
+            for place, trial in enumerate(trials)
+        },
+        np.array([trial.predicted(parts(at, place), p, absent) for place, trial in enumerate(trials)]),
+    )
+
+
+class _Trial:
+    """One trial, replayed in winds and currents: parts (2 m,) along north and east, m/s, of m effects."""
+
+    def __init__(
+        self,
+        card: ManoeuvringCard,
+        driven_by: str,
+        trial: Trial,
+        effects: Sequence[str],
+        noise: Mapping[str, float],
+    ):
+        self.name, self._trial, self._effects = trial.name, trial, effects
+        self.replayer = Replayer(card, driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
+        self._sigma = np.array([noise[name] for name in self.replayer.seen])
+        self.typical = np.repeat([_typical_speed(card, name) for name in effects], 2)
+        still = self._record(np.zeros(len(self.typical)))
+        self._known = ~np.isnan(still.readings)
+        self._passage = card.ship.length_m / card.model.speed_mps / (still.step_s * still.every)
+        self._state = self.replayer.guess_initial_state(still, self._sigma, self.replayer.model.parameter_values())
+        self.compare(1.0)
+
+    def compare(self, begin: float, end: float | None = None) -> None:
+        """Compare readings up to a share `begin` of the record, or from there to `end`."""
+        share = np.arange(len(self._known)) / len(self._known)
+        inside = share < begin if end is None else (share >= begin) & (share < end)
+        inside[0] |= not inside.any()
+        self._compared = self._known & inside[:, None]
+        self.count = int(self._compared.sum())
+
+    def surroundings(self, parts: Array) -> dict[str, Surroundings]:
+        """Each effect's wind or current."""
+        pairs = zip(self._effects, np.reshape(parts, (-1, 2)), strict=True)
+        return {name: Surroundings.of_parts(pair, np.zeros(2)) for name, pair in pairs}
+
+    def _record(self, parts: Array) -> InputRecord:
+        found = {name: {self.name: at} for name, at in self.surroundings(parts).items()}
+        return input_record(self.replayer, _with(self._trial, found))
+
+    def away(self, parts: Array, p: Array) -> Array:
+        """Simulated less measured (count,), noise units."""
+        record = self._record(parts)
+        away = ((self.replayer.motion(record, self._state, p) - record.readings) / self._sigma)[self._compared]
+        bounded: Array = np.nan_to_num(away, nan=_FAR)
+        return bounded
+
+    def slopes(self, parts: Array, p: Array) -> Array:
+        """Derivatives (count, 2 m) of :meth:`away` in the parts."""
+        return difference_slopes(lambda moved: self.away(moved, p), parts, self.away(parts, p), _STEP * self.typical)
+
+    def begin(self, parts: Array, p: Array) -> None:
+        """Find the initial state again, in these surroundings."""
+        self._state = self.replayer.fit_initial_state(self._record(parts), self._sigma, p)
+
+    def parts(self, p: Array) -> Array:
+        """The parts that fit the compared readings best, from a search over directions and speeds: first over the
+        beginning of the record."""
+        self.compare(_FIRST_PART)
+        angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+        ring = [
+            share * np.tile([np.cos(angle), np.sin(angle)], len(self._effects)) * self.typical
+            for angle in angles
+            for share in _SHARES
+        ]
+        at = min([np.zeros(len(self.typical)), *ring], key=lambda parts: float(np.sum(self._pulled(parts, p) ** 2)))
+        nearest: Array = self.nearest(at, p).x
+        self.compare(1.0)
+        return nearest
+
+    def nearest(self, at: Array, p: Array) -> OptimizeResult:
+        """Least squares from `at`, the parts normal beforehand about zero."""
+
+        def slopes(parts: Array) -> Array:
+            return np.concatenate([self.slopes(parts, p), np.diag(1 / self.typical)])
+
+        return least_squares(lambda parts: self._pulled(parts, p), at, slopes, x_scale=self.typical)
+
+    def _pulled(self, parts: Array, p: Array) -> Array:
+        return np.concatenate([self.away(parts, p), parts / self.typical])
+
+    def weight(self, parts: Array, p: Array) -> float:
+        """Weight of a reading: the errors of its trial are of one size, and independent once in a passage of L/u0."""
+        size = max(float(np.sqrt(np.mean(self.away(parts, p) ** 2))), 1.0)
+        independent = max(len(self._known) / self._passage, 1.0)
+        return math.sqrt(min(independent / self.count, 1.0)) / size
+
+    def predicted(self, parts: Array, p: Array, absent: Array) -> float:
+        """Root mean square of :meth:`away` over the second half of the record with the surroundings of the first half,
+        over that in none, where the model has the parameters `absent`."""
+        self.compare(0.5)
+        first = self.nearest(parts, p).x
+        self.compare(0.5, 1.0)
+        left = float(np.sum(self.away(first, p) ** 2))
+        none, kept = np.zeros(len(self.typical)), self._state
+        self.begin(none, absent)
+        without = float(np.sum(self.away(none, absent) ** 2))
+        self._state = kept
+        self.compare(1.0)
+        return math.sqrt(left / without) if without > 0 else 1.0
+
+
+def _of_trial(
+    card: ManoeuvringCard, driven_by: str, given: Trial, effects: Sequence[str], noise: Mapping[str, float]
+) -> dict[str, Surroundings]:
+    trial = _Trial(card, driven_by, given, effects, noise)
+    p = trial.replayer.model.parameter_values()
+    at = trial.parts(p)
+    for _ in range(_TURNS):
+        solved = trial.nearest(at, p)
+        moved, at = float(np.max(np.abs(solved.x - at) / trial.typical)), solved.x
+        trial.begin(at, p)
+        if moved < _SETTLED:
+            break
+    size = max(float(np.mean(np.append(trial.away(at, p), at / trial.typical) ** 2)), 1.0)
     errors = np.sqrt(np.diag(np.linalg.inv(solved.jac.T @ solved.jac)) * size)
     pairs = zip(effects, at.reshape(-1, 2), errors.reshape(-1, 2), strict=True)
     return {name: Surroundings.of_parts(part, error) for name, part, error in pairs}
