@@ -65,6 +65,8 @@ KNOWN = ("05_01", "10_10_P", "20_10_S", "35_05")
 UNKNOWN = ("10_05", "10_10_S", "25_05")
 """Zigzags of HSVA, halved so that each half has small and large angles."""
 
+KINDS = ("estimated", "identified", "bundled")
+
 RIVALS = 3
 """Explanations of which the loss is told."""
 
@@ -73,7 +75,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ship", nargs="+", choices=("esso", "kvlcc2-captive"), default=("esso", "kvlcc2-captive"))
     parser.add_argument("--days", nargs="+", choices=DAYS, default=DAYS, help="of the Esso Osaka")
-    parser.add_argument("--card", nargs="+", choices=("estimated", "identified"), default=("estimated", "identified"))
+    parser.add_argument("--card", nargs="+", choices=KINDS, default=KINDS[:2])
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     args = parser.parse_args()
     warnings.filterwarnings("ignore", category=RuntimeWarning)  # a motion that runs away is counted as such
@@ -99,9 +101,19 @@ def _esso_osaka(args: argparse.Namespace) -> None:
         print(f"\nEsso Osaka, {day}: {len(own)} runs, {', '.join(f'{_length(one):.0f} s' for one in own)}")
         print(f"   wind as measured: {_mean_wind(own)}")
         for kind in args.card:
-            windy = card if kind == "estimated" else _identified(card, replace(everything, trials=tuple(others)), HELD)
+            windy = _card_of(kind, card, replace(everything, trials=tuple(others)))
             print(f"  card as {kind}")
             _without_wind(windy, replace(everything, trials=tuple(own), notices=()), args.workers)
+
+
+def _card_of(kind: str, estimated: ManoeuvringCard, others: Measured) -> ManoeuvringCard:
+    """A card with wind: as estimated, as identified from the trials of other days, or the bundled one, which was
+    identified with the measured wind from the trials of all days."""
+    if kind == "identified":
+        return _identified(estimated, others, HELD)
+    bundled = read_card("esso-osaka")
+    assert isinstance(bundled, ManoeuvringCard)
+    return estimated if kind == "estimated" else bundled
 
 
 def _longest_part(trial: Trial, slowest: float) -> Trial:

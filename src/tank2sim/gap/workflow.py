@@ -94,7 +94,7 @@ CLEARLY = 0.7
 PREDICTS = 0.5
 """Share of the misfit of the second half of a trial that a wind or current fitted to its first half may leave, as the
 median over the trials, where it is named by simulation alone (project choice): two numbers to a trial imitate much
-that is no wind, without predicting what comes."""
+else, without predicting what comes."""
 
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
