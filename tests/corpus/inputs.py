@@ -60,7 +60,6 @@ def simman(rows: int = 200) -> bytes:
     return (text + "\n".join("".join(f"{cell:20.9f}" for cell in row) for row in table) + "\n").encode()
 
 
-@functools.cache
 def craft_trial() -> bytes:
     """A trial of the Otter: revolutions of both thrusters, position and heading."""
     rows = ["t_s,x_m,y_m,psi_deg,n_port_rpm,n_starboard_rpm"]
@@ -72,6 +71,7 @@ def craft_trial() -> bytes:
     return ("\n".join(rows) + "\n").encode()
 
 
+@functools.cache
 def plain() -> Files:
     """Inputs that nothing has to compute."""
     oscillating = np.sin(np.linspace(0, 40, 400))

@@ -4,8 +4,8 @@
  *     fuzz SEED CALLS
  *
  * After each call: one that was refused (Error, Discard) has left the state as it was and logged one line, or none
- * where its category is not logged; numbers that came with OK are finite. The first breach ends the program with the
- * seed and the number of the call, which repeat it.
+ * where its category is not logged, next to warnings of what it calculates; numbers that came with OK are finite. The
+ * first breach ends the program with the seed and the number of the call, which repeat it.
  */
 #include "fuzz.h"
 
@@ -17,7 +17,7 @@
 #include <string.h>
 
 static uint64_t random_state, seed;
-static long call_number, lines, refusals, done[UPDATING + 1];
+static long call_number, lines, warnings, refusals, done[UPDATING + 1];
 static void *taken[64];
 static size_t taken_count;
 bool inputs_set_inside;
@@ -114,11 +114,13 @@ void release_arrays(void) {
 
 void line_logged(const char *category, const char *message) {
     must(category && *category && message && *message && !strchr(message, '\n'), message, "is not a line of a log");
-    ++lines;
+    if (category && strcmp(category, "logStatusWarning") == 0) ++warnings;
+    else ++lines;
 }
 
 Trial begun(Instance *instance, const char *function) {
     Trial trial = {.instance = instance, .function = function, .lines = lines};
+    warnings = 0;
     if (!instance) return trial;
     trial.mode = instance->mode;
     trial.logged = instance->logged;
@@ -148,6 +150,7 @@ void ended(const Trial *trial, int status) {
     const long logged = lines - trial->lines;
     lines = trial->lines;
     must(status >= OK && status <= ERROR, trial->function, "no such status");
+    must(warnings <= VALIDITY_FACTOR_COUNT + INPUTS_END - INPUTS_BEGIN + 1, trial->function, "a warning twice");
     if (!trial->instance) {
         must(status == ERROR && logged == 0, trial->function, "took a missing instance");
     } else if (status == ERROR || status == DISCARD) {
