@@ -67,6 +67,9 @@ UNKNOWN = ("10_05", "10_10_S", "25_05")
 
 KINDS = ("estimated", "identified", "bundled")
 
+NAMED = "what was named"
+"""Row of a table."""
+
 RIVALS = 3
 """Explanations of which the loss is told."""
 
@@ -185,7 +188,12 @@ def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None
         **_named(gap, fitted),
         "the wind fitted alone": (calm, found),
     }
-    rows = {words: _passed(gap, *model, blind) for words, model in models.items()}
+    own_winds = {effect.name: effect.by_trial for effect in gap.effects if effect.by_trial}
+    for effect, by_trial in own_winds.items():
+        each = [_polar(one.speed_mps * np.exp(1j * one.direction_rad)) for one in by_trial.values()]
+        print(f"   {effect} as named, of each run: {', '.join(each)}")
+    in_winds = with_surroundings(blind, own_winds)
+    rows = {words: _passed(gap, *model, in_winds if words == NAMED else blind) for words, model in models.items()}
     rows["the measured wind"] = _passed(gap, windy, [], whole)
     last = whole.trials[-1].name
     _table(calm, rows, {"fitted": lambda name: name != last, "held out": lambda name: name == last})
@@ -272,7 +280,7 @@ def _in_short(name: str, values: Mapping[str, float], errors: Mapping[str, float
 def _named(gap: Gap, fitted: Measured) -> dict[str, tuple[ManoeuvringCard, list[Found]]]:
     """What was named, or, where a name was withheld, what fits best all the same."""
     if gap.effects:
-        return {"what was named": (gap.card, [(one.name, one.parameters, one.standard_errors) for one in gap.effects])}
+        return {NAMED: (gap.card, [(one.name, one.parameters, one.standard_errors) for one in gap.effects])}
     names = gap.rivals[0].effects
     if not names:
         return {}
