@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -15,21 +14,11 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
+from tests.dynamics.accelerations import accelerations
 
 OTTER = read_card("otter")
 TEXT = OTTER.text
 RPM = math.tau / 60
-
-
-def accelerations(model: Model, motion: dict[str, float], inputs: dict[str, float]) -> np.ndarray:
-    """udot, vdot, rdot at a state; propellers turn as ordered unless `motion` says otherwise."""
-    names = ("motion.udot", "motion.vdot", "motion.rdot")
-    function = ca.Function("f", [model.x, model.u, model.p], [model.expand(ca.vcat([model.symbol(n) for n in names]))])
-    p = model.parameter_values()
-    x = np.array(model.initial(p)).ravel()
-    for name, value in motion.items():
-        x[model.state_names.index(name)] = value
-    return np.array(function(x, model.input_values(inputs), p)).ravel()
 
 
 def changed(*pairs: tuple[str, str]) -> Model:

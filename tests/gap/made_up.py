@@ -99,7 +99,9 @@ def missing() -> Gap:
             "current.speed": {"turn35": (0.44, 0.03), "zigzag": (0.47, 0.4), "turn20": (0.46, 0.03)},
             "current.direction": {"turn35": (np.deg2rad(268), 0.03), "zigzag": (np.deg2rad(-89), 0.03)},
         },
-        next_test=NextTest("turn:35", "t_s,delta_order_deg,n_rpm\n0,35,84\n", "A turn tells most.", {"turn:35": 40.0}),
+        next_test=NextTest(
+            "turn:35", "t_s,delta_order_deg,n_rpm\n0,35,84\n", 0.0, "A turn tells most.", {"turn:35": 40.0}
+        ),
         notices=("zigzag: y_m stood still for 1 s",),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.outcome.surroundings import fit_common_surroundings, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import MISSING, Gap, Surroundings
-from tank2sim.gap.workflow import GapOptions, run_gap_workflow
+from tank2sim.gap.workflow import GapOptions, _probabilities_by_simulation, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.trials import window, with_signals
 
@@ -139,6 +140,22 @@ def test_a_wind_of_the_first_half_predicts_nothing_where_there_is_none(tmp_path:
     assert np.median(fit_common_surroundings(with_wind, fitted, "wind", NOISE).predicted) > 0.9
 
 
+def test_probabilities_by_simulation_are_those_of_the_misfits_and_of_the_numbers_they_took(windy: tuple) -> None:
+    _, card, fitted, _ = windy
+
+    def proof(misfit: float) -> SimpleNamespace:
+        replay = SimpleNamespace(held_out=False, misfit=lambda version: misfit)
+        return SimpleNamespace(results=[replay] * len(fitted.trials))
+
+    passages = sum(trial.time_s[-1] - trial.time_s[0] for trial in fitted.trials) * 7.7175 / 160.93
+    same = _probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(10.0)})
+    # Two numbers to each of three trials, half of their logarithm each, over TEMPER = 3.
+    assert np.log(same[()] / same["wind",]) == pytest.approx(6 * np.log(passages) / 2 / 3, rel=1e-3)
+    closer = _probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(2.0)})
+    gained = np.log(closer["wind",] / closer[()]) + np.log(same[()] / same["wind",])
+    assert gained == pytest.approx(passages * np.log(5.0) / 3, rel=1e-3)
+
+
 @pytest.mark.slow
 def test_the_wind_of_a_pond_is_named_by_simulation(data) -> None:
     bundled = read_card("esso-osaka")
@@ -160,7 +177,7 @@ def test_the_wind_of_a_pond_is_named_by_simulation(data) -> None:
     assert [effect.name for effect in gap.effects] == ["wind"]
     north_east = np.mean([at.speed_mps * np.exp(1j * at.direction_rad) for at in gap.effects[0].by_trial.values()])
     assert abs((np.rad2deg(np.angle(north_east)) - 287 + 180) % 360 - 180) < 25  # measured: 1.8 m/s from 287 deg
-    assert 1.0 < abs(north_east) < 2.8
+    assert 1.0 < abs(north_east) < 2.8 and gap.effects[0].confidence > 0.9
     before, after = (gap.misfit(version, held_out=True) for version in ("before", "after"))
     assert before is not None and after is not None and after < 0.4 * before
 

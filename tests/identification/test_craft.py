@@ -118,7 +118,7 @@ def test_what_straight_runs_do_not_show_is_said_and_a_manoeuvre_that_would_is_na
     [
         (("n_port_rpm", "rpm_links"), "lacks n_port_rpm"),
         (("psi_deg", "heading"), "lacks psi_deg"),
-        (("t_s", "time"), "lacks t_s"),
+        (("t_s", "time"), "no column t_s"),
     ],
 )
 def test_a_trial_that_lacks_a_column_is_refused_by_its_name(craft, tmp_path, change, problem) -> None:

@@ -521,6 +521,11 @@ class ThrusterSection(CardSection):
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
     @property
+    def largest_thrust_N(self) -> float:
+        """Thrust at rest at the largest revolutions ahead, N."""
+        return self.ahead_Ns2 * self.max_radps**2
+
+    @property
     def lowest_radps(self) -> float:
         """Largest revolutions astern, rad/s, negative."""
         return -(self.max_radps if self.max_astern_radps is None else self.max_astern_radps)

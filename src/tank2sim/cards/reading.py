@@ -41,7 +41,7 @@ from tank2sim.cards.form import (
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
 from tank2sim.cards.scaling import FileScales, file_factor
-from tank2sim.cards.small_craft import craft_card, craft_scale, craft_scales
+from tank2sim.cards.small_craft import body_scales, craft_card, craft_scale, craft_scales
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
@@ -204,9 +204,8 @@ def craft_in_scaling(card: CraftCard, scaling: str) -> CraftCard:
     if to_prime == was_prime:
         return card
     scales, body = craft_scales(card), card.rigid_body
-    own = {"mass": float(scales.mass), "yaw_inertia": float(scales.inertia), "x_G": float(scales.length)}
     changes: dict[str, object] = {"model.scaling": scaling}
-    for key, unit in own.items():
+    for key, unit in body_scales(scales).items():
         changes[f"rigid_body.{key}"] = getattr(body, key) / (unit if to_prime else 1.0)
     for section, values in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
         for name, value in values.items():

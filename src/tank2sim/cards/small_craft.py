@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from tank2sim.cards.card import CraftCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
+from tank2sim.units import from_si
 
 if TYPE_CHECKING:
     from tank2sim.cards.form import CraftForm
@@ -38,6 +39,11 @@ class CraftTerm(NamedTuple):
     force: str
     factor: str
     size: str
+
+    @property
+    def lengths(self) -> int:
+        """Lengths that it has more than a term of a force by linear velocities: an arm, and one for each yaw rate."""
+        return (self.force == "N") + (self.factor == "r") + (self.size == "r")
 
 
 def _terms() -> tuple[CraftTerm, ...]:
@@ -78,16 +84,11 @@ def craft_scale(name: str, scales: Scales) -> float:
     >>> craft_scale("Xuabsu", Scales(1000.0, 2.0, 3.0))  # 1/2 rho L^2
     2000.0
     """
-    length = float(scales.length)
-    arm = length if name[0] == "N" else 1.0
+    length, speed = float(scales.length), float(scales.speed)
     if name in CRAFT_ADDED_MASSES:
-        return float(scales.mass) * arm * (length if name[1] == "r" else 1.0)
+        return float(scales.mass) * length ** ((name[0] == "N") + (name[1] == "r"))
     term = next(term for term in VELOCITY_TERMS if term.name == name)
-    velocities = [letter for letter in (term.factor, term.size) if letter]
-    scale = float(scales.force) * arm
-    for letter in velocities:
-        scale /= float(scales.speed) * (1.0 / length if letter == "r" else 1.0)
-    return scale
+    return float(scales.force) * length**term.lengths / speed ** (2 if term.size else 1)
 
 
 def craft_scales(card: CraftCard) -> Scales:
@@ -95,25 +96,9 @@ def craft_scales(card: CraftCard) -> Scales:
     return Scales(card.environment.water_density_kgpm3, card.ship.length_m, card.model.speed_mps)
 
 
-def craft_prime(card: CraftCard) -> dict[str, float]:
-    """The hull of a craft in the prime system: ``mass``, ``yaw_inertia``, ``x_G`` and each of its derivatives.
-
-    Exact, with V the cruising speed: the same numbers on a card with ``scaling = "prime"`` are the same craft.
-
-    Examples
-    --------
-    >>> from tank2sim.cards import read_card
-    >>> otter = read_card("otter")
-    >>> round(craft_prime(otter)["mass"], 5)  # 80 kg/(1/2 rho L^3)
-    0.01951
-    """
-    scales, body = craft_scales(card), card.rigid_body
-    return {
-        "mass": body.mass / float(scales.mass),
-        "yaw_inertia": body.yaw_inertia / float(scales.inertia),
-        "x_G": body.x_G / float(scales.length),
-        **{name: value / craft_scale(name, scales) for name, value in card.derivatives.items()},
-    }
+def body_scales(scales: Scales) -> dict[str, float]:
+    """SI values of ``mass``, ``yaw_inertia`` and ``x_G`` that are 1 in the prime system."""
+    return {"mass": float(scales.mass), "yaw_inertia": float(scales.inertia), "x_G": float(scales.length)}
 
 
 def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]) -> CraftCard:
@@ -149,13 +134,8 @@ def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]
         return value * craft_scale(name, scales) if prime else value
 
     if prime:
-        body = body.model_copy(
-            update={
-                "mass": body.mass * scales.mass,
-                "yaw_inertia": body.yaw_inertia * scales.inertia,
-                "x_G": body.x_G * length,
-            }
-        )
+        units = body_scales(scales)
+        body = body.model_copy(update={key: getattr(body, key) * unit for key, unit in units.items()})
     if body.mass > 2.0 * scales.mass:
         problem, remedy = f"is {body.mass:g} kg on {length:g} m", "it is in kg, and in the prime system about 0.01"
         raise InputError(source, "rigid_body.mass", problem, remedy)
@@ -225,7 +205,7 @@ def cruising_revolutions(card: CraftCard) -> float:
     InputError
         No thruster pushes ahead, or the speed is beyond the largest revolutions.
     """
-    ahead = [thruster for thruster in card.thrusters if math.cos(thruster.azimuth_rad) > 1e-6]
+    ahead = [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
     speed = card.model.speed_mps
     if not ahead:
         raise card.fault("thrusters.0.azimuth_rad", "leaves no thruster that pushes ahead", "give one within 90 deg")
@@ -235,7 +215,8 @@ def cruising_revolutions(card: CraftCard) -> float:
     n = (loss + math.sqrt(loss**2 + 4 * thrust * resistance)) / (2 * thrust)
     least = min(thruster.max_radps for thruster in ahead)
     if n > least * (1 + 1e-9):
-        problem = f"needs {n * 60 / math.tau:.4g} rpm, and the thrusters reach {least * 60 / math.tau:.4g} rpm"
+        needed, reached = (from_si("n_rpm", value) for value in (n, least))
+        problem = f"needs {needed:.4g} rpm, and the thrusters reach {reached:.4g} rpm"
         raise card.fault("model.speed_mps", problem, "give a speed that they hold, or check thrust and resistance")
     return n
 

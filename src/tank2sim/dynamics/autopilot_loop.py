@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tank2sim.dynamics.model import Input, Model, Quantity, Variable
+from tank2sim.dynamics.model import Input, Model, Quantity, Variable, same_symbol
 
 YAW_DISTURBANCE = "waves.yaw_acceleration"
 """Input of :func:`with_yaw_disturbance`, rad/s2."""
@@ -45,9 +45,7 @@ def _joint(receiver: Input, sender: Variable) -> Quantity:
         description=f"What is received of: {receiver.description}",
         value=sender.symbol,
     )
-    # The equations of the receiver hold the symbol of its input: cached_property keeps it in __dict__.
-    joint.__dict__["symbol"] = receiver.symbol
-    return joint
+    return same_symbol(receiver, joint)
 
 
 def with_yaw_disturbance(ship: Model) -> Model:

@@ -324,25 +324,32 @@ def inside_range(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
     return 1 - beyond * beyond * (3 - 2 * beyond)
 
 
+def speed_and_drift(s: Mapping[str, ca.SX], speed: ca.SX, nominal: float) -> tuple[Quantity, Quantity]:
+    """``motion.speed`` (m/s) and ``motion.beta`` (rad), with `speed` by :func:`.regular_speed`, typically `nominal`."""
+    return (
+        Quantity(
+            name="motion.speed",
+            unit="m/s",
+            description="Speed U through the water",
+            display_unit="knots",
+            nominal=nominal,
+            value=speed,
+        ),
+        Quantity(
+            name="motion.beta",
+            unit="rad",
+            description="Drift angle -asin(v/U), positive when the water comes from port",
+            display_unit="deg",
+            nominal=0.1,
+            # asin(v/U) without its division by zero at rest
+            value=-ca.atan2(s["motion.v"], ca.sqrt(s["motion.u"] ** 2 + (STILL_SPEED * s["ship.speed"]) ** 2)),
+        ),
+    )
+
+
 def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
-    u, v = hull["motion.u"], hull["motion.v"]
-    speed = Quantity(
-        name="motion.speed",
-        unit="m/s",
-        description="Speed U through the water",
-        display_unit="knots",
-        nominal=5.0,
-        value=hull.speed,
-    )
-    drift = Quantity(
-        name="motion.beta",
-        unit="rad",
-        description="Drift angle -asin(v/U), positive when the water comes from port",
-        display_unit="deg",
-        nominal=0.1,
-        # asin(v/U) without its division by zero at rest
-        value=-ca.atan2(v, ca.sqrt(u**2 + (STILL_SPEED * hull["ship.speed"]) ** 2)),
-    )
+    v = hull["motion.v"]
+    speed, drift = speed_and_drift(hull.symbols, hull.speed, 5.0)
     u0 = hull["ship.speed"]
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
     factors = tuple(

@@ -251,7 +251,7 @@ class Model:
     def with_values(self, changed: Mapping[str, float]) -> Model:
         """The model with parameters that start at the values of `changed` (by name) in place of their own."""
         parameters = (
-            _same_symbol(parameter, replace(parameter, start=changed[parameter.name]))
+            same_symbol(parameter, replace(parameter, start=changed[parameter.name]))
             if parameter.name in changed
             else parameter
             for parameter in self.parameters
@@ -265,7 +265,7 @@ class Model:
         if name not in {quantity.name for quantity in self.quantities}:
             raise ValueError(f"{name} is not a quantity of {self.name}")
         changed = tuple(
-            _same_symbol(quantity, replace(quantity, value=ca.SX(value(quantity.value))))
+            same_symbol(quantity, replace(quantity, value=ca.SX(value(quantity.value))))
             if quantity.name == name
             else quantity
             for quantity in self.quantities
@@ -299,10 +299,10 @@ class Model:
             return ca.substitute(ca.SX(expression), old, value)
 
         quantities = tuple(
-            _same_symbol(quantity, replace(quantity, value=changed(quantity.value))) for quantity in self.quantities
+            same_symbol(quantity, replace(quantity, value=changed(quantity.value))) for quantity in self.quantities
         )
         states = tuple(
-            _same_symbol(
+            same_symbol(
                 state,
                 replace(state, start=changed(state.start), trim=None if state.trim is None else changed(state.trim)),
             )
@@ -331,7 +331,7 @@ class Model:
         given = set(names)
         held = [variable for variable in self.inputs if variable.name in given]
         constants = tuple(
-            _same_symbol(
+            same_symbol(
                 variable,
                 Parameter(
                     name=variable.name,
@@ -449,7 +449,8 @@ def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mappi
     return np.array([changed.get(variable.name, variable.start) for variable in variables], dtype=float)
 
 
-def _same_symbol(old: Variable, new: Kind) -> Kind:
-    # cached_property stores in __dict__, so this keeps the symbol that other expressions already use.
+def same_symbol(old: Variable, new: Kind) -> Kind:
+    """The variable `new` with the symbol of `old`, which the equations of a model already use."""
+    # cached_property stores in __dict__
     new.__dict__["symbol"] = old.symbol
     return new

@@ -39,8 +39,10 @@ from tank2sim.dynamics.hull import (
     force_quantities,
     inertia_quantities,
     inside_range,
+    speed_and_drift,
 )
 from tank2sim.dynamics.kinematics import body_states, planar_kinematics
+from tank2sim.dynamics.low_speed import regular_speed
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
 from tank2sim.dynamics.rigid_body import (
     Inertia,
@@ -53,9 +55,6 @@ from tank2sim.dynamics.rigid_body import (
 _STEPS_PER_LENGTH = 200
 _STEPS_PER_LAG = 5
 """Integration steps while the craft covers its length, and in the shortest lag: as of a ship, project choices."""
-
-_STILL = 1e-7
-"""Speed over the cruising speed that counts as rest, so that the speed has a slope there (project choice)."""
 
 THRUSTER_PARAMETERS = {
     "x_m": "x",
@@ -141,7 +140,7 @@ def _refuse_mass(card: CraftCard) -> None:
 
 def _nominal_forces(card: CraftCard) -> tuple[float, float]:
     """Thrust (N) of all thrusters at their largest revolutions, and its moment (N m) at half the length."""
-    thrust = sum(thruster.ahead_Ns2 * thruster.max_radps**2 for thruster in card.thrusters)
+    thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     return thrust, thrust * card.ship.length_m / 2
 
 
@@ -190,8 +189,7 @@ def craft_unit(name: str) -> str:
     if name in _ADDED_UNITS:
         return _ADDED_UNITS[name]
     term = next(term for term in VELOCITY_TERMS if term.name == name)
-    lengths = (term.force == "N") + (term.factor == "r") + (term.size == "r")
-    return _DAMPING_UNITS[int(bool(term.size))][lengths]
+    return _DAMPING_UNITS[int(bool(term.size))][term.lengths]
 
 
 def _craft_derivatives(card: CraftCard) -> tuple[Parameter, ...]:
@@ -347,7 +345,7 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
         name=f"{prefix}.thrust",
         unit="N",
         description=f"Thrust of {where}, positive with revolutions ahead",
-        nominal=thruster.ahead_Ns2 * thruster.max_radps**2,
+        nominal=thruster.largest_thrust_N,
         value=thrust_of(speed[0].symbol, along, ahead.symbol, astern.symbol, loss.symbol),
     )
     return [*variables, thrust], thrust.symbol, azimuth
@@ -433,23 +431,8 @@ def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[V
 
 
 def _craft_speed(s: Mapping[str, ca.SX]) -> tuple[Quantity, ...]:
-    u, v, u0 = s["motion.u"], s["motion.v"], s["ship.speed"]
-    still = _STILL * u0
-    speed = Quantity(
-        name="motion.speed",
-        unit="m/s",
-        description="Speed U through the water",
-        display_unit="knots",
-        value=ca.sqrt(u**2 + v**2 + still**2),
-    )
-    drift = Quantity(
-        name="motion.beta",
-        unit="rad",
-        description="Drift angle -asin(v/U), positive when the water comes from port",
-        display_unit="deg",
-        nominal=0.1,
-        value=-ca.atan2(v, ca.sqrt(u**2 + still**2)),
-    )
+    u0 = s["ship.speed"]
+    speed, drift = speed_and_drift(s, regular_speed(s), 1.0)
     margin = VALIDITY_MARGIN * u0
     inside = inside_range(speed.symbol - s["ship.fastest"], margin) * inside_range(
         s["ship.slowest"] - speed.symbol, margin

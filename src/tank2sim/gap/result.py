@@ -282,6 +282,8 @@ class NextTest:
         As `simulate --manoeuvre` takes it, or ``file:next_test.csv``.
     orders : str
         CSV text ``t_s,delta_order_deg,n_rpm`` that `simulate --manoeuvre file:` runs.
+    heading_rad : float
+        Heading on which it begins, rad from north, which orders cannot state.
     why : str
         A sentence: the explanations that it would distinguish, and how clearly (expected gain of the score).
     expected : mapping
@@ -293,6 +295,7 @@ class NextTest:
 
     manoeuvre: str
     orders: str
+    heading_rad: float
     why: str
     expected: Mapping[str, float]
     sizes: Mapping[str, tuple[Mapping[str, float], Mapping[str, float]]] = field(default_factory=dict)

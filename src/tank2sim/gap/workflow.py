@@ -492,6 +492,15 @@ def _probabilities_by_simulation(
 
     Their errors are of an unknown size and independent once in a passage of L/u0; an explanation has two numbers to a
     trial, or none, which cost what Schwarz's criterion asks.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        For L/u0.
+    fitted : Measured
+        T trials.
+    proofs : mapping
+        Names of the winds and currents of an explanation to the replays with it, of the fitted trials first.
     """
     passage = card.ship.length_m / card.model.speed_mps
     readings = np.array([(trial.time_s[-1] - trial.time_s[0]) / passage for trial in fitted.trials])

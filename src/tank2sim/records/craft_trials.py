@@ -34,14 +34,9 @@ def read_craft_trial(path: Path, thrusters: Sequence[str]) -> Trial:
         Revolutions, positions or heading are missing, or the time does not rise.
     """
     table = read_table(Path(path)).si()
-    columns = table.columns
-    if "t_s" not in columns:
-        raise InputError(path, "header", "lacks t_s", "give the time in s")
-    time = columns["t_s"]
+    columns, time = table.columns, table.increasing("t_s")
     if len(time) < LEAST_CRAFT_ROWS:
         raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
-    if not np.all(np.diff(time) > 0):
-        raise InputError(path, "column t_s", "does not rise", "sort the rows, and give each time once")
     driven = [f"n_{name}_radps" for name in thrusters]
     for name in (*driven, "x_m", "y_m", "psi_rad"):
         if name not in columns or not np.isfinite(columns[name]).any():

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.simulation.running import Running
+from tank2sim.units import from_si
 
 SPIN_HEADING = 4 * math.pi
 """Heading change of a spin: two turns, the second of which is steady. Project choice."""
@@ -74,9 +75,9 @@ def _within(model: Model, orders: dict[str, float], words: str) -> dict[str, flo
         low, high = model[name].minimum, model[name].maximum
         assert low is not None and high is not None
         if not low * (1 + 1e-9) <= value <= high * (1 + 1e-9):
-            rpm = 60 / math.tau
-            problem = f"orders {value * rpm:.4g} rpm of {name.split('.')[1]}"
-            raise InputError(model.origin, words, problem, f"it turns at {low * rpm:.4g} to {high * rpm:.4g} rpm")
+            ordered, lowest, highest = (from_si("n_rpm", speed) for speed in (value, low, high))
+            problem = f"orders {ordered:.4g} rpm of {name.split('.')[1]}"
+            raise InputError(model.origin, words, problem, f"it turns at {lowest:.4g} to {highest:.4g} rpm")
     return orders
 
 
@@ -95,7 +96,7 @@ class StraightRun:
     @property
     def words(self) -> str:
         """The text form of a manoeuvre, in rpm."""
-        return f"straight:{self.revolutions * 60 / math.tau:.10g}"
+        return f"straight:{from_si('n_rpm', self.revolutions):.10g}"
 
     def start(self, model: Model) -> dict[str, float]:
         """Parameters of the start."""
@@ -120,7 +121,7 @@ class DifferenceTurn:
     @property
     def words(self) -> str:
         """The text form of a manoeuvre, in rpm."""
-        return f"difference:{self.difference * 60 / math.tau:.10g}"
+        return f"difference:{from_si('n_rpm', self.difference):.10g}"
 
     def start(self, model: Model) -> dict[str, float]:
         """Parameters of the start: those of the model, at the cruising speed."""
@@ -145,7 +146,7 @@ class Spin:
     @property
     def words(self) -> str:
         """The text form of a manoeuvre, in rpm."""
-        return f"spin:{self.revolutions * 60 / math.tau:.10g}"
+        return f"spin:{from_si('n_rpm', self.revolutions):.10g}"
 
     def start(self, model: Model) -> dict[str, float]:
         """Parameters of the start."""

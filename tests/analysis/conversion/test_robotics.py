@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 
-import casadi as ca
 import numpy as np
 import pytest
 
 import tank2sim as t2s
 from tank2sim.cards import CraftCard, parse_card
-from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tests.dynamics.accelerations import accelerations
 
 CROSS = (
     "Yrdot = -9.0\nNvdot = -9.0\nYvabsr = -40.0\nYr = -8.0\nNv = -14.0\nNrabsv = -60.0\nNrabsu = -30.0\n"
@@ -27,17 +26,6 @@ def craft() -> CraftCard:
     card = parse_card(text, "craft.toml")
     assert isinstance(card, CraftCard)
     return card
-
-
-def accelerations(model: Model, motion: dict[str, float], inputs: dict[str, float]) -> np.ndarray:
-    """udot, vdot, rdot at a state; propellers turn as ordered unless `motion` says otherwise."""
-    names = ("motion.udot", "motion.vdot", "motion.rdot")
-    function = ca.Function("f", [model.x, model.u, model.p], [model.expand(ca.vcat([model.symbol(n) for n in names]))])
-    p = model.parameter_values()
-    x = np.array(model.initial(p)).ravel()
-    for name, value in motion.items():
-        x[model.state_names.index(name)] = value
-    return np.array(function(x, model.input_values(inputs), p)).ravel()
 
 
 def elements(text: str) -> dict[str, float]:

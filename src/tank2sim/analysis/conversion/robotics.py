@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import combinations_with_replacement
 
 from tank2sim.analysis.conversion.polynomial_fit import FigureChange
 from tank2sim.cards.card import CraftCard
@@ -60,14 +61,16 @@ def coriolis_products(derivatives: Mapping[str, float]) -> dict[str, float]:
         ``Xudot Yvdot Yrdot Nvdot``, kg and kg m; absent means 0.
     """
     known = {name: derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
-    coupled = (known["Yrdot"] + known["Nvdot"]) / 2
-    products = {
-        "xVR": -known["Yvdot"],
-        "xRR": -coupled,
-        "yUR": known["Xudot"],
-        "nUV": known["Yvdot"] - known["Xudot"],
-        "nUR": coupled,
-    }
+    products: dict[str, float] = {}
+    for first, second in combinations_with_replacement("uvr", 2):
+        unit = {letter: float(letter in (first, second)) for letter in "uvr"}
+        # Quadratic in the velocities: what both together give beyond what each gives by itself.
+        forces = added_mass_forces(known, **unit)
+        if first != second:
+            alone = (added_mass_forces(known, **{**unit, letter: 0.0}) for letter in (first, second))
+            forces = tuple(force - sum(parts) for force, *parts in zip(forces, *alone, strict=True))
+        for letter, value in zip("xyn", forces, strict=True):
+            products[f"{letter}{first.upper()}{second.upper()}"] = value
     return {name: value for name, value in products.items() if value}
 
 
@@ -85,7 +88,7 @@ def gazebo_text(card: CraftCard) -> str:
         "</plugin>",
     ]
     for thruster in card.thrusters:
-        most = thruster.ahead_Ns2 * thruster.max_radps**2
+        most = thruster.largest_thrust_N
         least = -thruster.astern_Ns2 * thruster.lowest_radps**2
         coefficient = thruster.ahead_Ns2 / card.environment.water_density_kgpm3  # of T = rho C_T n^2 D^4, n in rad/s
         lines += [

@@ -263,23 +263,15 @@ class Effect:
 
     def tried(self, card: ManoeuvringCard) -> bool:
         """True if a search can begin: this ship's model can have it, and required parameters have typical values."""
-        if (
-            not self.sought
-            or self._taken(card)
-            or (self.in_mmg and card.model.kind == "mmg")
-            or (self.in_roll and card.roll)
-        ):
+        if not self.sought or (self.in_mmg and card.model.kind == "mmg") or (self.in_roll and card.roll):
             return False
         required = self.required()
         return all(parameter.typical_values(card) for parameter in self.parameters if parameter.name in required)
 
-    def _taken(self, card: ManoeuvringCard) -> bool:
-        """True if another effect of the card has one of its inputs (a current that changes, for a steady one)."""
-        from tank2sim.dynamics.effects import EFFECTS  # which holds this class
-
-        others = [EFFECTS.get(entry.name) for entry in card.effects if entry.name != self.name]
-        taken = {parameter.input_name for effect in others if effect for parameter in effect.parameters}
-        return any(parameter.input_name in taken for parameter in self.parameters if parameter.input_name)
+    @property
+    def input_names(self) -> frozenset[str]:
+        """Names of the inputs that it adds to a model."""
+        return frozenset(parameter.input_name for parameter in self.parameters if parameter.input_name)
 
     def changes_on(self, card: ManoeuvringCard) -> tuple[str, ...]:
         """Derivatives as in `changes`; none where they are the rudder's and the card has an MMG rudder instead."""

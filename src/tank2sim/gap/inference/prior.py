@@ -128,11 +128,14 @@ def belief(motion: MeasuredBatch, ship_time: float) -> Belief:
 def candidate_explanations(card: ManoeuvringCard, driven_by: str) -> tuple[str, ...]:
     """Effects that can be tried: those not on the card, with values to begin a search from.
 
+    Not one with an input that an effect of the card has already: a steady current, on a card with one that changes.
     Where the rudder's angle was measured, the record contains the response of the gear, and its effects are not tried.
     """
     have = {entry.name for entry in card.effects}
+    taken = frozenset[str]().union(*(EFFECTS[name].input_names for name in have))
     chosen = []
     for name, effect in EFFECTS.items():
-        if effect.tried(card) and name not in have and not (driven_by == "angle" and effect.inside_gear):
+        inside = driven_by == "angle" and effect.inside_gear
+        if effect.tried(card) and name not in have and not inside and not effect.input_names & taken:
             chosen.append(name)
     return tuple(chosen)

@@ -320,7 +320,8 @@ def _next_test(test: NextTest | None) -> dict[str, object] | None:
         name: {"parameters": _in_file(values, estimate_in_file), "standard_errors": _in_file(errors)}
         for name, (values, errors) in test.sizes.items()
     }
-    test_plan = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why}
+    heading = {"heading_deg": round(math.degrees(test.heading_rad), 6)}
+    test_plan = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, **heading, "why": test.why}
     return {**test_plan, "expected": expected, "candidates": sizes}
 
 

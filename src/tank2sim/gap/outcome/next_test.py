@@ -150,6 +150,7 @@ def next_test(
     return NextTest(
         manoeuvre=of[best].manoeuvre or "file:next_test.csv",
         orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
+        heading_rad=of[best].heading,
         why=why,
         expected={name: score for name, score in named if math.isfinite(score)},
         sizes=_sizes(explanations),

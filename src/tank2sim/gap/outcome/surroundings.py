@@ -167,7 +167,7 @@ def fit_common_surroundings(
         for place, (trial, weight) in enumerate(zip(trials, weights, strict=True)):
             rows = slice(row, row + trial.count)
             now, own = trial.away(parts(at, place), p), slice(begin + 2 * place, begin + 2 * place + 2)
-            blocks[rows, own] = weight * trial.slopes(parts(at, place), p)
+            blocks[rows, own] = weight * trial.slopes(parts(at, place), p, now)
             for column in range(begin):
                 moved = at.copy()
                 moved[column] += _STEP * spread[column]
@@ -213,11 +213,16 @@ class _Trial:
         effects: Sequence[str],
         noise: Mapping[str, float],
     ):
-        self.name, self._trial, self._effects = trial.name, trial, effects
+        self.name, self._effects = trial.name, effects
         self.replayer = Replayer(card, driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
         self._sigma = np.array([noise[name] for name in self.replayer.seen])
         self.typical = np.repeat([_typical_speed(card, name) for name in effects], 2)
-        still = self._record(np.zeros(len(self.typical)))
+        names = self.replayer.model.input_names
+        self._places = [
+            tuple(names.index(EFFECTS[name].model_names()[key]) for key in ("speed_mps", "direction_rad"))
+            for name in effects
+        ]
+        still = self._still = input_record(self.replayer, _with(trial, self._in_trial(np.zeros(len(self.typical)))))
         self._known = ~np.isnan(still.readings)
         self._passage = card.ship.length_m / card.model.speed_mps / (still.step_s * still.every)
         self._state = self.replayer.guess_initial_state(still, self._sigma, self.replayer.model.parameter_values())
@@ -236,9 +241,14 @@ class _Trial:
         pairs = zip(self._effects, np.reshape(parts, (-1, 2)), strict=True)
         return {name: Surroundings.of_parts(pair, np.zeros(2)) for name, pair in pairs}
 
+    def _in_trial(self, parts: Array) -> ByTrial:
+        return {name: {self.name: at} for name, at in self.surroundings(parts).items()}
+
     def _record(self, parts: Array) -> InputRecord:
-        found = {name: {self.name: at} for name, at in self.surroundings(parts).items()}
-        return input_record(self.replayer, _with(self._trial, found))
+        inputs = self._still.inputs.copy()
+        for places, pair in zip(self._places, np.reshape(parts, (-1, 2)), strict=True):
+            inputs[:, places] = np.hypot(*pair), np.arctan2(pair[1], pair[0])
+        return replace(self._still, inputs=inputs)
 
     def away(self, parts: Array, p: Array) -> Array:
         """Simulated less measured (count,), noise units."""
@@ -247,9 +257,9 @@ class _Trial:
         bounded: Array = np.nan_to_num(away, nan=_FAR)
         return bounded
 
-    def slopes(self, parts: Array, p: Array) -> Array:
-        """Derivatives (count, 2 m) of :meth:`away` in the parts."""
-        return difference_slopes(lambda moved: self.away(moved, p), parts, self.away(parts, p), _STEP * self.typical)
+    def slopes(self, parts: Array, p: Array, now: Array) -> Array:
+        """Derivatives (count, 2 m) of ``away(parts, p) = now`` in the parts."""
+        return difference_slopes(lambda moved: self.away(moved, p), parts, now, _STEP * self.typical)
 
     def begin(self, parts: Array, p: Array) -> None:
         """Find the initial state again, in these surroundings."""
@@ -274,7 +284,7 @@ class _Trial:
         """Least squares from `at`, the parts normal beforehand about zero."""
 
         def slopes(parts: Array) -> Array:
-            return np.concatenate([self.slopes(parts, p), np.diag(1 / self.typical)])
+            return np.concatenate([self.slopes(parts, p, self.away(parts, p)), np.diag(1 / self.typical)])
 
         return least_squares(lambda parts: self._pulled(parts, p), at, slopes, x_scale=self.typical)
 

@@ -235,7 +235,7 @@ class Replayer:
         """The record with the instants of the steps at `rows`, the initial state, and their misfit.
 
         By least squares on the beginning of the record, then on twice as many steps, and so on: a small error at an
-        early step of an unstable ship is a large one later, where the motion is no longer nearly linear in it.
+        early step of an unstable ship is a large one later, where the motion is not nearly linear in it.
         """
         middle = record.middle
         guess, spread = _first_state(self, record, sigma, p)

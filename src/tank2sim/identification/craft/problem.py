@@ -21,7 +21,7 @@ from tank2sim.cards.card import CraftCard
 from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
-from tank2sim.dynamics.model import Model, Parameter, Quantity, State
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.records.trials import Trial
@@ -88,7 +88,7 @@ def craft_fit_model(card: CraftCard) -> Model:
         for key in keys:
             first = f"thrusters.{card.thrusters[0].name}.{key}"
             model = model.substitute(f"thrusters.{name}.{key}", model.symbol(first))
-    thrust = sum(thruster.ahead_Ns2 * thruster.max_radps**2 for thruster in card.thrusters)
+    thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     described = (
         ("current.north", "m/s", "m/s2", CURRENT_SPREAD, "Velocity of the water to north"),
         ("current.east", "m/s", "m/s2", CURRENT_SPREAD, "Velocity of the water to east"),
@@ -150,7 +150,7 @@ def craft_prior(card: CraftCard, model: Model) -> dict[str, tuple[float, float]]
     drag = 0.5 * card.environment.water_density_kgpm3 * length * draught
     for term in VELOCITY_TERMS:
         value = known.get(term.name, 0.0)
-        arms = (term.force == "N") + (term.factor == "r") + (term.size == "r")
+        arms = term.lengths
         usual = drag * (length / 2) ** arms / (1 + arms) * (1.0 if term.size else speed / 2)
         spread = max(DAMPING_SPREAD * abs(value), CROSS_FLOW_SPREAD * usual)
         found[f"derivatives.{term.name}"] = value, card.uncertainty.get(term.name, spread)
@@ -211,9 +211,7 @@ def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem
         if state.name not in known:
             return state
         mean, spread = known[state.name]
-        changed = replace(state, start=mean, nominal=spread)
-        changed.__dict__["symbol"] = state.symbol  # the equations hold this one
-        return changed
+        return same_symbol(state, replace(state, start=mean, nominal=spread))
 
     return replace(problem, model=replace(problem.model, states=tuple(map(with_prior, problem.model.states))))
 
@@ -224,8 +222,6 @@ def _unbounded(model: Model) -> Model:
     def without_bound(parameter: Parameter) -> Parameter:
         if not parameter.name.endswith(".speed_loss"):
             return parameter
-        unbounded = replace(parameter, minimum=None)
-        unbounded.__dict__["symbol"] = parameter.symbol  # the equations hold this one
-        return unbounded
+        return same_symbol(parameter, replace(parameter, minimum=None))
 
     return replace(model, parameters=tuple(map(without_bound, model.parameters)))

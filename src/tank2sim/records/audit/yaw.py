@@ -120,7 +120,7 @@ class _Comparison:
 
 
 def _hidden_by_rounding(trial: Trial, rate: Array, heading: Array, step: float) -> bool:
-    """True if what r and dpsi/dt differ by in wide windows is no more than the rounding of the heading may leave.
+    """True if what r and dpsi/dt differ by in wide windows is at most what the rounding of the heading may leave.
 
     An error that is uniform within half a unit, and one value in each half of a window, leaves sqrt(2/12) unit times
     the largest value of the window, 4/(3/2 width), in the rate: the slower the ship, the nearer it comes to that.

@@ -20,7 +20,7 @@ from scipy import sparse
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.build import KEPT_MODELS
-from tank2sim.dynamics.model import Input, Model
+from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, MeasuredMotion, measured_motion
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
@@ -158,8 +158,7 @@ def _hidden_model(model: Model) -> Model:
     known = []
     for state in (model[name] for name in MEASURED_STATES):
         copy = Input(name=state.name, unit=state.unit, description=state.description, display_unit=state.display_unit)
-        copy.__dict__["symbol"] = state.symbol  # quantities refer to it
-        known.append(copy)
+        known.append(same_symbol(state, copy))
     hidden = tuple(state for state in model.states if state.name not in MEASURED_STATES)
     return replace(model, states=hidden, inputs=(*model.inputs, *known), outputs=())
 

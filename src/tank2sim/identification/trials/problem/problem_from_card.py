@@ -22,7 +22,7 @@ from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, stu
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
-from tank2sim.dynamics.model import Model, Quantity
+from tank2sim.dynamics.model import Model, Quantity, same_symbol
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
@@ -137,8 +137,7 @@ def driven_by_angle(model: Model) -> Model:
         if quantity.name in removed:
             continue
         copy = replace(quantity, value=ca.substitute(quantity.value, angle, order))
-        copy.__dict__["symbol"] = quantity.symbol  # quantities refer to it
-        quantities.append(copy)
+        quantities.append(same_symbol(quantity, copy))
     return replace(
         model,
         states=tuple(state for state in model.states if state.name != "rudder.angle"),
