@@ -100,7 +100,12 @@ def missing() -> Gap:
             "current.direction": {"turn35": (np.deg2rad(268), 0.03), "zigzag": (np.deg2rad(-89), 0.03)},
         },
         next_test=NextTest(
-            "turn:35", "t_s,delta_order_deg,n_rpm\n0,35,84\n", 0.0, "A turn tells most.", {"turn:35": 40.0}
+            manoeuvre="turn:35",
+            orders="t_s,delta_order_deg,n_rpm\n0,35,84\n",
+            heading_rad=0.0,
+            needs_instants=False,
+            why="A turn tells most.",
+            expected={"turn:35": 40.0},
         ),
         notices=("zigzag: y_m stood still for 1 s",),
     )

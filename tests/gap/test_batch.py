@@ -208,6 +208,7 @@ def test_a_rounded_motion_is_moved_to_the_exact_one_between_the_blocks() -> None
         np.zeros((2, BLOCKS, 6)),
         sizes,
         np.zeros(2),
+        np.zeros(2, dtype=bool),
     )
     away = (true - rounded)[:, FINE // 2 :: FINE]
     halfway = 0.5 * (rounded[:, 1:] + rounded[:, :-1])

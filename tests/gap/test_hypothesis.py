@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
 from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
-from tank2sim.gap.inference.prior import candidate_explanations
+from tank2sim.gap.inference.prior import candidate_explanations, with_executes
 from tests.identification.trials import made_up_ship
 from tests.identification.trials.made_up_ship import SPEED, TRUTH, accelerations
 
@@ -69,7 +69,18 @@ def simulated(rudder, given, current=(0.0, 0.0)) -> MeasuredBatch:
     measured = np.zeros((2, BLOCKS, 6))
     lengths = np.full(2, BLOCKS)
     return MeasuredBatch(
-        ("a", "b"), SEEN, STEP, FINE, np.zeros(2), lengths, np.array(solved), inputs, measured, np.ones(6), np.zeros(2)
+        names=("a", "b"),
+        seen=SEEN,
+        step_s=STEP,
+        fine=FINE,
+        begin_s=np.zeros(2),
+        lengths=lengths,
+        states=np.array(solved),
+        inputs=inputs,
+        measured=measured,
+        noise=np.ones(6),
+        unsure_s=np.zeros(2),
+        at_execute=np.zeros(2, dtype=bool),
     )
 
 
@@ -408,3 +419,17 @@ def test_effects_of_the_card_are_not_asked_for_again(card) -> None:
     text = made_up_ship.CARD + '\n[[effects]]\nname = "rudder_bias"\nparameters = { angle_deg = 1.0 }\n'
     without = candidate_explanations(parse_card(text, "made_up.toml"), "order")
     assert set(candidate_explanations(card, "order")) - set(without) == {"rudder_bias"}
+
+
+@pytest.mark.parametrize(
+    ("rudder", "expected"),
+    [(lambda t: 0.3 + 0.0 * np.asarray(t), False), (lambda t: 0.3 - 0.3 * np.exp(-np.asarray(t) / LAG), True)],
+    ids=["settled", "leaves amidships"],
+)
+def test_a_run_that_begins_at_the_execute_is_told_from_one_with_a_settled_rudder(card, rudder, expected) -> None:
+    explained = Hypothesis(card, "order")
+    motion = with_executes(explained, simulated(rudder, lambda t: np.full((len(t)), 0.3)))
+    assert motion.at_execute.tolist() == [expected, expected]
+    angle = explained.unmeasured_states(motion, NOTHING)[:, :, explained.unmeasured.index("rudder.angle")]
+    times = STEP * np.arange(angle.shape[1])
+    np.testing.assert_allclose(angle, [rudder(times)] * 2, atol=1e-3)

@@ -125,12 +125,13 @@ def test_the_orders_run_and_a_zigzag_in_them_is_one(mariner_card: ManoeuvringCar
     assert result.returncode == 0, result.stderr
     rudder, heading = (float(text) for text in found.manoeuvre.removeprefix("zigzag:").split("/"))
     orders = read_orders(tmp_path / "next_test.csv")
-    assert set(np.round(np.abs(np.degrees(orders.inputs["rudder.command"])), 6)) == {rudder}
+    ordered = np.round(np.degrees(orders.inputs["rudder.command"]), 6)
+    assert ordered[0] == 0 and set(np.abs(ordered[1:])) == {rudder}
     # By the explanation that steered, the rudder goes over when the heading has changed by the angle.
     late = explanation(mariner_card, "rudder_lag", time_constant_s=3.0).card
     run = simulate(build(late), orders).trajectory
-    over = orders.times[1:-1]
-    turned = np.degrees(np.interp(over, run.t, run["motion.psi"])) * -np.sign(orders.inputs["rudder.command"][1:-1])
+    over = orders.times[2:-1]
+    turned = np.degrees(np.interp(over, run.t, run["motion.psi"])) * -np.sign(ordered[2:-1])
     np.testing.assert_allclose(turned, heading, atol=0.6)
 
 
@@ -178,3 +179,12 @@ def test_the_straight_run_on_two_headings_turns_after_a_third_of_its_length(mari
     helmsman = found.helmsman()
     assert [np.degrees(helmsman(time, 0.0, 0.0)) for time in (0.0, 9.9, 10.1, 29.0)] == pytest.approx([0, 0, 20, 20])
     assert helmsman(20.0, np.pi / 2, 0.0) == pytest.approx(0.0)
+
+
+def test_a_lag_behind_another_needs_the_instants_of_the_orders(mariner_card: ManoeuvringCard) -> None:
+    """They differ by a delay of the gear's own time constant, which orders read seldom hide."""
+    lags = [explanation(mariner_card, name, time_constant_s=6.0) for name in ("rudder_lag", "telemotor_lag")]
+    known, unknown = (next_test(lags, NOISE, duration_s=250.0, unsure_s=unsure_s) for unsure_s in (0.0, 20.0))
+    assert known is not None and unknown is not None
+    assert not known.needs_instants and unknown.needs_instants
+    assert unknown.expected == pytest.approx(known.expected)

@@ -160,4 +160,5 @@ def toy_trials(theta=(), coefficients=(), *, seed=1, blocks=(24, 17), fine=5, st
         measured=measured,
         noise=WHITE,
         unsure_s=np.zeros(2),
+        at_execute=np.zeros(2, dtype=bool),
     ), np.array(truths)

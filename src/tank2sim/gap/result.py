@@ -284,10 +284,14 @@ class NextTest:
         CSV text ``t_s,delta_order_deg,n_rpm`` that `simulate --manoeuvre file:` runs.
     heading_rad : float
         Heading on which it begins, rad from north, which orders cannot state.
+    needs_instants : bool
+        True where it would decide with the instants of the orders known, and not as the order was recorded: the order
+        is to be recorded ten times as often, or the rudder's angle.
     why : str
         A sentence: the explanations that it would distinguish, and how clearly (expected gain of the score).
     expected : mapping
-        Each manoeuvre that was compared to the score by which it would distinguish the explanations.
+        Each manoeuvre that was compared to the score by which it would distinguish the explanations, for known instants
+        of the orders where it needs them.
     sizes : mapping
         Each effect of the explanations that are to be distinguished to (parameters, standard errors), SI, as the first
         explanation that has it estimates it.
@@ -296,6 +300,7 @@ class NextTest:
     manoeuvre: str
     orders: str
     heading_rad: float
+    needs_instants: bool
     why: str
     expected: Mapping[str, float]
     sizes: Mapping[str, tuple[Mapping[str, float], Mapping[str, float]]] = field(default_factory=dict)

@@ -674,7 +674,7 @@ def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mappi
     if decision.verdict != AMBIGUOUS:
         return None
     rivals = [_explanation(card, found, fit) for fit in (decision.best, *decision.alike)]
-    return next_test(rivals, noise)
+    return next_test(rivals, noise, unsure_s=float(found.likelihood.motion.unsure_s.max()))
 
 
 def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> Explanation:

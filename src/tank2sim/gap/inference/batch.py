@@ -79,6 +79,8 @@ class MeasuredBatch:
     unsure_s : array (R,)
         Time from one reading of the rudder's order to the next, s: within it the order changed, at an unknown instant.
         0 where the rudder's angle was measured.
+    at_execute : array (R,)
+        True for a run that begins at its execute: its rudder was amidships until the first reading.
     recorded : mapping
         Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
         `inputs` does not hold; directions without jumps of a full turn.
@@ -95,6 +97,7 @@ class MeasuredBatch:
     measured: Array
     noise: Array
     unsure_s: Array
+    at_execute: _Truths
     recorded: Mapping[str, Array] = field(default_factory=dict)
 
     @property
@@ -249,6 +252,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         inputs=np.array(inputs),
         measured=np.array(measured),
         unsure_s=np.array([0.0 if "delta_rad" in trial.signals else sampling_step(trial) for trial in trials]),
+        at_execute=np.zeros(len(runs), dtype=bool),
         recorded=_recorded(trials, runs, size, model.input_names),
         noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
     )

@@ -301,7 +301,10 @@ class Hypothesis:
         x = motion.states
         tracks = []
         for run in range(len(x)):
-            start = self._steady_states(x[run, 0], inputs[run, 0], p)
+            first = inputs[run, 0].copy()
+            if motion.at_execute[run]:
+                first[self.model.input_names.index("rudder.command")] = 0.0
+            start = self._steady_states(x[run, 0], first, p)
             tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
         unmeasured = np.array(tracks)
         delays = {"rudder.command": 0.0} | self._delays(theta)

@@ -12,7 +12,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
-from tank2sim.gap.inference.batch import MeasuredBatch, batch_trials
+from tank2sim.gap.inference.batch import BLOCKS_PER_SHIP_TIME, MEASURED_STATES, MeasuredBatch, batch_trials
 from tank2sim.gap.inference.fit import Belief, NuisanceParameters
 from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES, NoiseLevels
@@ -63,7 +63,7 @@ def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihoo
     """
     none = Hypothesis(card, measured.driven_by)
     ship_time = card.ship.length_m / card.model.speed_mps
-    motion = batch_trials(none.model, measured.trials, ship_time)
+    motion = with_executes(none, batch_trials(none.model, measured.trials, ship_time))
     free = free_parameters(card, inertia=True)
     known = {name: error for name, (_, error) in free.items() if name in none.model.parameter_names}
     count = len(known)
@@ -107,6 +107,24 @@ def _gear_errors(card: ManoeuvringCard, model: Model) -> dict[str, float]:
     stated = card.steering_gear is not None and card.steering_gear.time_constant_s is not None
     shares = {"steering.max_rate": GEAR, "steering.time_constant": GEAR if stated else ASSUMED_GEAR}
     return {name: share * float(start[name]) for name, share in shares.items() if start.get(name)}
+
+
+def with_executes(none: Hypothesis, motion: MeasuredBatch) -> MeasuredBatch:
+    """The trials with those marked that begin at the execute: their first changes of yaw rate are nearer to those of a
+    rudder that leaves amidships than of one that has settled at the first order."""
+    if "rudder.angle" not in none.unmeasured:
+        return motion
+    yaw = MEASURED_STATES.index("motion.r")
+    first = BLOCKS_PER_SHIP_TIME  # one L/u0
+    measured = np.diff(motion.middles[:, : first + 1, yaw], axis=1) / motion.block_s
+
+    def misfit(at_execute: bool) -> NDArray[np.float64]:
+        marked = replace(motion, at_execute=np.full(len(motion.names), at_execute))
+        rates = none.fine_rates(marked, np.zeros(0))[:, :first, yaw]
+        found: NDArray[np.float64] = np.sum((measured - rates[:, : measured.shape[1]]) ** 2, axis=1)
+        return found
+
+    return replace(motion, at_execute=misfit(True) < misfit(False))
 
 
 def belief(motion: MeasuredBatch, ship_time: float) -> Belief:

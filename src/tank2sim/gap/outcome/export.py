@@ -320,9 +320,15 @@ def _next_test(test: NextTest | None) -> dict[str, object] | None:
         name: {"parameters": _in_file(values, estimate_in_file), "standard_errors": _in_file(errors)}
         for name, (values, errors) in test.sizes.items()
     }
-    heading = {"heading_deg": round(math.degrees(test.heading_rad), 6)}
-    test_plan = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, **heading, "why": test.why}
-    return {**test_plan, "expected": expected, "candidates": sizes}
+    return {
+        "manoeuvre": test.manoeuvre,
+        "orders": NEXT_TEST_FILE,
+        "heading_deg": round(math.degrees(test.heading_rad), 6),
+        "needs_instants": test.needs_instants,
+        "why": test.why,
+        "expected": expected,
+        "candidates": sizes,
+    }
 
 
 def _time(value: float) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND
 from tank2sim.dynamics.mmg.equivalent import linear_equivalent
 from tank2sim.dynamics.model import Input, Parameter
+from tank2sim.gap.inference.prior import CLOCK_SHARE
 from tank2sim.gap.outcome.next_test_candidates import (
     REVOLUTIONS,
     RUDDER,
     Candidate,
+    after_approach,
     candidate_manoeuvres,
     on_heading,
     orders_csv,
@@ -58,6 +60,9 @@ choice)."""
 TO_FEEL = 0.1
 """Differences by a parameter are taken over this share of its standard deviation."""
 
+_LATE = "late"
+"""Among changes of variables: the rudder's orders act a step later."""
+
 _ROUNDED = 1
 """Decimals of an order in degrees: as fine as a helmsman can give it."""
 
@@ -92,14 +97,20 @@ class WindowPrediction:
     ----------
     readings : array (c, w, m)
     slopes : array (c, w, m, k)
-        By the unknowns of the explanation, each column per standard deviation.
+        By the unknowns of the explanation, each column per standard deviation; the last is the clock of the orders,
+        where that is unknown.
     passing : array (c, w, m, j)
-        By the unknowns of the window: its first state, and disturbances.
+        By the unknowns of the window: the instants of its orders, where these are unknown; its first state, and
+        disturbances.
     """
 
     readings: Array
     slopes: Array
     passing: Array
+
+    def with_known_instants(self) -> WindowPrediction:
+        """The same without the clock of the orders and their instants, which are among the unknowns here."""
+        return replace(self, slopes=self.slopes[..., :-1], passing=self.passing[..., 1:])
 
 
 def next_test(
@@ -107,6 +118,7 @@ def next_test(
     noise: Mapping[str, float],
     duration_s: float | None = None,
     correlation_s: float = 0.0,
+    unsure_s: float = 0.0,
 ) -> NextTest | None:
     """The manoeuvre by which the first explanation is distinguished best from all the others.
 
@@ -127,6 +139,9 @@ def next_test(
         Of the test; by default :data:`LENGTH` L/u0.
     correlation_s : float
         Time constant of the readings' errors: one independent reading every 2 of it (or :data:`READ_S`, if longer).
+    unsure_s : float
+        Time from one reading of the rudder's order to the next, s: an order acts at an unknown instant between them. 0
+        where its instants are known.
 
     Returns
     -------
@@ -134,30 +149,42 @@ def next_test(
     """
     if len(explanations) < 2:
         return None
-    ships = _ships(explanations, noise, correlation_s)
+    ships = _ships(explanations, noise, correlation_s, unsure_s)
     length = LENGTH if duration_s is None else duration_s / ships[0].ship_time
-    of = _with_headings(candidate_manoeuvres(explanations[0].card, length), explanations)
+    of = [after_approach(candidate) for candidate in candidate_manoeuvres(explanations[0].card, length)]
+    of = _with_headings(of, explanations)
     orders, motion = ships[0].sail(of, length)
-    first, *rivals = (ship.predict(of, orders, motion) for ship in ships)
-    each = np.stack([_expected_loss(first, rival) for rival in rivals])
+    predictions = [ship.predict(of, orders, motion) for ship in ships]
+    each = _from_rivals(predictions)
+    needs_instants = False
+    if unsure_s and not _decides(each):
+        known = _from_rivals([prediction.with_known_instants() for prediction in predictions])
+        needs_instants, each = _decides(known), known if _decides(known) else each
     if not np.isfinite(scores := each.min(axis=0)).any():
         return None
     best, least = _best_and_least(scores)
-    why = _why(
-        of[best], [explanation.name for explanation in explanations], each[:, best], (float(scores[least]), of[least])
-    )
+    names = [explanation.name for explanation in explanations]
+    why = _why(of[best], names, each[:, best], (float(scores[least]), of[least]))
+    if needs_instants:
+        why += (
+            f" This holds for known instants of the orders; read every {unsure_s:.2g} s, they decide in no manoeuvre: "
+            "record the order ten times as often, or the rudder's angle."
+        )
     named = zip((candidate.name for candidate in of), map(float, scores), strict=True)
     return NextTest(
         manoeuvre=of[best].manoeuvre or "file:next_test.csv",
         orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
         heading_rad=of[best].heading,
+        needs_instants=needs_instants,
         why=why,
         expected={name: score for name, score in named if math.isfinite(score)},
         sizes=_sizes(explanations),
     )
 
 
-def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[SailedShip]:
+def _ships(
+    explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float, unsure_s: float
+) -> list[SailedShip]:
     """The ship of each explanation, with the available sensors that all models have."""
     models = [driven_model(explanation.card, "order") for explanation in explanations]
     seen = {
@@ -165,7 +192,18 @@ def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], corr
         for name in OBSERVED_SIGNALS.values()
         if name in noise and all(name in model for model in models)
     }
-    return [SailedShip(explanation, seen, correlation_s) for explanation in explanations]
+    return [SailedShip(explanation, seen, correlation_s, unsure_s) for explanation in explanations]
+
+
+def _from_rivals(predictions: Sequence[WindowPrediction]) -> Array:
+    """Expected loss (rivals, c) between the first prediction and each of the others."""
+    first, *rivals = predictions
+    return np.stack([_expected_loss(first, rival) for rival in rivals])
+
+
+def _decides(each: Array) -> bool:
+    """True if a manoeuvre distinguishes the first explanation from every other (rivals, c)."""
+    return bool((each.min(axis=0) >= DECIDES).any())
 
 
 def _best_and_least(scores: Array) -> tuple[int, int]:
@@ -246,9 +284,13 @@ class SailedShip:
         Variable (``motion.*``) to the standard deviation of one reading, SI.
     correlation_s : float
         Time constant of the readings' errors.
+    unsure_s : float
+        Time from one reading of the rudder's order to the next, s; 0 where the instants of orders are known.
     """
 
-    def __init__(self, explanation: Explanation, seen: Mapping[str, float], correlation_s: float):
+    def __init__(
+        self, explanation: Explanation, seen: Mapping[str, float], correlation_s: float, unsure_s: float = 0.0
+    ):
         self.card, self.free = explanation.card, explanation.free
         self.model = driven_model(explanation.card, "order")
         self.names = self.model.parameter_names
@@ -263,6 +305,7 @@ class SailedShip:
         self.sigma *= math.sqrt(max(1.0, 2 * correlation_s / (self.every * self.step_s)))
         self._motion = [self.model.state_names.index(name) for name in MEASURED_BEFOREHAND]
         self.axes = _independent(explanation.covariance) if self.free else np.zeros((0, 0))
+        self.unsure_s = unsure_s
 
     def sail(self, of: Sequence[Candidate], length: float) -> tuple[dict[str, Array], Array]:
         """The helmsmen's orders by input (c, n) each, and the resulting motion (c, n, 6), as MEASURED_BEFOREHAND."""
@@ -307,7 +350,7 @@ class SailedShip:
             x = self._after(x, acting[:, row], p)
         seen = np.stack(readings, axis=1).reshape(rows, c, w, -1)
         slopes = np.moveaxis((seen[1:] - seen[0]) / shares[1:, None, None, None], 0, -1)
-        unknown = self.axes.shape[1]
+        unknown = self.axes.shape[1] + (self.unsure_s > 0)
         return WindowPrediction(seen[0], slopes[..., :unknown], slopes[..., unknown:])
 
     def information(self, of: Sequence[Candidate], length: float) -> tuple[dict[str, Array], Array]:
@@ -324,7 +367,7 @@ class SailedShip:
         """
         orders, motion = self.sail(of, length)
         found = self.predict(of, orders, motion)
-        information = np.full((len(of), self.axes.shape[1], self.axes.shape[1]), np.nan)
+        information = np.full((len(of), *2 * found.slopes.shape[-1:]), np.nan)
         known = np.isfinite(found.slopes).all(axis=(1, 2, 3))
         information[known] = _without_passing(found.passing[known], found.slopes[known])
         return orders, information
@@ -356,7 +399,8 @@ class SailedShip:
     def _variations(self) -> tuple[list[dict[str, float]], Array, Array]:
         """Changes of variables by name, shares of a standard deviation, changes of the first state (rows, nx).
 
-        First none, then the explanation's unknowns, then the window's: its first motion and disturbances.
+        First none, then the explanation's unknowns and the clock of the orders, then the window's: the instants of its
+        orders, its first motion and disturbances.
         """
         changes: list[dict[str, float]] = [{}]
         shares, first = [1.0], [np.zeros(len(self.model.states))]
@@ -365,6 +409,11 @@ class SailedShip:
             side = 1.0 if self._inside(change, 1.0) or not self._inside(change, -1.0) else -1.0
             changes.append({name: side * value for name, value in change.items()})
             shares.append(side * TO_FEEL)
+            first.append(first[0])
+        clock, one = CLOCK_SHARE * self.unsure_s, self.unsure_s / math.sqrt(12.0)  # of all orders, of a window's
+        for spread in (clock, one) if self.unsure_s else ():
+            changes.append({_LATE: self.step_s})
+            shares.append(self.step_s / spread)
             first.append(first[0])
         for place in self._motion:
             changes.append({})
@@ -384,6 +433,9 @@ class SailedShip:
         for name, value in change.items():
             if name in self.model.input_names:
                 acting[:, :, self.model.input_names.index(name)] += value
+        if _LATE in change:
+            place = self.model.input_names.index(RUDDER)
+            acting[:, :, place] = np.concatenate([acting[:, :1, place], acting[:, :-1, place]], axis=1)
         p = self.p + self._of_parameters(change)
         if not any(EFFECTS[entry.name].delays for entry in self.card.effects):
             return acting

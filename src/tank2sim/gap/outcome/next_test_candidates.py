@@ -22,6 +22,9 @@ SMALL_RUDDER = math.radians(5.0)
 SLOW = 0.6
 """Share of the nominal revolutions to which a slow-down goes: u falls to about this share, inside any card's range."""
 
+BEFORE_EXECUTE = 1.0
+"""Straight run before a manoeuvre whose record is to show the execute, L/u0 (project choice)."""
+
 Helmsman = Callable[[float, float, float], float]
 """``rudder = helmsman(time, heading, rate)``: in L/u0, rad from the first heading, and rad per L/u0; + to starboard."""
 
@@ -160,6 +163,18 @@ def _random_steps(largest: float, length: float) -> Callable[[], Helmsman]:
         return -math.copysign(rudder, heading) if abs(heading) > math.pi / 4 else rudder
 
     return lambda: helmsman
+
+
+def after_approach(candidate: Candidate) -> Candidate:
+    """The candidate after :data:`BEFORE_EXECUTE` with the rudder amidships, so that a record shows the execute."""
+
+    def new() -> Helmsman:
+        helmsman = candidate.helmsman()
+        return lambda time, heading, rate: (
+            helmsman(time - BEFORE_EXECUTE, heading, rate) if time >= BEFORE_EXECUTE else 0.0
+        )
+
+    return replace(candidate, helmsman=new)
 
 
 def on_heading(candidate: Candidate, heading: float) -> Candidate:
