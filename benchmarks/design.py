@@ -78,7 +78,8 @@ def _autopilot(card: ManoeuvringCard, model: Model, kind: str) -> None:
     if kind == "pid":
         filtered = study_autopilot(card, model, StudySettings(kind=kind, wave_filter_radps=WAVE_FILTER)).keeping
         print(f"    with a wave filter: {filtered.heading_error_rms_deg:.3g}, {filtered.rudder_rms_deg:.3g} deg rms")
-        agreement = verify_together(model, study.design, make_autopilot_fmu(study.design, fmi=3))
+        autopilot = study.design.autopilot
+        agreement = verify_together(model, autopilot, make_autopilot_fmu(autopilot, study.design.source, fmi=3))
         steps = ", ".join(f"{error:.3g} deg at {step:g} s" for step, error in sorted(agreement.error_deg.items()))
         print(f"    two FMUs against one model: {steps}; order {agreement.order:.2f}")
 

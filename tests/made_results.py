@@ -72,6 +72,7 @@ def _gap(found: Callable[[], Gap]) -> Result:
 RESULTS: dict[str, Callable[[Path], Result]] = {
     "audit": lambda folder: t2s.audit(_trials(folder)),
     "autopilot": lambda _: t2s.load("mariner").autopilot(),
+    "autopilot of a craft": lambda _: t2s.load("otter").autopilot(),
     "autopilot along a track": lambda _: t2s.load("mariner").autopilot(track=[[0, 0], [3000, 0], [6000, 1500]]),
     "check": _check,
     "compare": lambda _: t2s.compare(["mariner", "kvlcc2-captive"], members=2),
@@ -130,7 +131,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
 OWN_DOCUMENTS = ("pilotcard", "poster", "steer")
 """Commands whose result is a document of its own, which is no page of tables and charts."""
 
-SLOW = ("steer",)
+SLOW = ("steer", "stability with small probabilities")
 """Names whose result takes 10 s or more."""
 
 

@@ -38,7 +38,7 @@ def result(made: Callable[[str], Result]) -> Callable[[str], dict[str, object]]:
     return functools.cache(lambda name: json.loads(made(name).to_json()))
 
 
-@pytest.mark.parametrize("name", marked(RESULTS))
+@pytest.mark.parametrize("name", marked(RESULTS), scope="module")  # grouped by result: each is made once
 def test_results_follow_their_schemas_and_no_others(result, name) -> None:
     command, found = name.split()[0], result(name)
     jsonschema.validate(found, t2s.json_schema(command))
@@ -49,7 +49,7 @@ def test_results_follow_their_schemas_and_no_others(result, name) -> None:
     assert command in kind_of(without, "r.json").commands.split()
 
 
-@pytest.mark.parametrize("name", [name for name in RESULTS if name.split()[0] not in OWN_DOCUMENTS])
+@pytest.mark.parametrize("name", [name for name in RESULTS if name.split()[0] not in OWN_DOCUMENTS], scope="module")
 def test_the_command_and_report_give_the_same_page(made, name: str, tmp_path: Path) -> None:
     found = made(name)
     found.to_json(tmp_path / "result.json")

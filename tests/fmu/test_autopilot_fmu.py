@@ -26,7 +26,7 @@ def pair(
     request: pytest.FixtureRequest, design: HeadingDesign, mariner_fmu: Callable[[int], Path], tmp_path_factory
 ) -> tuple[Path, Path]:
     path = tmp_path_factory.mktemp("autopilot") / "autopilot.fmu"
-    path.write_bytes(make_autopilot_fmu(design, fmi=request.param).content)
+    path.write_bytes(make_autopilot_fmu(design.autopilot, design.source, fmi=request.param).content)
     return mariner_fmu(request.param), path
 
 
@@ -37,7 +37,7 @@ def test_the_fmu_of_a_controller_is_valid(pair: tuple[Path, Path]) -> None:
 def test_two_fmus_agree_with_one_model_in_proportion_to_their_step(
     mariner: Model, design: HeadingDesign, pair: tuple[Path, Path]
 ) -> None:
-    found = loop_difference(mariner, design, pair, math.radians(20.0), steps_s=(2.0, 0.4, 0.1))
+    found = loop_difference(mariner, design.autopilot, pair, math.radians(20.0), steps_s=(2.0, 0.4, 0.1))
     assert found.order == pytest.approx(1.0, abs=0.1)
     assert 0.005 < found.error_deg[0.1] < 0.02
     # In proportion: what a straight line through two of them leaves at a step of 0 is nothing.
@@ -47,7 +47,7 @@ def test_two_fmus_agree_with_one_model_in_proportion_to_their_step(
 
 def test_the_first_order_is_the_gain_times_the_error(design: HeadingDesign, pair: tuple[Path, Path]) -> None:
     run = co_simulate_heading(*pair, math.radians(10.0), step_s=1.0, duration_s=5.0)
-    assert run.order_rad[0] == pytest.approx(design.gains["Kp"] * math.radians(10.0))
+    assert run.orders["rudder.command"][0] == pytest.approx(design.gains["Kp"] * math.radians(10.0))
     assert np.all(np.diff(run.heading_rad) >= 0)
 
 

@@ -43,6 +43,22 @@ class AutopilotFmu:
         compared = {"co_simulation": self.difference.as_json()} if self.difference else {}
         return {**self.exported.as_json(), **compared}
 
+    @property
+    def text(self) -> str:
+        """Where it goes, its version of FMI, and its size."""
+        return f"{self.path}: FMI {self.exported.fmi}, {len(self.exported.content) / 1000:.0f} kB"
+
+    @property
+    def table(self) -> ResultTable | None:
+        """The differences of the co-simulation, if there was one."""
+        if self.difference is None:
+            return None
+        return ResultTable(
+            f"Ship and autopilot co-simulated, against one model: order {self.difference.order:.2f}",
+            ("communication step (s)", "largest difference of heading (deg)"),
+            [[step, error] for step, error in sorted(self.difference.error_deg.items())],
+        )
+
 
 class AutopilotResult(PagedResult):
     """A heading controller of a ship: gains, margins at several speeds, course changes, weather, tracks.
@@ -129,11 +145,11 @@ class AutopilotResult(PagedResult):
         """
         from tank2sim.fmu.autopilot import make_autopilot_fmu, verify_together  # takes most of a second to import
 
-        made = make_autopilot_fmu(self.study.design, fmi=fmi, report=report)
+        made = make_autopilot_fmu(self.study.design.autopilot, self.study.design.source, fmi=fmi, report=report)
         difference = None
         if verify:
             report("co-simulating ship and autopilot")
-            difference = verify_together(self.ship.model, self.study.design, made)
+            difference = verify_together(self.ship.model, self.study.design.autopilot, made)
         return AutopilotResult(self.ship, self.study, AutopilotFmu(Path(path), made, difference))
 
     def to_fmu(self, path: str | Path, *, fmi: int = 3, verify: bool = False) -> AutopilotResult:
@@ -177,8 +193,7 @@ class AutopilotResult(PagedResult):
             f"at full rate {kept.rate_limited_percent:.3g} % of the time",
         ]
         if self.fmu:
-            size = len(self.fmu.exported.content) / 1000
-            lines.append(f"{self.fmu.path}: FMI {self.fmu.exported.fmi}, {size:.0f} kB")
+            lines.append(self.fmu.text)
         return tuple(lines)
 
     @property
@@ -224,15 +239,8 @@ class AutopilotResult(PagedResult):
             columns = ("guidance", "length (m)", "time (s)", "finished", "largest (m)", "rms (m)", "on legs (m)")
             tracks = [[name, *vars(track.figures).values()] for name, track in study.tracks.items()]
             tables.append(ResultTable("Cross-track error", (*columns, "stays (m)"), tracks))
-        if self.fmu and self.fmu.difference:
-            difference = self.fmu.difference
-            tables.append(
-                ResultTable(
-                    f"Ship and autopilot co-simulated, against one model: order {difference.order:.2f}",
-                    ("communication step (s)", "largest difference of heading (deg)"),
-                    [[step, error] for step, error in sorted(difference.error_deg.items())],
-                )
-            )
+        if self.fmu and (compared := self.fmu.table):
+            tables.append(compared)
         return tuple(tables)
 
 
@@ -255,7 +263,10 @@ def pilot_ship(
     card = ship.card
     if not isinstance(card, ManoeuvringCard):
         raise InputError(
-            card.source, "model.kind", "has no rudder", "an autopilot needs a linear, abkowitz or mmg card"
+            card.source,
+            "model.kind",
+            "has no rudder",
+            "an autopilot needs a ship with a rudder, or a craft with thrusters",
         )
     check_settings(settings)
     try:

@@ -684,6 +684,32 @@ class AutopilotKeys(_Keys):
     export: NotRequired[dict[str, Any]]
 
 
+class StepFiguresKeys(_Part):
+    """The response to an order that steps; of a course in deg, of a speed in m/s."""
+
+    ordered: float
+    rise_time_s: float | None
+    overshoot: float
+    settling_time_s: float | None
+
+
+class CraftAutopilotKeys(_Keys):
+    """An autopilot of heading and speed for a craft with thrusters, and its runs."""
+
+    ship: str
+    speed_mps: float
+    source: str
+    gains: dict[str, float]
+    largest_moment_Nm: list[float]
+    poles: list[list[float]]
+    course_change: StepFiguresKeys
+    speed_change: StepFiguresKeys
+    at_limit_percent: dict[str, float]
+    histories: dict[str, Columns]
+    notices: list[str]
+    export: NotRequired[dict[str, Any]]
+
+
 class CompareKeys(_Keys):
     """Cards of one ship side by side."""
 
@@ -1105,7 +1131,7 @@ class GuessKeys(_Keys):
 
 KEYS: dict[str, Any] = {
     "audit": AuditKeys,
-    "autopilot": AutopilotKeys,
+    "autopilot": AutopilotKeys | CraftAutopilotKeys,
     "check": CheckKeys,
     "compare": CompareKeys,
     "convention": ConventionKeys,

@@ -12,7 +12,7 @@ import numpy as np
 
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
-from tank2sim.cards import Card, ManoeuvringCard, parse_card, read_card
+from tank2sim.cards import Card, CraftCard, ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.errors import InputError
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from tank2sim.api.autopilot import AutopilotResult
     from tank2sim.api.bridge import PilotCardResult, PosterResult
+    from tank2sim.api.craft_autopilot import CraftAutopilotResult
     from tank2sim.api.fmu import ExportResult
     from tank2sim.api.glide import GlideResult
     from tank2sim.api.influence import InfluenceResult, TuningResult
@@ -422,15 +423,15 @@ class Ship:
         wave_yaw_deg: float | None = None,
         seed: int | None = None,
         track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
-    ) -> AutopilotResult:
-        """Design a heading controller, judge its loop and try it.
+    ) -> AutopilotResult | CraftAutopilotResult:
+        """Design a heading controller, judge its loop and try it; of a craft with thrusters, one of heading and speed.
 
         Parameters
         ----------
         design : str
             ``pd``, ``pid``, ``lqr`` or ``robust``.
         speed_mps : float, optional
-            Of the design; by default the speed of the card.
+            Of the design; by default the speed of the card. A craft takes this and the change of course alone.
         heading_weight_deg, rudder_weight_deg : float
             Heading error and rudder that are equally bad for the LQR.
         wave_filter_radps : float, optional
@@ -448,8 +449,26 @@ class Ship:
         Raises
         ------
         InputError
-            The ship has no rudder, a value is out of bounds, or no controller holds the ship.
+            The ship has neither rudder nor fixed thrusters, a value is out of bounds, or no controller holds the ship.
         """
+        if isinstance(self.card, CraftCard):
+            from tank2sim.api.craft_autopilot import pilot_craft
+
+            given = {
+                "--design": design != "pid",
+                "--heading-weight": heading_weight_deg != 5.0,
+                "--rudder-weight": rudder_weight_deg != 5.0,
+                "--wave-filter": wave_filter_radps is not None,
+                "--current": current_mps is not None,
+                "--wind": wind_mps is not None,
+                "--wave-yaw": wave_yaw_deg is not None,
+                "--seed": seed is not None,
+                "--track": track is not None,
+            }
+            for option, there in given.items():
+                if there:
+                    raise InputError(option, "", "is not for a craft with thrusters", "leave it out")
+            return pilot_craft(self, speed_mps=speed_mps, course_change_deg=course_change_deg)
         from tank2sim.analysis.heading.designs import LqrWeights
         from tank2sim.analysis.heading.study import StudySettings
         from tank2sim.api.autopilot import pilot_ship

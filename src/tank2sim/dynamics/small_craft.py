@@ -267,6 +267,24 @@ def thrust_of(n: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, loss: ca.SX) 
     return (ahead + astern) / 2 * n * ca.fabs(n) + (ahead - astern) / 2 * n * n - loss * ca.fmax(n, 0) * along
 
 
+def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, loss: ca.SX) -> ca.SX:
+    """Revolutions n (rad/s, positive ahead) that give a thrust: the inverse of :func:`thrust_of`.
+
+    Ahead, k n^2 - l u_T n = T has one root that is not negative; a thrust of 0 is that of a propeller at rest only for
+    u_T = 0, and of one that turns with the water where the craft moves ahead.
+
+    Parameters
+    ----------
+    thrust : casadi.SX
+        T, N, positive ahead.
+    along, ahead, astern, loss : casadi.SX
+        As of :func:`thrust_of`.
+    """
+    lost = loss * ca.fmax(along, 0)
+    forward = (lost + ca.sqrt(lost**2 + 4 * ahead * ca.fmax(thrust, 0))) / (2 * ahead)
+    return ca.if_else(thrust >= 0, forward, -ca.sqrt(ca.fmax(-thrust, 0) / astern))
+
+
 def _thrusters(card: CraftCard, s: Mapping[str, ca.SX]) -> tuple[list[Variable], tuple[ca.SX, ca.SX, ca.SX]]:
     """Variables of all thrusters, and their X, Y (N) and N (N m)."""
     cruising = cruising_revolutions(card)

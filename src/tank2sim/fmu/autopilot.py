@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.analysis.heading.designs import HeadingDesign
 from tank2sim.analysis.heading.runs import HeadingLoop
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
@@ -24,33 +23,41 @@ from tank2sim.fmu.provenance import ValueOrigin
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import unpack
 
-_SEEN = ("motion.psi", "motion.r")
+_COMMANDED = "heading.command"
 
 
 @dataclass(frozen=True, eq=False)
 class SteeredRun:
-    """Two FMUs together, at their communication points (n,): s, and rad."""
+    """Two FMUs together, at their communication points (n,): s, rad, and each order (n,) by its name, SI."""
 
     time_s: Array
     heading_rad: Array
-    order_rad: Array
+    orders: Mapping[str, Array]
 
 
 def make_autopilot_fmu(
-    design: HeadingDesign,
+    autopilot: Model,
+    source: str,
     *,
     fmi: int = 2,
     platforms: Sequence[Platform] | None = None,
     report: ProgressReport = lambda _: None,
 ) -> ExportedFmu:
-    """The FMU of a controller, which says how it was found.
+    """The FMU of an autopilot, which says how it was found.
 
-    Inputs ``motion.psi``, ``motion.r`` (as the ship's FMU has them among its outputs) and ``heading.command``, output
-    ``rudder.command``. Parameters and errors are those of :func:`tank2sim.fmu.export.make_fmu`.
+    Its inputs (``motion.psi``, ``motion.r``, ``heading.command``, and of a craft ``motion.u`` and ``speed.command``)
+    and its orders are called as the signals of the ship's FMU. Other parameters and errors are those of
+    :func:`tank2sim.fmu.export.make_fmu`.
+
+    Parameters
+    ----------
+    autopilot : Model
+    source : str
+        How it was found, in a sentence.
     """
-    tuned = (parameter.name for parameter in design.autopilot.parameters if parameter.name.startswith("autopilot."))
-    documents = Documents(source=design.source, origins={name: ValueOrigin(design.source) for name in tuned})
-    return make_fmu(design.autopilot, fmi=fmi, documents=documents, platforms=platforms, report=report)
+    tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
+    documents = Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})
+    return make_fmu(autopilot, fmi=fmi, documents=documents, platforms=platforms, report=report)
 
 
 def co_simulate_heading(
@@ -58,14 +65,14 @@ def co_simulate_heading(
 ) -> SteeredRun:
     """Co-simulate a ship and an autopilot through FMPy: one change of the ordered heading at t = 0.
 
-    At each communication point the autopilot hears heading and yaw rate, and the ship its rudder order, which it holds
-    for the step; then both go on. The order is half a step old on average, so that the error falls in proportion to the
+    At each communication point the autopilot hears the motion of the ship, and the ship its orders, which it holds
+    for the step; then both go on. An order is half a step old on average, so that the error falls in proportion to the
     step. Both may be of FMI 2.0 or 3.0.
 
     Parameters
     ----------
     ship, autopilot : Path
-        FMUs.
+        FMUs. What the autopilot orders are its outputs called ``*.command``, what it hears its inputs ``motion.*``.
     step_s, duration_s : float
         Communication step, and length of the run, a whole number of steps.
 
@@ -76,36 +83,48 @@ def co_simulate_heading(
     """
     count = round(duration_s / step_s)
     time = np.asarray(step_s * np.arange(count + 1), dtype=np.float64)
-    heading, order = np.empty(count + 1), np.empty(count + 1)
+    heading = np.empty(count + 1)
     with ExitStack() as stack:
-        hull, pilot = (_opened(stack, path, names) for path, names in ((ship, _HULL), (autopilot, _PILOT)))
+        pilot, signals = _opened(stack, autopilot, ())
+        if _COMMANDED not in signals:
+            raise _lacking(autopilot, _COMMANDED)
+        seen = [name for name in signals if name.startswith("motion.")]
+        ordered = [name for name, causality in signals.items() if name.endswith(".command") and causality == "output"]
+        hull, _ = _opened(stack, ship, [*seen, *ordered])
         hull.initialise({})
-        pilot.initialise({"heading.command": heading_rad})
+        pilot.initialise({_COMMANDED: heading_rad})
+        orders = np.empty((count + 1, len(ordered)))
         for place, instant in enumerate(time):
-            seen = hull.read(_SEEN)
-            pilot.write(dict(zip(_SEEN, seen, strict=True)))
-            heading[place], order[place] = seen[0], pilot.read(["rudder.command"])[0]
+            heard = hull.read(seen)
+            pilot.write(dict(zip(seen, heard, strict=True)))
+            heading[place], orders[place] = heard[seen.index("motion.psi")], pilot.read(ordered)
             if place == count:
                 break
             pilot.instance.doStep(currentCommunicationPoint=instant, communicationStepSize=step_s)
-            hull.write({"rudder.command": order[place]})
+            hull.write(dict(zip(ordered, orders[place], strict=True)))
             hull.instance.doStep(currentCommunicationPoint=instant, communicationStepSize=step_s)
-    return SteeredRun(time, heading, order)
+    return SteeredRun(time, heading, dict(zip(ordered, orders.T, strict=True)))
 
 
-_HULL = (*_SEEN, "rudder.command")
-_PILOT = (*_SEEN, "rudder.command", "heading.command")
-
-
-def _opened(stack: ExitStack, path: Path, names: Sequence[str]) -> RunningFmu:
+def _opened(stack: ExitStack, path: Path, names: Sequence[str]) -> tuple[RunningFmu, dict[str, str]]:
+    """An FMU that runs, and its signals with their causality."""
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tank2sim-")))
     unpacked = unpack(path, folder)
-    known = {variable.name for variable in unpacked.description.modelVariables}
-    missing = [name for name in names if name not in known]
-    if missing or "CoSimulation" not in unpacked.kinds:
-        problem = f"has no {missing[0]}" if missing else "offers no Co-Simulation"
-        raise InputError(path, "", problem, "give the FMU of a ship, and that of an autopilot for it")
-    return stack.enter_context(running(unpacked, "CoSimulation"))
+    known = {variable.name: variable.causality for variable in unpacked.description.modelVariables}
+    for name in names:
+        if name not in known:
+            raise _lacking(path, name)
+    if "CoSimulation" not in unpacked.kinds:
+        raise InputError(path, "", "offers no Co-Simulation", _REMEDY)
+    signals = {name: causality for name, causality in known.items() if causality in ("input", "output")}
+    return stack.enter_context(running(unpacked, "CoSimulation")), signals
+
+
+_REMEDY = "give the FMU of a ship, and that of an autopilot for it"
+
+
+def _lacking(path: Path, name: str) -> InputError:
+    return InputError(path, "", f"has no {name}", _REMEDY)
 
 
 @dataclass(frozen=True)
@@ -128,13 +147,13 @@ class LoopDifference:
 
 
 def loop_difference(
-    ship: Model, design: HeadingDesign, fmus: tuple[Path, Path], heading_rad: float, *, steps_s: Sequence[float]
+    ship: Model, autopilot: Model, fmus: tuple[Path, Path], heading_rad: float, *, steps_s: Sequence[float]
 ) -> LoopDifference:
     """Hold the co-simulation of two FMUs against the closed loop simulated as one model.
 
     Parameters
     ----------
-    ship, design : Model, HeadingDesign
+    ship, autopilot : Model
         What the FMUs are of.
     fmus : (Path, Path)
         Of the ship and of the autopilot.
@@ -146,7 +165,7 @@ def loop_difference(
     values = {parameter.name: parameter.start for parameter in ship.parameters}
     longest = max(steps_s)
     duration = longest * round(20 * values["ship.length"] / values["ship.speed"] / longest)
-    direct = HeadingLoop(ship, design.autopilot).run({"heading.command": heading_rad}, duration)
+    direct = HeadingLoop(ship, autopilot).run({"heading.command": heading_rad}, duration)
     errors = {}
     for step in steps_s:
         run = co_simulate_heading(*fmus, heading_rad, step_s=step, duration_s=duration)
@@ -158,7 +177,7 @@ def _difference(run: SteeredRun, time: Array, heading: Array) -> float:
     return float(np.degrees(np.abs(run.heading_rad - np.interp(run.time_s, time, heading)).max()))
 
 
-def verify_together(ship: Model, design: HeadingDesign, made: ExportedFmu) -> LoopDifference:
+def verify_together(ship: Model, autopilot: Model, made: ExportedFmu) -> LoopDifference:
     """The agreement of an autopilot's FMU with a ship's of the same version of FMI, on a change of course by 20 deg.
 
     Communication steps are 2, 4, 10 and 20 steps of the ship's integration. Raises as :func:`loop_difference`.
@@ -168,4 +187,4 @@ def verify_together(ship: Model, design: HeadingDesign, made: ExportedFmu) -> Lo
         paths = Path(folder) / "ship.fmu", Path(folder) / "autopilot.fmu"
         paths[0].write_bytes(make_fmu(ship, fmi=made.fmi).content)
         paths[1].write_bytes(made.content)
-        return loop_difference(ship, design, paths, math.radians(20.0), steps_s=steps)
+        return loop_difference(ship, autopilot, paths, math.radians(20.0), steps_s=steps)

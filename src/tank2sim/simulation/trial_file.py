@@ -8,7 +8,6 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.records.thinning import drawn_columns
-from tank2sim.simulation.thruster_manoeuvres import thruster_commands
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
@@ -30,8 +29,8 @@ _COLUMNS = {
 def trial_columns(trajectory: Trajectory) -> dict[str, Array]:
     """Columns (n,) of a run by their names in the trial format, ``t_s`` first, for the signals of the model."""
     model, names = trajectory.model, dict(_COLUMNS)
-    for command in thruster_commands(model):
-        thruster = command.name.split(".")[1]
+    speeds = (name for name in model.outputs if name.startswith("thrusters.") and name.endswith(".speed"))
+    for thruster in (name.split(".")[1] for name in speeds):
         names[f"n_{thruster}_rpm"] = f"thrusters.{thruster}.speed"
         if f"thrusters.{thruster}.azimuth" in model:
             names[f"azimuth_{thruster}_deg"] = f"thrusters.{thruster}.azimuth"

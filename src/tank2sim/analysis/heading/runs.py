@@ -163,18 +163,50 @@ def without_anti_windup(autopilot: Model) -> dict[str, float]:
 
 def course_change(run: Trajectory, ordered_rad: float) -> CourseChange:
     """Figures of a run in which ``heading.command`` steps from the heading at the start by `ordered_rad` at t = 0."""
-    heading = (run["motion.psi"] - run["motion.psi"][0]) / ordered_rad
-    outside = np.flatnonzero(np.abs(heading - 1) > _SETTLED)
-    settled = len(outside) and outside[-1] + 1 < len(heading)
-    first = _reached(run.t, heading, 0.1)
-    last = _reached(run.t, heading, 0.9)
+    heading = step_figures(run.t, run["motion.psi"], ordered_rad)
     return CourseChange(
         ordered_deg=math.degrees(ordered_rad),
-        rise_time_s=None if first is None or last is None else last - first,
-        overshoot_deg=math.degrees(abs(ordered_rad) * max(0.0, float(heading.max()) - 1)),
-        settling_time_s=float(run.t[outside[-1] + 1]) if settled else None,
+        rise_time_s=heading.rise_time_s,
+        overshoot_deg=math.degrees(heading.overshoot),
+        settling_time_s=heading.settling_time_s,
         largest_rudder_deg=float(np.degrees(np.abs(run["rudder.angle"]).max())),
         rate_limited_s=float(_rate_limited(run).sum() * run.model.step_s),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepFigures:
+    """Figures of the response to an order that steps.
+
+    Parameters
+    ----------
+    ordered : float
+        Size of the step, in the unit of the signal.
+    rise_time_s : float or None
+        From 10 to 90 % of the step; None if not reached.
+    overshoot : float
+        Beyond the step, not negative, in the unit of the signal.
+    settling_time_s : float or None
+        Time after which it stays within :data:`_SETTLED` of the step; None if it does not.
+    """
+
+    ordered: float
+    rise_time_s: float | None
+    overshoot: float
+    settling_time_s: float | None
+
+
+def step_figures(time: Array, values: Array, ordered: float) -> StepFigures:
+    """Figures of a signal (n,) whose order steps by `ordered` from its first value at the first instant."""
+    share = (values - values[0]) / ordered
+    outside = np.flatnonzero(np.abs(share - 1) > _SETTLED)
+    settled = len(outside) and outside[-1] + 1 < len(share)
+    first, last = (_reached(time, share, level) for level in (0.1, 0.9))
+    return StepFigures(
+        ordered=ordered,
+        rise_time_s=None if first is None or last is None else last - first,
+        overshoot=abs(ordered) * max(0.0, float(share.max()) - 1),
+        settling_time_s=float(time[outside[-1] + 1]) if settled else None,
     )
 
 

@@ -196,10 +196,7 @@ def check_settings(settings: StudySettings) -> None:
     InputError
         One is.
     """
-    change = math.degrees(settings.course_change_rad)
-    if not 0 < abs(change) <= LARGEST_CHANGE_DEG * (1 + 1e-12):
-        remedy = f"give the angle to turn by, up to {LARGEST_CHANGE_DEG:g} deg either way"
-        raise InputError("--course-change", "", f"is {change:g}", remedy)
+    check_course_change(settings.course_change_rad)
     positive = {
         "--speed": settings.speed_mps,
         "--heading-weight": settings.weights.heading_rad,
@@ -210,6 +207,14 @@ def check_settings(settings: StudySettings) -> None:
     for option, value in (positive | {option: settings.weather.get(name) for option, name in weather.items()}).items():
         if value is not None and not (0 <= value < math.inf and (value or option in weather)):
             raise InputError(option, "", f"is {value:g}", "a positive number was expected")
+
+
+def check_course_change(change_rad: float) -> None:
+    """Refuse a change of course that is none, or further than :data:`LARGEST_CHANGE_DEG` either way."""
+    change = math.degrees(change_rad)
+    if not 0 < abs(change) <= LARGEST_CHANGE_DEG * (1 + 1e-12):
+        remedy = f"give the angle to turn by, up to {LARGEST_CHANGE_DEG:g} deg either way"
+        raise InputError("--course-change", "", f"is {change:g}", remedy)
 
 
 def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> AutopilotStudy:

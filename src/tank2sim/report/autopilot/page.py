@@ -37,7 +37,7 @@ def autopilot_page(found: Json) -> Page:
     if found["track"]:
         sections.append(_track(found))
     if exported := found.get("export"):
-        sections.append(_exported(exported))
+        sections.append(exported_section(exported))
     if found["notices"]:
         sections.append(PageSection(heading="Notes", notes=found["notices"]))
     return Page(
@@ -288,6 +288,7 @@ def _track(found: Json) -> PageSection:
     )
 
 
-def _exported(exported: Mapping[str, Json]) -> PageSection:
+def exported_section(exported: Mapping[str, Json]) -> PageSection:
+    """The section on the FMU of an autopilot."""
     values = {key: value for key, value in exported.items() if not isinstance(value, list | dict)}
     return PageSection(heading="FMU", tables=[quantities("The controller as an FMU", values)])

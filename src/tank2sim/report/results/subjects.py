@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from tank2sim.report.autopilot.craft_page import craft_autopilot_page
 from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.captive.mmg_page import mmg_reduction_page
 from tank2sim.report.captive.page import reduction_page
@@ -78,6 +79,10 @@ _PAGES: Mapping[str, _Page] = {
     ),
     "Heading control": _Page(
         autopilot_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}
+    ),
+    "Heading and speed control of a craft": _Page(
+        craft_autopilot_page,
+        {"course_change": dict, "speed_change": dict, "histories": dict, "poles": list, "notices": list},
     ),
     "Stability": _Page(
         stability_page,

@@ -1,0 +1,253 @@
+"""The autopilot of a craft with fixed thrusters: gains by pole placement, its closed loop, and what it does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+
+from tank2sim.analysis.heading.control import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
+from tank2sim.analysis.heading.runs import HeadingLoop, StepFigures, step_figures
+from tank2sim.analysis.linearisation import OperatingPoint, jacobians
+from tank2sim.arrays import Array
+from tank2sim.cards.card import CraftCard
+from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES
+from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
+from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.rigid_body import inertia
+from tank2sim.errors import InputError
+from tank2sim.simulation.trajectory import Trajectory
+
+HALF_MOMENT_AT_RAD = math.radians(30.0)
+"""Heading error for which half of the largest yaw moment is ordered (project choice: a usual change of course does not
+saturate the thrusters)."""
+
+LAG_SHARE = 0.25
+"""The loops are no faster than this over the longest lag of a thruster, so that it takes little of their phase: 14 deg
+(project choice)."""
+
+SLOWER_SHARE = 0.5
+"""Share of the ordered speed from which a change of speed begins (project choice)."""
+
+FASTER = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0)
+LEAST_DAMPING = 0.5
+"""Frequencies of heading that are tried, over that of :data:`HALF_MOMENT_AT_RAD`, until every pole of the whole closed
+loop has at least this relative damping (project choices): sway, which the gains leave out, turns a fast craft by the
+moment of Munk."""
+
+RUN_LENGTHS = 30.0
+"""Length of a run in L/u0 (project choice): several times what heading and speed need to settle."""
+
+
+@dataclass(frozen=True, eq=False)
+class CraftAutopilot:
+    """The autopilot of a craft, and what it does.
+
+    Parameters
+    ----------
+    speed_mps : float
+        Speed of the design.
+    gains : CraftGains
+    model : Model
+        The autopilot.
+    source : str
+        How it was found, in a sentence.
+    poles : tuple of complex
+        Of the whole closed loop at that speed, 1/s, the slowest first.
+    runs : mapping
+        ``course`` and ``speed`` to their motion.
+    course, speed : StepFigures
+        Of the change of course (rad) and of speed (m/s).
+    at_limit_share : mapping
+        Run to the share of its time in which an order is at a limit of a thruster.
+    """
+
+    speed_mps: float
+    gains: CraftGains
+    model: Model
+    source: str
+    poles: tuple[complex, ...]
+    runs: Mapping[str, Trajectory]
+    course: StepFigures
+    speed: StepFigures
+    at_limit_share: Mapping[str, float]
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it; angles in degrees."""
+        course = asdict(self.course)
+        for key in ("ordered", "overshoot"):
+            course[key] = math.degrees(course[key])
+        gains = self.gains
+        return {
+            "speed_mps": self.speed_mps,
+            "source": self.source,
+            "gains": {
+                "Kp_Nm": gains.heading,
+                "Kd_Nms": gains.yaw_rate,
+                "Ki_Nmps": gains.heading_integral,
+                "Ku_kgps": gains.speed,
+                "Ki_u_Npm": gains.speed_integral,
+            },
+            "largest_moment_Nm": list(gains.largest_moment_Nm),
+            "poles": [[pole.real, pole.imag] for pole in self.poles],
+            "course_change": course,
+            "speed_change": asdict(self.speed),
+            "at_limit_percent": {name: 100 * share for name, share in self.at_limit_share.items()},
+        }
+
+
+def study_craft_autopilot(
+    card: CraftCard, model: Model, *, speed_mps: float | None, course_change_rad: float
+) -> CraftAutopilot:
+    """Design the autopilot of a craft, and try a change of course and one of speed.
+
+    Parameters
+    ----------
+    card, model : CraftCard, Model
+    speed_mps : float, optional
+        Of the design and of the runs; by default that of the card.
+    course_change_rad : float
+        + to starboard.
+
+    Raises
+    ------
+    InputError
+        The thrusters turn, or give no yaw moment without a surge force; the speed is beyond them; the loop is unstable.
+    """
+    speed = card.model.speed_mps if speed_mps is None else speed_mps
+    duration = RUN_LENGTHS * card.ship.length_m / speed
+    for faster in FASTER:
+        gains = craft_gains(card, speed, faster)
+        autopilot = craft_autopilot_model(card, gains, model.step_s)
+        loop = HeadingLoop(model, autopilot)
+        steady, slower = (_settled(loop, wanted, duration) for wanted in (speed, SLOWER_SHARE * speed))
+        poles = _poles(loop, steady, speed)
+        if min(-pole.real / abs(pole) for pole in poles) >= LEAST_DAMPING:
+            break
+    else:
+        problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
+        raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
+    runs = {
+        "course": loop.run({"speed.command": speed, "heading.command": course_change_rad}, duration, begin=steady),
+        "speed": loop.run({"speed.command": speed, "heading.command": 0.0}, duration, begin=slower),
+    }
+    return CraftAutopilot(
+        speed_mps=speed,
+        gains=gains,
+        model=autopilot,
+        source=(
+            f"Poles placed on the yaw (relative damping {DAMPING:g}) and the surge (two equal poles) of "
+            f"{card.ship.name} at {speed:.4g} m/s"
+        ),
+        poles=poles,
+        runs=runs,
+        course=step_figures(runs["course"].t, runs["course"]["motion.psi"], course_change_rad),
+        speed=step_figures(runs["speed"].t, runs["speed"]["motion.u"], speed - float(runs["speed"]["motion.u"][0])),
+        at_limit_share={name: _at_limit(card, run) for name, run in runs.items()},
+    )
+
+
+def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
+    """Gains for a craft at a speed, with `faster` times the frequency of heading.
+
+    Yaw, I r' = d r + N with the added inertia in I and d = Nr + Nrabsu u: poles where (s^2 + 2 z w s + w^2)(s + a) = 0,
+    z :data:`.DAMPING`, a :data:`.SLOWNESS` w; w^2 I is half of the largest moment over :data:`HALF_MOMENT_AT_RAD`.
+    Surge, m u' = d u + X, d the slope of the resistance: two equal poles, Ku all of the surge force for an error of the
+    speed. Both are no faster than :data:`LAG_SHARE` over the longest lag of the thrusters.
+
+    Raises
+    ------
+    InputError
+        As of :func:`study_craft_autopilot`.
+    """
+    known, lags = card.derivatives, [thruster.time_constant_s or 0.0 for thruster in card.thrusters]
+    fastest = LAG_SHARE / max(lags) if any(lags) else math.inf
+    gives = _effectiveness(card)
+    low, high = _largest_moments(card, gives, speed_mps)
+    added = {name: known.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
+    masses = inertia(card.rigid_body.mass, card.rigid_body.x_G, card.rigid_body.yaw_inertia, added)
+    yaw, surge = float(masses.yaw), float(masses.surge)
+    w = min(faster * math.sqrt(min(-low, high) / 2 / HALF_MOMENT_AT_RAD / yaw), fastest)
+    a = SLOWNESS * w
+    damping = -known.get("Nr", 0.0) - known.get("Nrabsu", 0.0) * speed_mps
+    drag = -known.get("Xu", 0.0) - 2 * known.get("Xuabsu", 0.0) * speed_mps
+    most = float(gives[0] @ [thrust_limits(thruster, speed_mps)[1] for thruster in card.thrusters])
+    Ku = max(0.0, min(most / speed_mps, 2 * surge * fastest - drag))
+    return CraftGains(
+        heading=yaw * (w**2 + 2 * DAMPING * w * a),
+        yaw_rate=max(0.0, yaw * (2 * DAMPING * w + a) - damping),
+        heading_integral=yaw * w**2 * a,
+        integral_band_rad=INTEGRAL_BAND_RAD,
+        speed=Ku,
+        speed_integral=(drag + Ku) ** 2 / (4 * surge),
+        anti_windup_time_s=1 / w,
+        largest_moment_Nm=(low, high),
+        allocation=np.asarray(np.linalg.pinv(gives), dtype=float),
+    )
+
+
+def _effectiveness(card: CraftCard) -> Array:
+    """Surge force and yaw moment by the thrust of each thruster (2, m): 1, and m."""
+    for place, thruster in enumerate(card.thrusters):
+        if thruster.max_azimuth_rad is not None:
+            remedy = "the autopilot needs thrusters that do not turn"
+            raise InputError(card.source, f"thrusters.{place}.max_azimuth_rad", "lets it turn", remedy)
+    angles = np.array([thruster.azimuth_rad for thruster in card.thrusters])
+    x, y = (np.array([getattr(thruster, key) for thruster in card.thrusters]) for key in ("x_m", "y_m"))
+    gives = np.stack([np.cos(angles), x * np.sin(angles) - y * np.cos(angles)])
+    if np.linalg.matrix_rank(gives) < 2:
+        problem = "give no yaw moment that is free of their surge force"
+        raise InputError(card.source, "thrusters", problem, "the autopilot needs one at port and one at starboard")
+    return gives
+
+
+def _largest_moments(card: CraftCard, gives: Array, speed_mps: float) -> tuple[float, float]:
+    """Largest yaw moments to port (negative) and to starboard, N m, at any surge force that the thrusters can give.
+
+    The share of the surge force is that of the least squares of the thrusts, as the autopilot shares it out.
+    """
+    bounds = [thrust_limits(thruster, speed_mps) for thruster in card.thrusters]
+    if any(high <= 0 for _, high in bounds):
+        problem = f"give no thrust ahead at {speed_mps:.4g} m/s"
+        raise InputError(card.source, "thrusters", problem, "give a lower speed")
+    least, most = (np.array(column, dtype=float) for column in zip(*bounds, strict=True))
+    by = np.linalg.pinv(gives)
+    within = {"A_ub": np.vstack([by, -by]), "b_ub": np.concatenate([most, -least]), "bounds": [(None, None)] * 2}
+    port, starboard = (linprog([0.0, side], **within).x[1] for side in (1.0, -1.0))
+    return float(port), float(starboard)
+
+
+def _settled(loop: HeadingLoop, speed_mps: float, duration_s: float) -> Array:
+    """State (nx,) on course 0 after a time at an ordered speed, at the origin."""
+    order = {"speed.command": speed_mps, "heading.command": 0.0}
+    states, _ = loop.advance(loop.start(), order, round(duration_s / loop.model.step_s), None)
+    names = loop.model.state_names
+    state: Array = states[-1].copy()
+    if not np.isfinite(state).all() or abs(state[names.index("motion.u")] - speed_mps) > 0.1 * speed_mps:
+        problem = f"does not come to {speed_mps:.4g} m/s under the autopilot: {state[names.index('motion.u')]:.4g} m/s"
+        raise InputError(loop.model.origin, "", problem, "give a speed that its thrusters hold")
+    state[[names.index("motion.x"), names.index("motion.y")]] = 0.0
+    return state
+
+
+def _poles(loop: HeadingLoop, state: Array, speed_mps: float) -> tuple[complex, ...]:
+    """Poles of the closed loop at a steady state, 1/s, the slowest first; without the position."""
+    model = loop.model
+    inputs = model.input_values()
+    inputs[model.input_names.index("speed.command")] = speed_mps
+    names = [state.name for state in model.states if state.name not in ("motion.x", "motion.y")]
+    rates = [state.derivative for state in model.states if state.name in names]
+    A, _ = jacobians(model, OperatingPoint(state, inputs, model.parameter_values()), rates, names, [])
+    return tuple(complex(pole) for pole in sorted(np.linalg.eigvals(A), key=lambda pole: -pole.real))
+
+
+def _at_limit(card: CraftCard, run: Trajectory) -> float:
+    """Share of the time in which the order of a thruster is at one of its limits."""
+    at = np.zeros(len(run.t), dtype=bool)
+    for thruster in card.thrusters:
+        order = run[f"thrusters.{thruster.name}.command"]
+        at |= (order >= 0.999 * thruster.max_radps) | (order <= 0.999 * thruster.lowest_radps)
+    return float(at.mean())

@@ -1,0 +1,113 @@
+"""The page of the autopilot of a craft with thrusters: its gains, its poles, and changes of course and speed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tank2sim.report.autopilot.page import exported_section
+from tank2sim.report.kit.analysis_charts import PolesZeros, pole_zero_chart
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.motion_charts import History, Signal, history_chart
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+
+_HEADING = Signal(name="psi_deg", title="heading", unit="rad")
+_SPEED = Signal(name="u_mps", title="surge velocity", unit="m/s")
+
+
+def craft_autopilot_page(found: Json) -> Page:
+    """The page, from the JSON of a :class:`.CraftAutopilotResult`."""
+    sections = [_runs(found), _controller(found)]
+    if exported := found.get("export"):
+        sections.append(exported_section(exported))
+    if found["notices"]:
+        sections.append(PageSection(heading="Notes", notes=found["notices"]))
+    return Page(
+        title=f"{found['ship']}: autopilot of heading and speed",
+        subtitle=found["source"],
+        figures=_figures(found),
+        sections=sections,
+    )
+
+
+def _figures(found: Json) -> list[KeyFigure]:
+    course, speed = found["course_change"], found["speed_change"]
+    by, more = f"in a change by {course['ordered']:.3g} deg", f"in a change by {speed['ordered']:.3g} m/s"
+    settled = [
+        KeyFigure(label=label, value=value, unit="s", note=note)
+        for label, value, note in (
+            ("Heading settled", course["settling_time_s"], by),
+            ("Speed settled", speed["settling_time_s"], more),
+        )
+        if value is not None
+    ]
+    return [
+        KeyFigure(label="Overshoot of heading", value=course["overshoot"], unit="deg", note=by),
+        KeyFigure(label="Overshoot of speed", value=speed["overshoot"], unit="m/s", note=more),
+        *settled,
+    ]
+
+
+def _runs(found: Json) -> PageSection:
+    thrusters = sorted(key for key in found["histories"]["course"] if key.startswith("n_"))
+    turning = [
+        Signal(name=key, title=key.removeprefix("n_").removesuffix("_rpm").replace("_", " "), unit="rad/s",
+               display_unit="rpm")
+        for key in thrusters
+    ]  # fmt: skip
+    charts = [
+        Illustration(chart=history_chart([_history(name, columns)], [first, *others, *turning], title=title))
+        for name, columns, first, others, title in (
+            ("course", found["histories"]["course"], _HEADING, [_SPEED], "Change of course"),
+            ("speed", found["histories"]["speed"], _SPEED, [], "Change of speed"),
+        )
+    ]
+    rows: list[list[Cell]] = [
+        [
+            f"{words}, {found[key]['ordered']:.3g} {unit}",
+            *list(found[key].values())[1:],
+            found["at_limit_percent"][name],
+        ]
+        for words, key, unit, name in (
+            ("course", "course_change", "deg", "course"),
+            ("speed", "speed_change", "m/s", "speed"),
+        )
+    ]
+    columns = [
+        Column(title="change"),
+        Column(title="rise time", unit="s", digits=3),
+        Column(title="overshoot", unit="deg or m/s", digits=3),
+        Column(title="settling time", unit="s", digits=3),
+        Column(title="a thruster at its limit", unit="%", digits=2),
+    ]
+    return PageSection(
+        heading="Changes of course and speed",
+        text="On the nonlinear craft in calm water, from a steady course; revolutions are those of the thrusters.",
+        charts=charts,
+        tables=[PageTable(caption="Figures of the changes", columns=columns, rows=rows)],
+    )
+
+
+def _history(name: str, columns: Json) -> History:
+    values = {"psi_deg": np.radians(columns["psi_deg"]), "u_mps": np.array(columns["u_mps"])}
+    values |= {key: np.array(column) * math.pi / 30 for key, column in columns.items() if key.startswith("n_")}
+    return History(label=name, time_s=columns["t_s"], values=values)
+
+
+def _controller(found: Json) -> PageSection:
+    low, high = found["largest_moment_Nm"]
+    text = (
+        f"A yaw moment of {-low:.3g} N m to port and {high:.3g} N m to starboard is ordered at most; the surge force "
+        "takes what the thrusters have left. Thrusts become revolutions by the thrust curves of the card, at the speed "
+        "of the moment."
+    )
+    rows: list[list[Cell]] = [[name, value] for name, value in found["gains"].items()]
+    poles = [complex(*pole) for pole in found["poles"]]
+    drawn = [PolesZeros(label=f"{found['speed_mps']:.3g} m/s", poles=poles)]
+    return PageSection(
+        heading="Controller",
+        text=text,
+        tables=[PageTable(caption="Gains", columns=[Column(title="gain"), Column(title="value")], rows=rows)],
+        charts=[Illustration(chart=pole_zero_chart(drawn, title="Poles of the closed loop"))],
+    )
