@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.cards import CraftCard
+from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import CoefficientVerdict, determination
 
@@ -34,8 +34,13 @@ def craft() -> dict[str, float]:
     return craft_log.random_craft(np.random.default_rng(7))
 
 
-def written(folder: Path, craft: dict[str, float], names: list[str], *, scale: float = 1.0) -> list[Path]:
-    """Trials by the integration of the benchmark, without wind or current, with 1 cm and 0.1 deg of noise."""
+def written(
+    folder: Path, craft: dict[str, float], names: list[str], *, scale: float = 1.0, ordered: bool = False
+) -> list[Path]:
+    """Trials by the integration of the benchmark, without wind or current, with 1 cm and 0.1 deg of noise.
+
+    With revolutions, or `ordered` with orders alone.
+    """
     rng, paths = np.random.default_rng(11), []
     full = craft["rpm"] * np.pi / 30
     for name in names:
@@ -44,7 +49,7 @@ def written(folder: Path, craft: dict[str, float], names: list[str], *, scale: f
             goal = np.array(orders) * full
             for _ in range(round(seconds / 0.02)):
                 if round(t / 0.02) % 10 == 0:
-                    rows.append([t, *state[:3], *n])
+                    rows.append([t, *state[:3], *(orders if ordered else n)])
                 n = goal + (n - goal) * np.exp(-0.02 / craft["lag"])
                 psi, u, v, r = state[2:]
                 speed = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
@@ -53,9 +58,10 @@ def written(folder: Path, craft: dict[str, float], names: list[str], *, scale: f
         table = np.array(rows)
         table[:, 1:3] += 0.01 * rng.normal(size=(len(table), 2))
         table[:, 3] = np.degrees(table[:, 3]) + 0.1 * rng.normal(size=len(table))
-        table[:, 4:] *= scale * 30 / np.pi
+        table[:, 4:] *= 1.0 if ordered else scale * 30 / np.pi
         path = folder / f"{name}.csv"
-        np.savetxt(path, table, delimiter=",", header="t_s,x_m,y_m,psi_deg,n_port_rpm,n_starboard_rpm", comments="")
+        driven = "order_port,order_starboard" if ordered else "n_port_rpm,n_starboard_rpm"
+        np.savetxt(path, table, delimiter=",", header=f"t_s,x_m,y_m,psi_deg,{driven}", comments="")
         paths.append(path)
     return paths
 
@@ -92,6 +98,45 @@ def test_the_card_written_is_a_craft_with_the_estimates_and_their_errors(found) 
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_orders_alone_give_thrust_curve_damping_and_lag(craft, tmp_path) -> None:
+    paths = written(tmp_path, craft, ["straight", "spin", "astern", "steps", "zigzag"], ordered=True)
+    text = craft_log.first_card(craft, np.random.default_rng(5)).card.text
+    lines = f"max_rpm = {craft['rpm']!r}\ntime_constant_s = {1.5 * craft['lag']!r}"
+    text = text.replace(f"max_rpm = {1.05 * craft['rpm']!r}", lines)
+    found = t2s.identify_craft(t2s.Ship(parse_card(text, "first.toml")), paths)
+    assert found.driven_by == "orders" and found.content()["driven_by"] == "orders"
+    coefficients = found.content()["coefficients"]
+    for name, truth in [(f"port.{key}", craft[key]) for key in ("ahead", "astern")] + [
+        ("port.time_constant", craft["lag"])
+    ]:
+        entry = coefficients[name]
+        assert abs(entry["value"] - truth) < 3 * entry["standard_error"], name
+        assert entry["standard_error"] < 0.1 * truth
+    for name in ("Xu", "Xuabsu", "Nr", "Nrabsr"):
+        assert abs(coefficients[name]["value"] - craft[name]) < 3 * coefficients[name]["standard_error"], name
+    assert found.card.thrusters[1].time_constant_s == pytest.approx(coefficients["port.time_constant"]["value"])
+
+
+@pytest.mark.parametrize(("rows", "place"), [("1.5", "order_port"), ("", "n_port_rpm")])
+def test_orders_that_cannot_be_are_refused(craft, tmp_path, rows, place) -> None:
+    (path,) = written(tmp_path, craft, ["spin"], ordered=True)
+    lines = path.read_text().splitlines()
+    changed = [",".join([*line.split(",")[:-2], rows, rows]) for line in lines[1:]]
+    path.write_text("\n".join([lines[0], *changed]) + "\n")
+    with pytest.raises(InputError, match=place):
+        t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), path)
+
+
+def test_trials_by_revolutions_and_by_orders_are_not_mixed(craft, tmp_path) -> None:
+    (first,) = written(tmp_path, craft, ["spin"])
+    (tmp_path / "ordered").mkdir()
+    (second,) = written(tmp_path / "ordered", craft, ["steps"], ordered=True)
+    with pytest.raises(InputError, match="give trials of one kind") as raised:
+        t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), [first, second])
+    assert raised.value.source == str(first)
+
+
 def test_a_held_out_trial_is_predicted(found) -> None:
     r_squared = found.determination
     assert r_squared["u"] > 0.9 and r_squared["r"] > 0.9

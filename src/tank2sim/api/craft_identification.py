@@ -24,7 +24,7 @@ from tank2sim.identification.craft.fit import (
     predict_free,
 )
 from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
-from tank2sim.identification.craft.problem import craft_problem
+from tank2sim.identification.craft.problem import craft_driven_by, craft_problem
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.marks import CHECK
 from tank2sim.records.craft_trials import read_craft_trial
@@ -45,15 +45,23 @@ class CraftIdentificationResult(Result):
         Of held-out trials.
     held : sequence of str
         Names of the held-out trials, those that are too short to be predicted with them.
+    driven_by : str
+        ``revolutions`` of the thrusters, or their ``orders``.
     """
 
     command = "identify"
 
     def __init__(
-        self, before: Ship, fit: CraftFit, predictions: Sequence[FreePrediction], held: Sequence[str] = ()
+        self,
+        before: Ship,
+        fit: CraftFit,
+        predictions: Sequence[FreePrediction],
+        held: Sequence[str] = (),
+        driven_by: str = "revolutions",
     ) -> None:
         assert isinstance(before.card, CraftCard)
         self.before, self.fit, self.predictions, self.held = before, fit, list(predictions), list(held)
+        self.driven_by = driven_by
         self.card = identified_craft(before.card, fit)
         self.notices = tuple(self._notices())
 
@@ -69,6 +77,10 @@ class CraftIdentificationResult(Result):
         if self.held and not self.predictions:
             notices.append(
                 f"no held-out trial is longer than {PREDICTION_LEAD_S + SHORTEST_PREDICTION_S:g} s: none is predicted"
+            )
+        if self.driven_by == "orders":
+            notices.append(
+                "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
             )
         notices.append(
             "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
@@ -125,6 +137,7 @@ class CraftIdentificationResult(Result):
             "coefficients": {str(name): dict(zip(keys, row, strict=True)) for name, *row in self._rows()},
             "noise": dict(self.fit.estimate.measurement_noise),
             "determination": self.determination,
+            "driven_by": self.driven_by,
             "held_out": self.held,
             "next_trials": [candidate.as_json() for candidate in self.next_trials],
             "notices": list(self.notices),
@@ -209,9 +222,8 @@ def identify_craft(
     twice = {path.resolve() for path in fitted} & {path.resolve() for path in held}
     if twice:
         raise InputError(sorted(twice)[0], "", "is fitted and held out", "give it once")
-    names = [thruster.name for thruster in ship.card.thrusters]
-    read = [read_craft_trial(path, names) for path in (*fitted, *held)]
-    problem = craft_problem(ship.card, read)
+    read = [read_craft_trial(path, ship.card.thrusters) for path in (*fitted, *held)]
+    problem, driven_by = craft_problem(ship.card, read), craft_driven_by(ship.card, read)
     runs = problem.runs
     try:
         with np.errstate(all="ignore"):  # a step of the search may be one to an unstable craft
@@ -220,7 +232,7 @@ def identify_craft(
         remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
         raise InputError(ship.card.source, "", "does not move as the trials do, not even roughly", remedy) from None
     predictions = predict_free(fit, runs[len(fitted) :]) if held else []
-    return CraftIdentificationResult(ship, fit, predictions, [run.name for run in runs[len(fitted) :]])
+    return CraftIdentificationResult(ship, fit, predictions, [run.name for run in runs[len(fitted) :]], driven_by)
 
 
 def craft_trial_files(paths: CraftTrialPaths) -> list[Path]:

@@ -437,6 +437,7 @@ class CraftIdentifyKeys(_Keys):
     coefficients: dict[str, CraftEstimateKeys]
     noise: dict[str, float]
     determination: dict[str, Number] | None
+    driven_by: str
     held_out: list[str]
     next_trials: list[CandidateTrialKeys]
     notices: list[str]

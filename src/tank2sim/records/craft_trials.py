@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arrays import Array
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.trials import Trial
@@ -15,36 +17,66 @@ from tank2sim.records.trials import Trial
 CRAFT_SIGNALS = ("x_m", "y_m", "psi_rad", "r_radps", "u_mps", "v_mps")
 """Signals that are compared with the motion of a craft; position and heading suffice."""
 
+ROUNDED_ORDER = 0.01
+"""By how much an order may be beyond 1: rounding of pulse widths (project choice)."""
+
 LEAST_CRAFT_ROWS = 20
 """Fewest rows of a trial. Project choice: a few seconds at the rates of small receivers."""
 
 
-def read_craft_trial(path: Path, thrusters: Sequence[str]) -> Trial:
-    """A trial with the column ``n_<name>_rpm`` of each of the `thrusters`, as ``tank2sim log`` cuts it; SI.
+def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
+    """A trial with the column ``n_<name>_rpm`` or ``order_<name>`` of each thruster, as ``tank2sim log`` cuts it; SI.
+
+    An order is a share of the largest revolutions of the card, positive ahead, and becomes the signal
+    ``order_<name>_radps``; measured revolutions are ``n_<name>_radps``.
 
     Parameters
     ----------
     path : Path
-    thrusters : sequence of str
-        Names of the card's thrusters.
+    thrusters : sequence of ThrusterSection
+        Of the card.
 
     Raises
     ------
     InputError
-        Revolutions, positions or heading are missing, or the time does not rise.
+        Revolutions and orders, positions or heading are missing, an order is beyond 1, or the time does not rise.
     """
     table = read_table(Path(path)).si()
     columns, time = table.columns, table.increasing("t_s")
     if len(time) < LEAST_CRAFT_ROWS:
         raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
-    driven = [f"n_{name}_radps" for name in thrusters]
-    for name in (*driven, "x_m", "y_m", "psi_rad"):
-        if name not in columns or not np.isfinite(columns[name]).any():
-            remedy = f"a craft with thrusters {', '.join(thrusters)} needs t_s, x_m, y_m, psi_deg and "
-            remedy += ", ".join(f"n_{thruster}_rpm" for thruster in thrusters)
+    driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps") for thruster in thrusters}
+    orders = {f"order_{thruster.name}_radps": _ordered(path, thruster, columns) for thruster in thrusters}
+    names = [name for name, values in driven.items() if not _known(values)]
+    if all(_known(values) for values in orders.values()):
+        names = []
+    for name in (*names, "x_m", "y_m", "psi_rad"):
+        if not _known(columns.get(name)):
+            remedy = (
+                f"a craft with thrusters {', '.join(thruster.name for thruster in thrusters)} needs t_s, x_m, y_m, "
+            )
+            remedy += "psi_deg and of each thruster " + ", ".join(f"n_{thruster.name}_rpm" for thruster in thrusters)
+            remedy += f" or its order, {', '.join(f'order_{thruster.name}' for thruster in thrusters)}"
             raise InputError(path, "header", f"lacks {re.sub('_rad$', '_deg', name.replace('_radps', '_rpm'))}", remedy)
-    signals = {name: columns[name] for name in (*driven, *CRAFT_SIGNALS) if name in columns}
+    signals = {name: values for name, values in (driven | orders).items() if values is not None and _known(values)}
+    signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}
     known = np.isfinite(signals["psi_rad"])
     psi = signals["psi_rad"].copy()
     psi[known] = np.unwrap(psi[known])
     return Trial(Path(path), time, signals | {"psi_rad": psi})
+
+
+def _known(values: Array | None) -> bool:
+    return values is not None and bool(np.isfinite(values).any())
+
+
+def _ordered(path: Path, thruster: ThrusterSection, columns: Mapping[str, Array]) -> Array | None:
+    """Ordered revolutions (n,), rad/s: shares of the largest ones, ahead or astern."""
+    share = columns.get(f"order_{thruster.name}")
+    if share is None:
+        return None
+    if np.nanmax(np.abs(share), initial=0.0) > 1 + ROUNDED_ORDER:
+        problem = f"reaches {np.nanmax(np.abs(share)):.3g}"
+        raise InputError(path, f"column order_{thruster.name}", problem, "give shares of the largest order, -1 to 1")
+    ordered: Array = share * np.where(share >= 0, thruster.max_radps, -thruster.lowest_radps)
+    return ordered

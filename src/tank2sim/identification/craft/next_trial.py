@@ -133,7 +133,7 @@ def _orders(
 
 
 def _added_information(fit: CraftFit, inputs: Array) -> Array | None:
-    """Information of a simulated trial (k, k); None if the simulated motion leaves all bounds."""
+    """Information of a simulated trial (k, k); None if the motion or the covariance of its filter leaves all bounds."""
     problem = fit.problem
     run = problem.runs[0]
     model = problem.model
@@ -145,4 +145,7 @@ def _added_information(fit: CraftFit, inputs: Array) -> Array | None:
         return None
     shown = sensitivity.shown(states, inputs, p)
     made = replace(run, name="candidate", begin_s=0.0, inputs=inputs, measured=shown)
-    return information(problem.with_runs((made,)), fit.estimate.values, fit.levels)
+    try:
+        return information(problem.with_runs((made,)), fit.estimate.values, fit.levels)
+    except np.linalg.LinAlgError:
+        return None

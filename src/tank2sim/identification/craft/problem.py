@@ -22,6 +22,7 @@ from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
+from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.records.trials import Trial
@@ -53,6 +54,9 @@ the length and half the cruising speed (project choice)."""
 THRUST_SPREAD = 1.0
 """Standard error of a thrust curve on the card, over its value, where the card states none (project choice)."""
 
+LAG_SPREAD = 0.5
+"""Standard error of the lag of a thruster on the card, over its value, where the card states none (project choice)."""
+
 LOSS_SPREAD = 0.5
 """Standard error of the loss of thrust by speed, over half of the thrust at the cruising revolutions over the cruising
 speed (project choice)."""
@@ -69,16 +73,21 @@ OBSERVED_STEP_S = 0.2
 (project choice)."""
 
 
-def craft_fit_model(card: CraftCard) -> Model:
-    """The model of a card driven by measured revolutions, with disturbances as constant states.
+def craft_fit_model(card: CraftCard, driven_by: str = "revolutions") -> Model:
+    """The model of a card driven by measured or ordered revolutions, with disturbances as constant states.
 
     Parameters
     ----------
     card : CraftCard
-        Its lag and dead band are left out: both lie before the revolutions.
+    driven_by : str
+        ``revolutions``: lag and dead band of the card are left out, for both lie before the revolutions; ``orders``:
+        they are in, except a lag shorter than a step.
     """
     thrusters = tuple(
-        thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0}) for thruster in card.thrusters
+        thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0})
+        if driven_by == "revolutions"
+        else thruster.model_copy(update={"time_constant_s": _felt(thruster.time_constant_s)})
+        for thruster in card.thrusters
     )
     model = build(replace(card, thrusters=thrusters))
     # Added masses are symmetric in theory (Fossen 2021, 6.3).
@@ -87,6 +96,8 @@ def craft_fit_model(card: CraftCard) -> Model:
     for name, keys in twins(card).items():
         for key in keys:
             first = f"thrusters.{card.thrusters[0].name}.{key}"
+            if first not in model:  # a lag that is left out
+                continue
             model = model.substitute(f"thrusters.{name}.{key}", model.symbol(first))
     thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     described = (
@@ -119,9 +130,19 @@ def craft_fit_model(card: CraftCard) -> Model:
     )
 
 
+def _felt(lag_s: float | None) -> float | None:
+    """A lag that the steps of the fit show, s; None for a shorter one."""
+    return lag_s if lag_s is not None and lag_s >= OBSERVED_STEP_S else None
+
+
 def twins(card: CraftCard) -> dict[str, tuple[str, ...]]:
     """Thruster to the parameters that it shares with the first one, because the card states the same numbers."""
-    keys = {"ahead_Ns2": "ahead", "astern_Ns2": "astern", "speed_loss_kg": "speed_loss"}
+    keys = {
+        "ahead_Ns2": "ahead",
+        "astern_Ns2": "astern",
+        "speed_loss_kg": "speed_loss",
+        "time_constant_s": "time_constant",
+    }
     first, *others = card.thrusters
     return {
         other.name: tuple(keys.values())
@@ -161,6 +182,8 @@ def craft_prior(card: CraftCard, model: Model) -> dict[str, tuple[float, float]]
             "astern": ("astern_Ns2", THRUST_SPREAD * max(thruster.astern_Ns2, 0.5 * thruster.ahead_Ns2)),
             "speed_loss": ("speed_loss_kg", LOSS_SPREAD * 0.5 * thruster.ahead_Ns2 * thruster.max_radps / speed),
         }
+        if lag := _felt(thruster.time_constant_s):
+            spreads["time_constant"] = "time_constant_s", LAG_SPREAD * lag
         for part, (key, spread) in spreads.items():
             if f"{prefix}.{part}" in model:
                 found[f"{prefix}.{part}"] = getattr(thruster, key), thruster.uncertainty.get(key, spread)
@@ -179,9 +202,15 @@ def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
     Raises
     ------
     InputError
-        A trial is too short.
+        A trial is too short, or some trials have revolutions and others orders alone.
     """
-    model = _unbounded(craft_fit_model(card))
+    by = craft_driven_by(card, trials)
+    model = _unbounded(craft_fit_model(card, by))
+    unused = "order_" if by == "revolutions" else "n_"
+    trials = [
+        replace(trial, signals={key: values for key, values in trial.signals.items() if not key.startswith(unused)})
+        for trial in trials
+    ]
     prior = craft_prior(card, model)
     names = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}
     signals = {signal for trial in trials for signal in trial.signals}
@@ -193,6 +222,23 @@ def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
         runs.append(replace(run, seen=(*seen, *(["gyro.rate"] if rated else []))))
     means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
     return Problem(model, tuple(prior), means, errors, tuple(runs))
+
+
+def craft_driven_by(card: CraftCard, trials: Sequence[Trial]) -> str:
+    """What drives the model in all trials: ``revolutions``, which were measured, or else ``orders``.
+
+    Raises
+    ------
+    InputError
+        Some trials have revolutions and no orders, others orders alone.
+    """
+    if all(f"n_{thruster.name}_radps" in trial.signals for trial in trials for thruster in card.thrusters):
+        return "revolutions"
+    for trial in trials:
+        if any(f"order_{thruster.name}_radps" not in trial.signals for thruster in card.thrusters):
+            problem = "has revolutions and no orders, and another trial has orders alone"
+            raise InputError(trial.path, "header", problem, "give trials of one kind")
+    return "orders"
 
 
 def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem:

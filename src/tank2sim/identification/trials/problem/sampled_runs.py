@@ -110,7 +110,7 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
         raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
     inputs = np.tile(model.input_values(), (count, 1))
     for name, values in _input_signals(model, trial).items():
-        held = name == "rudder.command" and "delta_rad" not in trial.signals
+        held = (name == "rudder.command" and "delta_rad" not in trial.signals) or _ordered_signal(name) in trial.signals
         inputs[:, model.input_names.index(name)] = _means(trial.time_s, values, grid, step, held=held)
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
     measured = np.full((count, len(seen)), np.nan)
@@ -162,15 +162,21 @@ def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
     if "rudder.command" in model:
         angle = trial.signals.get("delta_rad")
         given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
-    for name in model.input_names:  # revolutions of a craft's thrusters, as measured
-        signal = f"n_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
-        if name.startswith("thrusters.") and signal in trial.signals:
-            given[name] = trial.signals[signal]
+    for name in model.input_names:  # revolutions of a craft's thrusters, as measured, else as ordered
+        ordered = _ordered_signal(name)
+        for signal in (ordered, ordered.replace("order_", "n_", 1)):
+            if signal in trial.signals:
+                given[name] = trial.signals[signal]
     return {
         name: _continuous(values) if name.endswith("direction") else values
         for name, values in given.items()
         if name in model.input_names
     }
+
+
+def _ordered_signal(name: str) -> str:
+    """Signal of a trial with the ordered revolutions of an input ``thrusters.<name>.command``; of other inputs none."""
+    return f"order_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
 
 
 def _continuous(direction: Array) -> Array:
