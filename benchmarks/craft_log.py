@@ -9,7 +9,8 @@ tank2sim.
 
     python benchmarks/craft_log.py [NUMBER OF CRAFT] [FIRST SEED]
 
-With the measured data it repeats this for the made-up craft of `shared/data/logs`, which another program wrote.
+With the measured data it repeats this for the made-up craft of `shared/data/logs`, which another program wrote: by
+revolutions, and by orders alone.
 """
 
 from __future__ import annotations
@@ -263,7 +264,7 @@ def r_squared(pairs: list[np.ndarray]) -> np.ndarray:
 
 
 def shared_craft(folder: Path) -> None:
-    """The craft of the shared logs, from its CSV."""
+    """The craft of the shared logs: from its CSV by revolutions, from an ArduPilot and a PX4 log by orders alone."""
     truth = json.loads((LOGS / "usv_22-truth.json").read_text(encoding="utf-8"))
     v, thrust = truth["vessel"], truth["vessel"]["thrusters"]
     d = v["damping"]
@@ -283,11 +284,24 @@ def shared_craft(folder: Path) -> None:
     }
     table = np.genfromtxt(LOGS / "usv_22-truth.csv", delimiter=",", names=True)
     motion = {"t": table["t_s"], "u": table["u_mps"], "v": table["v_mps"], "r": np.radians(table["r_degps"])}
-    paths = trials(LOGS / "usv_22" / "voyage.csv", folder)
     begin = datetime.fromisoformat(truth["t_zero_utc"].replace("Z", "+00:00"))
-    errors, pairs = judged(first_card(c, np.random.default_rng(0)), paths, {k: c[k] for k in MAIN}, motion, begin)
-    print("usv_22:", ", ".join(f"{name} {error:+.1f}" for name, error in errors.items()), "standard errors off")
-    print("usv_22: R^2 of u, v, r:", ", ".join(f"{value:.3f}" for value in r_squared(pairs)))
+    off = math.exp(0.4 * np.random.default_rng(1).normal())  # the lag is known no better than the rest
+    ordered = f"max_rpm = {c['rpm']!r}\ntime_constant_s = {off * thrust['time_constant_s']!r}"
+    ordered += f"\ndead_band_rpm = {thrust['dead_band_command'] * c['rpm']!r}"
+    text = first_card(c, np.random.default_rng(0)).card.text
+    by_orders = text.replace(f"max_rpm = {1.05 * c['rpm']!r}", ordered)
+    for name, card, more in (
+        ("voyage.csv", text, ()),
+        ("voyage.bin", by_orders, ("time_constant",)),
+        ("voyage.ulg", by_orders, ("time_constant",)),
+    ):
+        paths = trials(LOGS / "usv_22" / name, folder / name.replace(".", "_"))
+        known = {k: c[k] for k in MAIN} | dict.fromkeys(more, thrust["time_constant_s"])
+        errors, pairs = judged(t2s.Ship(parse_card(card, "first.toml")), paths, known, motion, begin)
+        print(
+            f"usv_22/{name}:", ", ".join(f"{key} {error:+.1f}" for key, error in errors.items()), "standard errors off"
+        )
+        print(f"usv_22/{name}: R^2 of u, v, r:", ", ".join(f"{value:.3f}" for value in r_squared(pairs)), flush=True)
 
 
 def trials(log: Path, folder: Path) -> list[Path]:
@@ -295,10 +309,8 @@ def trials(log: Path, folder: Path) -> list[Path]:
     return sorted(path for path in t2s.log(log).save(folder) if path.suffix == ".csv")
 
 
-def main() -> None:
-    """Print the figures of a number of craft."""
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else 20
-    first = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
+def made_up_craft(number: int, first: int) -> None:
+    """Print the figures of so many craft, from a seed on."""
     every, all_pairs, each, refused = [], [], [], 0
     begin_s = time.process_time()
     for seed in range(first, first + number):
@@ -328,6 +340,13 @@ def main() -> None:
     print("R^2 of u, v, r, all predictions together:", ", ".join(f"{value:.3f}" for value in r_squared(all_pairs)))
     print("median of the craft:", ", ".join(f"{value:.3f}" for value in np.median(each, axis=0)))
     print(f"time of a core for each: {(time.process_time() - begin_s) / number:.0f} s")
+
+
+def main() -> None:
+    """Print the figures of a number of made-up craft, and of the shared one."""
+    number = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    if number:
+        made_up_craft(number, int(sys.argv[2]) if len(sys.argv) > 2 else 1000)
     if LOGS.is_dir():
         with tempfile.TemporaryDirectory() as name:
             shared_craft(Path(name))
