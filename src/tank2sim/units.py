@@ -106,6 +106,7 @@ UNITS: dict[str, Unit] = {
         Unit("rad/s2", {"rad": 1, "s": -2}, 1e3, {"deg/s2": 180.0 / math.pi}),
         Unit("N", {"kg": 1, "m": 1, "s": -2}, 1e12),
         Unit("N.m", {"kg": 1, "m": 2, "s": -2}, 1e15),
+        Unit("W", {"kg": 1, "m": 2, "s": -3}, 1e15),
         Unit("N.m.s", {"kg": 1, "m": 2, "s": -1}, 1e15),
         Unit("N.m.s2", {"kg": 1, "m": 2}, 1e15),
         Unit("A", {"A": 1}, 1e6),
