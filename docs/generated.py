@@ -43,6 +43,7 @@ logger = logging.getLogger(__name__)
 FAMILIES = {
     "surroundings": "Surroundings",
     "fields": "Surroundings",
+    "banks": "Surroundings",
     "depth": "Surroundings",
     "propeller": "Propeller and engine",
     "harbour": "Thrusters and tugs",

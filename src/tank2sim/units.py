@@ -109,6 +109,7 @@ UNITS: dict[str, Unit] = {
         Unit("N/s", {"kg": 1, "m": 1, "s": -3}, 1e15),
         Unit("N/m", {"kg": 1, "s": -2}, 1e12),
         Unit("N.m/s", {"kg": 1, "m": 2, "s": -3}, 1e18),
+        Unit("W", {"kg": 1, "m": 2, "s": -3}, 1e15),
         Unit("N.m.s", {"kg": 1, "m": 2, "s": -1}, 1e15),
         Unit("N.m.s2", {"kg": 1, "m": 2}, 1e15),
         Unit("A", {"A": 1}, 1e6),

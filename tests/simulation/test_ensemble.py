@@ -12,6 +12,7 @@ import pytest
 from tank2sim.simulation import ensemble as module
 from tank2sim.simulation.bands import FOLLOWED, figure_bands, history_bands, small_edge_first, track_band
 from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, ensemble
+from tank2sim.simulation.member_streams import member_stream
 
 COVARIANCE = np.array([[4.0, 1.0], [1.0, 9.0]])
 DRAWS = Draws(
@@ -43,6 +44,15 @@ def test_draws_are_those_of_numpy_with_the_same_seeds() -> None:
         normal = np.random.default_rng(np.random.SeedSequence(7, spawn_key=(member,))).standard_normal(2)
         expected = DRAWS.mean + np.linalg.cholesky(COVARIANCE) @ normal
         np.testing.assert_allclose(list(DRAWS.member(member).values()), expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("seed", [0, 2**32, 2**130 + 1])
+@pytest.mark.parametrize("round_number", [None, 0, 3])
+def test_streams_are_those_of_numpy_for_seeds_of_any_length(seed: int, round_number: int | None) -> None:
+    for number in (0, 255, 256, 2**31 + 5):
+        key = (number,) if round_number is None else (round_number, number)
+        expected = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key)).standard_normal(3)
+        np.testing.assert_array_equal(member_stream(seed, number, round_number).standard_normal(3), expected)
 
 
 def test_moments_of_draws_and_of_a_linear_figure_are_those_of_the_covariance() -> None:

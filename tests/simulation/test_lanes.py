@@ -99,6 +99,33 @@ def test_no_bit_depends_on_the_number_of_lanes_or_on_neighbours(mariner_card, ma
             np.testing.assert_array_equal(values, results[0].figures[figure][part], err_msg=figure)
 
 
+def test_ships_that_are_doubtful_with_longer_steps_are_run_with_the_usual_ones(mariner_card) -> None:
+    _, p = ships(mariner_card, build(mariner_card), 24)
+    slowest = np.median(LaneManoeuvres(build(mariner_card)).run(Turn(TWENTY), p).figures["steady_speed_mps"])
+    narrow = build(revised(mariner_card, {}, {"model.valid_speed_mps": [float(slowest), 20.0]}))
+    _, p = ships(mariner_card, narrow, 24)
+    lanes = LaneManoeuvres(narrow)
+    usual, longer = (lanes.run(Turn(TWENTY), p, step_factor=factor) for factor in (1, 3))
+    np.testing.assert_array_equal(longer.doubtful, np.isfinite(usual.left_s))
+    assert 0 < longer.doubtful.sum() < len(p)
+    np.testing.assert_array_equal(longer.left_s, usual.left_s)
+    for figure, values in longer.figures.items():
+        np.testing.assert_allclose(values, usual.figures[figure], rtol=1e-6)
+        np.testing.assert_array_equal((values == usual.figures[figure])[longer.doubtful], True)
+    same = longer.figures["advance_m"] == usual.figures["advance_m"]
+    np.testing.assert_array_equal(same, longer.doubtful)
+
+
+def test_a_turn_near_the_limit_of_a_steady_one_is_doubtful() -> None:
+    model = build(read_card("kvlcc2"))
+    lanes, ends = LaneManoeuvres(model), np.arange(595.0, 630.0, 5.0)  # it becomes steady at some 603 s
+    runs = [lanes.run(Turn(LARGE), model.parameter_values()[None], end, step_factor=3) for end in ends.tolist()]
+    steady = np.array([np.isfinite(run.figures["steady_speed_mps"][0]) for run in runs])
+    doubtful = np.array([run.doubtful[0] for run in runs])
+    assert doubtful[~steady].all() and not steady.all()
+    assert doubtful[steady].any() and not doubtful[steady].all()
+
+
 def test_a_runaway_is_marked_and_disturbs_no_other_ship(mariner_card, mariner) -> None:
     _, p = ships(mariner_card, mariner, 4)
     wild = p.copy()

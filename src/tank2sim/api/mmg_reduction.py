@@ -21,8 +21,8 @@ from tank2sim.identification.captive.plausibility import unusual_signs, yaw_damp
 from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
-from tank2sim.identification.captive_mmg.regression import OF_TORQUE, ORDINARY, MmgFit, fit_mmg
-from tank2sim.identification.captive_mmg.steady_tests import TORQUE, read_steady_tests
+from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit, fit_mmg
+from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tank2sim.marks import CHECK
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ class MmgReductionResult(PagedResult):
         source = f"{path.resolve().parent.name}/{path.name}"
         note = f"tank2sim reduce --model mmg {source}: {len(fit.tests.names)} steady conditions"
         card = tested_card(fit.tests, values, errors, note)
-        kept = [i for i, name in enumerate(fit.names) if name not in ("rudder_offset", *OF_TORQUE)]
+        kept = [i for i, name in enumerate(fit.names) if name != "rudder_offset"]
         keys = [_card_key(fit.names[i]) for i in kept]
         signs = np.array([sign for _, sign in keys])
         matrix = fit.covariance[np.ix_(kept, kept)] * np.outer(signs, signs)
@@ -307,8 +307,6 @@ class MmgReductionResult(PagedResult):
                 f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
                 "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in."
             )
-        if TORQUE in fit.tests.channels:
-            found.append("eta_R and K_Q (q_0, q_1, q_2) are not on the card: no force on the ship depends on them.")
         found.append("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated.")
         return tuple(found)
 

@@ -70,7 +70,10 @@ class EnsembleKeys(_Part):
 
 
 class ManoeuvreEnsembleKeys(EnsembleKeys):
-    """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track."""
+    """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track; integration steps of
+    the first members and of later ones."""
+
+    steps_s: list[Number]
 
     t_s: list[Number]
     histories: dict[str, Columns]

@@ -239,7 +239,13 @@ WAKE_BY_DRIFT = (("C_1", "C_2_plus", "C_2_minus"), ("tau", "C_Pv", "C_Pr"))
 CROSS_FLOW_AT_RUDDER = (("l_R", "gamma_R_plus", "gamma_R_minus"), ("C_Rv", "C_Rr", "C_Rrrr", "C_Rrrv"))
 """The keys of either form of the cross flow to the rudder."""
 
-PROPELLER_COEFFICIENTS = ("k_0", "k_1", "k_2", "t_P", "w_P0", "x_P", *WAKE_BY_DRIFT[0], *WAKE_BY_DRIFT[1], "astern")
+TORQUE_COEFFICIENTS = ("q_0", "q_1", "q_2", "eta_R")
+"""Keys of what the torque alone depends on, of which no motion shows anything."""
+
+PROPELLER_COEFFICIENTS = (
+    *("k_0", "k_1", "k_2", "t_P", "w_P0", "x_P"),
+    *(*WAKE_BY_DRIFT[0], *WAKE_BY_DRIFT[1], "astern", *TORQUE_COEFFICIENTS),
+)
 RUDDER_COEFFICIENTS = (
     *("f_alpha", "t_R", "a_H", "x_H", "x_R", "eta", "eps", "kappa"),
     *(*CROSS_FLOW_AT_RUDDER[0], *CROSS_FLOW_AT_RUDDER[1]),

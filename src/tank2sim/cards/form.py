@@ -259,8 +259,12 @@ class MmgPropeller(CardSection):
         1, or 2 side by side at ``y_P`` to either side.
     k_0, k_1, k_2 : float, optional
         K_T = k_0 + k_1 J + k_2 J^2.
-    J, K_T : list of float, optional
-        Points of the open-water curve in their place.
+    q_0, q_1, q_2 : float, optional
+        K_Q = q_0 + q_1 J + q_2 J^2, for torque and power.
+    J, K_T, K_Q : list of float, optional
+        Points of the open-water curves in their place.
+    eta_R : float, optional
+        Relative rotative efficiency, torque in open water over that behind the hull; 1 unless given.
     t_P : float
         Thrust deduction, constant.
     w_P0 : float
@@ -281,6 +285,11 @@ class MmgPropeller(CardSection):
     k_2: Coefficient | None = None
     J: list[float] | None = None
     K_T: list[float] | None = None
+    q_0: Coefficient | None = None
+    q_1: Coefficient | None = None
+    q_2: Coefficient | None = None
+    K_Q: list[float] | None = None
+    eta_R: Annotated[float, Field(gt=0, le=2)] | None = None
     t_P: Share
     w_P0: Share
     x_P: Place = -0.5

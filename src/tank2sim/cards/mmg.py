@@ -18,6 +18,8 @@ from tank2sim.cards.card import (
 from tank2sim.cards.form import MmgForm, MmgPropeller, MmgRudder, ShipCard
 from tank2sim.errors import InputError
 
+_CURVES = ("k_0", "k_1", "k_2", "q_0", "q_1", "q_2")
+
 WITH_BOTH_SIDES = {
     "propeller": (("C_2_plus", "C_2_minus"),),
     "rudder": (("gamma_R_plus", "gamma_R_minus"),),
@@ -53,8 +55,8 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     errors = {
         key: error for key, error in form.uncertainty.items() if key in (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
     }
-    if form.propeller.J is not None and (key := next((key for key in ("k_0", "k_1", "k_2") if key in errors), "")):
-        remedy = "give k_0, k_1, k_2 in place of J and K_T, or leave it out"
+    if form.propeller.J is not None and (key := next((key for key in _CURVES if key in errors), "")):
+        remedy = "give k_0, k_1, k_2 in place of J and K_T (q_0, q_1, q_2 of K_Q), or leave it out"
         raise InputError(source, f"uncertainty.{key}", "is of a polynomial, and [propeller] has a table", remedy)
     remaining = {key: error for key, error in form.uncertainty.items() if key not in errors}
     own = {"propeller": propeller, "rudder": rudder, "interaction_errors": errors}
@@ -86,6 +88,7 @@ def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
         update |= dict(zip(("k_0", "k_1", "k_2"), fit.coefficients.tolist(), strict=True))
     elif not polynomial:
         raise InputError(source, "propeller.k_0", "is missing", "give k_0, k_1, k_2 or points J, K_T of the curve")
+    update |= _torque(section, source)
     by_polynomial = _one_form(section, "propeller", WAKE_BY_DRIFT, source)
     if not by_polynomial and (section.C_1 is None) != (section.C_2_plus is None):
         absent, there = ("C_1", "C_2_plus") if section.C_1 is None else ("C_2_plus", "C_1")
@@ -101,6 +104,26 @@ def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
             source, "propeller.y_P", "is missing", "two propellers need their distance to midships, over L"
         )
     return section.model_copy(update=update)
+
+
+def _torque(section: MmgPropeller, source: str) -> dict[str, float]:
+    """q_0, q_1, q_2 and eta_R, as given or of a table of K_Q; empty without K_Q."""
+    given = [key for key in ("q_0", "q_1", "q_2") if getattr(section, key) is not None]
+    if section.K_Q is not None and given:
+        raise InputError(source, "propeller.K_Q", f"is given, and {given[0]} too", "give one of the two")
+    if given and (absent := [key for key in ("q_0", "q_1", "q_2") if key not in given]):
+        raise InputError(source, f"propeller.{absent[0]}", "is missing", f"{given[0]} is given: give q_0, q_1, q_2")
+    if section.K_Q is not None and section.J is None:
+        raise InputError(source, "propeller.J", "is missing", "give the J of each K_Q")
+    if section.K_Q is None and not given:
+        if section.eta_R is not None:
+            raise InputError(source, "propeller.eta_R", "is given without K_Q", "give q_0, q_1, q_2 or leave it out")
+        return {}
+    update = {"eta_R": 1.0 if section.eta_R is None else section.eta_R}
+    if section.K_Q is None or section.J is None:
+        return update
+    fit = open_water_fit(section.J, section.K_Q, source, "K_Q")
+    return update | dict(zip(("q_0", "q_1", "q_2"), fit.coefficients.tolist(), strict=True))
 
 
 def _one_form(
@@ -121,28 +144,28 @@ def _one_form(
 
 
 class OpenWaterFit(NamedTuple):
-    """k_0, k_1, k_2 of an open-water curve, and the largest error of K_T."""
+    """Coefficients of 1, J, J^2 in an open-water curve, and its largest error."""
 
     coefficients: Array
     largest_error: float
 
 
-def open_water_fit(J: list[float], K_T: list[float], source: str) -> OpenWaterFit:
-    """Least squares of K_T on 1, J, J^2.
+def open_water_fit(J: list[float], values: list[float], source: str, curve: str = "K_T") -> OpenWaterFit:
+    """Least squares of a curve, K_T or K_Q, on 1, J, J^2.
 
     Raises
     ------
     InputError
         The lists differ in length, or have fewer than three different J.
     """
-    if len(J) != len(K_T):
-        problem = f"has {len(K_T)} values and J {len(J)}"
-        raise InputError(source, "propeller.K_T", problem, "give a K_T for each J")
+    if len(J) != len(values):
+        problem = f"has {len(values)} values and J {len(J)}"
+        raise InputError(source, f"propeller.{curve}", problem, f"give a {curve} for each J")
     if len(set(J)) < 3:
         raise InputError(source, "propeller.J", f"has {len(set(J))} different values", "a quadratic needs three")
     powers = np.vander(J, 3, increasing=True)
-    coefficients = np.linalg.lstsq(powers, np.array(K_T), rcond=None)[0]
-    return OpenWaterFit(coefficients, float(np.abs(powers @ coefficients - K_T).max()))
+    coefficients = np.linalg.lstsq(powers, np.array(values), rcond=None)[0]
+    return OpenWaterFit(coefficients, float(np.abs(powers @ coefficients - values).max()))
 
 
 def _rudder(section: MmgRudder, source: str) -> MmgRudder:

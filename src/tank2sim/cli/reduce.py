@@ -95,7 +95,6 @@ def _reduce_to_mmg(
 ) -> None:
     # Not for the polynomial, which needs no model:
     from tank2sim.api.mmg_reduction import reduce_to_mmg
-    from tank2sim.identification.captive_mmg.regression import OF_TORQUE
 
     result = reduce_to_mmg(campaign)
     form = result.fit.tests.form
@@ -106,5 +105,4 @@ def _reduce_to_mmg(
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)
     if output:
-        on_card = [name for name in result.coefficients if name not in OF_TORQUE]
-        screen.print(f"{output}: {len(on_card)} coefficients", soft_wrap=True, markup=False)
+        screen.print(f"{output}: {len(result.coefficients)} coefficients", soft_wrap=True, markup=False)

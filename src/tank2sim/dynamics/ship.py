@@ -89,8 +89,9 @@ def ship_model(card: ManoeuvringCard) -> Model:
         step_s=_step(card),
         notices=(*notices, *gear_notices, *_without_yaw(card), *_one_sided(card)),
     )
-    outputs = (*_OUTPUTS, *(["propeller.speed_actual"] if engine else []))
     forces = mmg_forces(MmgShip(hull, sides(card))) if isinstance(card, MmgCard) else polynomial_forces(hull)
+    loads = [quantity.name for quantity in forces if quantity.name.startswith(("propeller.torque", "propeller.power"))]
+    outputs = (*_OUTPUTS, *(["propeller.speed_actual"] if engine else []), *loads)
     planar = empty.extend(*given, *motion_quantities(hull, forces), outputs=outputs)
     return with_roll(planar, hull, card) if card.roll else planar
 

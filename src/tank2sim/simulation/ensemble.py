@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
+from tank2sim.simulation.member_streams import member_stream
 
 Histories = NDArray[np.float32]
 
@@ -72,7 +73,7 @@ class Draws:
 
     def drawn(self, number: int) -> Drawn:
         """A member, from numpy's ``SeedSequence(seed, spawn_key=(number,))``: the first draw within the bounds."""
-        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(number,)))
+        stream = member_stream(self.seed, number)
         beyond: tuple[str, ...] = ()
         for draw in range(DRAWS):
             # Summed by NumPy, row by row: the order of sums in a linear algebra library depends on the processor.
@@ -129,7 +130,7 @@ class MixtureDraws(Draws):
 
     def drawn(self, number: int) -> Drawn:
         """A member, from numpy's ``SeedSequence(seed, spawn_key=(round, number))``."""
-        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.round, number)))
+        stream = member_stream(self.seed, number, self.round)
         centre = self.centres[int(np.searchsorted(np.cumsum(self.shares)[:-1], stream.random(), side="right"))]
         standard = centre + stream.standard_normal(len(self.names))
         values = self.at(standard)
@@ -159,8 +160,9 @@ Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[MemberResult]]
 
 
 class BatchResult(NamedTuple):
-    """Results of n members: figures by name (n,), nan where absent; histories (n, signals, times), if any; why a member
-    is unusable, empty for others; and the parameters for which members were drawn again, by their number."""
+    """Results of n members: figures by name (n,), nan where absent; histories (kept, signals, times) of the first, if
+    any; why a member is unusable, empty for others; and the parameters for which members were drawn again, by their
+    number."""
 
     figures: Mapping[str, Array]
     histories: Histories | None
@@ -175,10 +177,11 @@ class AskTogether:
     Parameters
     ----------
     function : callable
-        Takes the number n of members, their parameters by name, (n,) each, and whether histories are kept.
+        Takes the number n of members, their parameters by name, (n,) each, and of how many of them, the first,
+        histories are kept.
     """
 
-    function: Callable[[int, Mapping[str, Array], bool], BatchResult]
+    function: Callable[[int, Mapping[str, Array], int], BatchResult]
 
 
 class Question(Protocol):
@@ -298,19 +301,19 @@ def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterable[BatchRe
 
 
 def _answers(task: _Task) -> BatchResult:
-    ask, kept = _prepared(task.question), task.first < KEPT
+    ask, kept = _prepared(task.question), min(max(KEPT - task.first, 0), task.count)
     drawn = [task.draws.drawn(number) for number in range(task.first, task.first + task.count)]
     if isinstance(ask, AskTogether):
         values = np.array([list(draw.values.values()) for draw in drawn]).reshape(task.count, len(task.draws.names))
         answer = ask.function(task.count, dict(zip(task.draws.names, values.T, strict=True)), kept)
     else:
-        answer = gathered(ask([draw.values for draw in drawn]), kept=kept)
+        answer = gathered(ask([draw.values for draw in drawn]), kept=kept > 0)
     outside = [number for number, draw in enumerate(drawn) if draw.trouble]
     troubles = [draw.trouble or trouble for draw, trouble in zip(drawn, answer.troubles, strict=True)]
     for figure in answer.figures.values():
         figure[outside] = np.nan
     if answer.histories is not None:
-        answer.histories[outside] = np.nan
+        answer.histories[[number for number in outside if number < len(answer.histories)]] = np.nan
     beyond = {task.first + number: draw.beyond for number, draw in enumerate(drawn) if draw.beyond}
     return answer._replace(troubles=troubles, beyond=beyond)
 

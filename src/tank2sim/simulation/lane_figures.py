@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -35,6 +35,11 @@ from tank2sim.simulation.run import simulate
 _HALVINGS = 60
 """Halvings of a step in the search of a crossing: to rounding."""
 
+NEAR_STEADY = 0.9
+"""Share of :data:`tank2sim.simulation.figures.STEADY_SHARE` above which a turn is near the limit of a steady one: with
+steps three times as long, the sample two lengths before the end is at most two of some 400 steps later, and the change
+from it half a percent smaller (project choice)."""
+
 _BEGINS = "motion.x", "motion.y", "motion.psi"
 
 
@@ -53,12 +58,16 @@ class LaneFigures:
         False for a ship whose motion left all bounds.
     left_s : array (n,)
         Time at which a ship first left the range of its card, s; inf if it did not, nan if it is not `fine`.
+    doubtful : array (n,)
+        True for a ship whose figures a longer integration step may turn into none, or none into a figure: one is none,
+        the turn is near the limit of a steady one (:data:`NEAR_STEADY`), or the ship left the range of its card.
     """
 
     figures: Mapping[str, Array]
     states: Array
     fine: NDArray[np.bool_]
     left_s: Array
+    doubtful: NDArray[np.bool_]
 
     def outside(self, name: str) -> NDArray[np.bool_]:
         """True (n,) for ships that had left the card's range before this figure was known, as
@@ -66,6 +75,16 @@ class LaneFigures:
         times = [self.figures[time] for time in read_with(name) if time in self.figures]
         known = np.sum(times, axis=0) if times else np.full(len(self.left_s), np.nan)
         return np.isfinite(self.left_s) & (np.where(np.isnan(known), np.inf, known) >= self.left_s)
+
+    def replaced(self, numbers: NDArray[np.intp], others: LaneFigures) -> LaneFigures:
+        """These figures with those of m ships, by their `numbers` (m,), from `others`; `doubtful` is not changed."""
+        figures = {name: values.copy() for name, values in self.figures.items()}
+        for name in figures | dict(others.figures):
+            values = figures.setdefault(name, np.full(len(self.fine), np.nan))
+            values[numbers] = others.figures.get(name, np.nan)
+        states, fine, left = self.states.copy(), self.fine.copy(), self.left_s.copy()
+        states[numbers], fine[numbers], left[numbers] = others.states, others.fine, others.left_s
+        return LaneFigures(figures, states, fine, left, self.doubtful)
 
 
 def runs_in_lanes(manoeuvre: Manoeuvre) -> bool:
@@ -116,6 +135,7 @@ class LaneManoeuvres:
         duration_s: float | None = None,
         times: Sequence[float] | Array = (),
         inputs: Mapping[str, float] | None = None,
+        step_factor: int = 1,
     ) -> LaneFigures:
         """Figures of ships with parameters `p` (n, np), and their states at `times`.
 
@@ -131,6 +151,9 @@ class LaneManoeuvres:
             Times at which states are kept, s.
         inputs : mapping, optional
             Values in place of the model's, by name.
+        step_factor : int
+            Length of an integration step over the model's. Ships that are `doubtful` with longer steps than the
+            model's are run again with these.
         """
         u = self.model.input_values(inputs)
         p = np.ascontiguousarray(p, dtype=float)
@@ -138,7 +161,7 @@ class LaneManoeuvres:
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
         ends = self._longest * ship_times if duration_s is None else np.full(len(p), duration_s)
-        plan = _plan(manoeuvre, u, times, timed=duration_s is not None)
+        plan = replace(_plan(manoeuvre, u, times, timed=duration_s is not None), step_factor=step_factor)
         side = math.copysign(1.0, manoeuvre.rudder)
         heading = starts[:, [self.model.state_names.index("motion.psi")]]
         if isinstance(manoeuvre, Turn):
@@ -156,7 +179,13 @@ class LaneManoeuvres:
             fine[number], left[number] = self._by_itself((manoeuvre, duration_s, inputs), p[number], figures, number)
         for values in figures.values():
             values[~fine] = np.nan
-        return LaneFigures(figures, found.states, fine, left)
+        doubtful = np.isfinite(left) | np.any([np.isnan(values) for values in figures.values()], axis=0)
+        if isinstance(manoeuvre, Turn):
+            doubtful |= self._unsteadiness(found) >= NEAR_STEADY * STEADY_SHARE
+        runs = LaneFigures(figures, found.states, fine, left, doubtful)
+        if step_factor == 1 or not doubtful.any():
+            return runs
+        return runs.replaced(np.flatnonzero(doubtful), self.run(manoeuvre, p[doubtful], duration_s, times, inputs))
 
     def _by_itself(
         self,
@@ -206,10 +235,8 @@ class LaneManoeuvres:
         (quarter, advance, transfer), (half, _, tactical) = places
         speed, rate = found.speeds[:, 3], self._column(found.last, "motion.r")
         drift = self._reading("motion.beta", found.last, np.full(len(p), turn.rudder), others)
+        steady = np.isfinite(half) & (self._unsteadiness(found) < STEADY_SHARE)
         with np.errstate(invalid="ignore", divide="ignore"):
-            steady = np.isfinite(half)
-            for now, then in ((rate, found.then[:, 0]), (speed, found.then[:, 1])):
-                steady &= np.abs(now - then) < STEADY_SHARE * np.abs(now)
             at_last = {
                 "steady_diameter_m": 2 * speed / np.abs(rate),
                 "steady_drift_deg": np.degrees(drift),
@@ -226,6 +253,13 @@ class LaneManoeuvres:
             "time_90_s": quarter,
             "time_180_s": half,
         } | {name: np.where(steady, values, np.nan) for name, values in at_last.items()}
+
+    def _unsteadiness(self, found: LaneResults) -> Array:
+        """Larger relative change (n,) of yaw rate and speed over the last two lengths; nan without them."""
+        now = np.column_stack([self._column(found.last, "motion.r"), found.speeds[:, 3]])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            changes: Array = np.max(np.abs(now - found.then) / np.abs(now), axis=1)
+        return changes
 
     def _zigzag(
         self, found: LaneResults, others: tuple[Array, Array], starts: Array, asked: tuple[Zigzag, int]

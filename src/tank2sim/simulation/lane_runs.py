@@ -305,6 +305,8 @@ class LanePlan:
         Inputs of the model; the rudder order among them is not used.
     times : array (m,)
         Times at which states are kept, s, rising.
+    step_factor : int
+        Length of an integration step over the model's.
     """
 
     orders: tuple[float, float]
@@ -314,6 +316,7 @@ class LanePlan:
     most: int
     inputs: Array
     times: Sequence[float] | Array = ()
+    step_factor: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,7 +416,7 @@ class LaneRunner:
         lengths = p[:, model.parameter_names.index("ship.length")]
         numbers = [np.ascontiguousarray(values, dtype=float) for values in (p, starts, ends, levels, lengths)]
         asked = _Plan(
-            model.step_s,
+            plan.step_factor * model.step_s,
             first,
             second,
             plan.heading,

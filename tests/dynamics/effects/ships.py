@@ -22,6 +22,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "wind_field": {"speed_mps": 10.0, "direction_deg": 40.0},
     "wave_drift": {"height_m": 2.0, "direction_deg": 40.0},
     "bank_suction": {"Y_prime": 1e-4, "N_prime": -3e-5},
+    "bank": {"port_distance_m": 1e4, "starboard_distance_m": 150.0},
     "propeller_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},
     "propeller_walk": {"Y_prime": -1e-4, "N_prime": 5e-5},
     "loading_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},

@@ -123,7 +123,7 @@ ODD = [
     "sway_yaw_coupling", "turning_drag", "added_yaw_inertia", "linear_yaw_damping", "linear_sway_damping",
     "shallow_water", "hull_fouling", "engine_droop", "flow_memory", "roll_coupling", "trim", "hump_resistance",
 ]  # fmt: skip
-EVEN = ["propeller_side_force", "bank_suction", "asymmetric_turning", "loading_side_force"]
+EVEN = ["propeller_side_force", "bank_suction", "bank", "asymmetric_turning", "loading_side_force"]
 SYMMETRIC = mariner_text(
     **{name: f"{name} = 0.0" for name in ("Y0", "Y0u", "Y0uu", "N0", "N0u", "N0uu")},
     speed_scale='speed_scale = "nominal"',

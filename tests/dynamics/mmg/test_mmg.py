@@ -267,3 +267,58 @@ def test_steady_turns_are_found_to_both_sides_of_the_kink(ship: t2s.Ship) -> Non
 def test_criterion_of_straight_line_stability_is_that_of_the_linear_equivalent(ship: t2s.Ship) -> None:
     """C' of the KVLCC2 on the side of gamma_R_minus: -0.0031 in Prime II."""
     assert ship.stability().to_dict()["margins"]["C_prime"] * (7 / 0.46) ** 2 == pytest.approx(-0.0031, abs=5e-5)
+
+
+CURVE = "q_0 = 0.0312\nq_1 = -0.0208\nq_2 = -0.0149\n"
+
+
+@pytest.mark.parametrize(("n_rps", "u"), [(10.0, 1.1), (4.0, 1.1), (0.0, 0.9), (12.0, -0.3)])
+def test_torque_and_power_are_those_of_the_open_water_curve(ship: t2s.Ship, n_rps: float, u: float) -> None:
+    card = changed_mmg(ship, ("[propeller]\n", f"[propeller]\n{CURVE}eta_R = 1.03\n"))
+    torque, power, thrust = Forces(build(card), "propeller.torque", "propeller.power", "propeller.thrust").at(
+        n_rps=n_rps, u=u, v=0.0, r=0.0
+    )
+    diameter, u_P = card.ship.propeller_diameter_m, u * (1 - card.propeller.w_P0 if u > 0 else 1)
+    density = card.environment.water_density_kgpm3
+    if n_rps:
+        J = u_P / n_rps / diameter
+        sign = 1 if J > 0 else -1  # J^2 has the sign of the inflow
+        K_Q = 0.0312 - 0.0208 * J - 0.0149 * sign * J**2
+        assert torque == pytest.approx(density * n_rps**2 * diameter**5 * K_Q / 1.03, rel=1e-9)
+        assert torque > 0 or J > 0.8
+    else:
+        assert torque < 0 > thrust  # the flow turns a propeller that is held
+    assert power == pytest.approx(2 * math.pi * n_rps * torque, rel=1e-9, abs=1e-9)
+
+
+def test_reversed_revolutions_take_power_too(ship: t2s.Ship) -> None:
+    card = changed_mmg(ship, ("[propeller]\n", f"[propeller]\n{CURVE}"))
+    torque, power = Forces(build(card), "propeller.torque", "propeller.power").at(n_rps=-8.0, u=0.0, v=0.0, r=0.0)
+    expected = -card.propeller.astern * card.environment.water_density_kgpm3 * 64.0 * 0.0312
+    assert torque == pytest.approx(expected * card.ship.propeller_diameter_m**5, rel=1e-9)
+    assert power == pytest.approx(2 * math.pi * -8.0 * torque, rel=1e-9) and power > 0
+
+
+def test_outputs_of_torque_are_of_cards_with_its_curve_alone(ship: t2s.Ship) -> None:
+    assert "propeller.torque" not in ship.model
+    model = build(changed_mmg(ship, ("[propeller]\n", f"[propeller]\n{CURVE}")))
+    assert {"propeller.torque", "propeller.power"} <= set(model.outputs)
+    assert model["propeller.power"].unit == "W" and model["propeller.torque"].unit == "N.m"
+    table = "J = [0.0, 0.4, 0.8]\nK_T = [0.2931, 0.16082, -0.01578]\nK_Q = [0.0312, 0.020496, 0.005024]\n"
+    text = ship.card.text
+    lines = [line for line in text.splitlines() if not line.startswith(("k_0", "k_1", "k_2"))]
+    card = parse_card("\n".join(lines).replace("[propeller]", f"[propeller]\n{table}", 1), "table.toml")
+    assert isinstance(card, MmgCard)
+    assert [card.propeller.q_0, card.propeller.q_1, card.propeller.q_2] == pytest.approx([0.0312, -0.0208, -0.0149])
+    assert card.propeller.eta_R == 1.0
+
+
+@pytest.mark.parametrize(
+    ("given", "place"),
+    [("q_0 = 0.03\nq_1 = -0.02\n", "propeller.q_2"), ("eta_R = 1.0\n", "propeller.eta_R"),
+     ("K_Q = [0.03, 0.02, 0.01]\n", "propeller.J"), (f"{CURVE}K_Q = [0.03]\n", "propeller.K_Q")],
+)  # fmt: skip
+def test_an_incomplete_torque_curve_is_refused(ship: t2s.Ship, given: str, place: str) -> None:
+    with pytest.raises(t2s.InputError) as caught:
+        changed_mmg(ship, ("[propeller]\n", f"[propeller]\n{given}"))
+    assert caught.value.place == place

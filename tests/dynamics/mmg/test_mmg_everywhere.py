@@ -21,7 +21,7 @@ from tank2sim.errors import InputError
 from tank2sim.gap.outcome.improve_card import add_effects_to_card
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
-SIZES = {"start_s": 1.0, "reversal_s": 4.0, "time_constant_s": 2.0, "depth_m": 1.5}
+SIZES = {"start_s": 1.0, "reversal_s": 4.0, "time_constant_s": 2.0, "depth_m": 1.5, "port_distance_m": 3.0}
 
 
 def ship_of(text: str) -> t2s.Ship:
@@ -37,7 +37,7 @@ def test_every_effect_acts_on_an_mmg_ship_or_is_refused_in_one_line(name: str) -
     for parameter in effect.parameters:
         if parameter.default is None:
             typical = parameter.typical_values(card)
-            values[parameter.name] = typical[0] if typical else SIZES[parameter.name]
+            values[parameter.name] = SIZES[parameter.name] if parameter.name in SIZES else typical[0]
     changed = replace(card, effects=(EffectEntry(name=name, parameters=values),))
     if effect.in_mmg:
         with pytest.raises(InputError, match=name):

@@ -369,7 +369,11 @@ def test_torque_gives_the_relative_rotative_efficiency_and_leaves_the_ship_as_it
     plain = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, seed=3))
     result = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, seed=3, torque=True))
     assert result.coefficients["w_P0"].standard_error < plain.coefficients["w_P0"].standard_error
-    assert set(result.card.covariance.names) == set(plain.card.covariance.names)
+    of_torque = {f"propeller.{name}" for name in TORQUE}
+    assert set(result.card.covariance.names) - of_torque == set(plain.card.covariance.names)
+    written = t2s.Ship(result.card)
+    assert written.card.propeller.eta_R == pytest.approx(result.coefficients["eta_R"].value, rel=1e-4)
+    assert "propeller.power" in written.model.outputs and "propeller.power" not in t2s.Ship(plain.card).model.outputs
     assert result.content()["readings"]["Q"]["unit"] == "N.m"
     for name in ("Yv", "Nr", "t_P", "eps"):
         apart = abs(result.coefficients[name].value - plain.coefficients[name].value)

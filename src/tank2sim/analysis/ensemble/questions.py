@@ -98,12 +98,17 @@ class ShipText:
 
 @dataclass(frozen=True, eq=False)
 class OfManoeuvre:
-    """Figures of a manoeuvre, and :func:`signals_with_bands` at `times` (n,), s."""
+    """Figures of a manoeuvre, and :func:`signals_with_bands` at `times` (n,), s.
+
+    Members whose histories are not kept are integrated, in lanes, with `step_factor` times the model's step
+    (:func:`tank2sim.analysis.ensemble.steps.largest_step_factor`).
+    """
 
     ship: ShipText
     manoeuvre: Manoeuvre
     duration_s: float | None
     times: Array
+    step_factor: int = 1
 
     @property
     def batch(self) -> int:
@@ -114,7 +119,7 @@ class OfManoeuvre:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = study_model(self.ship.card())
         signals = {name for name, _ in signals_with_bands(model).values()}
-        lanes = _lanes_of(model) if runs_in_lanes(self.manoeuvre) and signals <= set(model.state_names) else None
+        lanes = lanes_of(model) if runs_in_lanes(self.manoeuvre) and signals <= set(model.state_names) else None
         if lanes is not None:
             return AskTogether(self._in_lanes(model, lanes))
         return _each(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
@@ -135,22 +140,24 @@ class OfManoeuvre:
 
         return ask
 
-    def _in_lanes(self, model: Model, lanes: LaneManoeuvres) -> Callable[[int, Mapping[str, Array], bool], BatchResult]:
+    def _in_lanes(self, model: Model, lanes: LaneManoeuvres) -> Callable[[int, Mapping[str, Array], int], BatchResult]:
         """Joint runs of the members of a batch."""
         assert isinstance(self.manoeuvre, Turn | Zigzag)
         signals = signals_with_bands(model).values()
         manoeuvre, rows = self.manoeuvre, [model.state_names.index(name) for name, _ in signals]
         factors = np.array([factor for _, factor in signals])
 
-        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
-            p, troubles = _ships(model, count, values)
-            found = lanes.run(manoeuvre, p, self.duration_s, self.times if kept else ())
-            troubles = _with_runaways(troubles, found.fine)
-            answer = _usable(dict(found.figures), troubles)
+        def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
+            p, troubles = ships_of(model, count, values)
+            runs = [lanes.run(manoeuvre, p[:kept], self.duration_s, self.times)] if kept else []
+            if kept < count:
+                runs.append(lanes.run(manoeuvre, p[kept:], self.duration_s, step_factor=self.step_factor))
+            troubles = _with_runaways(troubles, np.concatenate([part.fine for part in runs]))
+            answer = _usable(_joined([(part.figures, len(part.fine)) for part in runs]), troubles)
             if not kept:
                 return answer
-            histories = (found.states[:, :, rows] * factors).transpose(0, 2, 1).astype(np.float32)
-            histories[[bool(trouble) for trouble in troubles]] = np.nan
+            histories = (runs[0].states[:, :, rows] * factors).transpose(0, 2, 1).astype(np.float32)
+            histories[[bool(trouble) for trouble in troubles[:kept]]] = np.nan
             return answer._replace(histories=histories)
 
         return ask
@@ -172,7 +179,7 @@ class OfFigures:
 
         card, asked = self.ship.card(), [parse_figure(text) for text in self.figures]
         study = Study(card, asked)
-        lanes = _lanes_of(study.model) if any(_lane_figure(figure) for figure in asked) else None
+        lanes = lanes_of(study.model) if any(_lane_figure(figure) for figure in asked) else None
         joint = [figure for figure in asked if lanes and _lane_figure(figure)]
         single = [figure for figure in asked if figure not in joint]
         one_by_one = Study(card, single) if joint and single else study
@@ -188,8 +195,8 @@ class OfFigures:
                 return MemberResult({}, trouble=error.problem)
             return MemberResult(dict(zip([figure.text for figure in one_by_one.figures], found.tolist(), strict=True)))
 
-        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
-            p, troubles = _ships(study.model, count, values)
+        def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
+            p, troubles = ships_of(study.model, count, values)
             found: dict[str, Array] = {}
             for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in joint):
                 assert lanes is not None and manoeuvre is not None
@@ -240,14 +247,14 @@ class OfCriteria:
                 figures[criterion.name + BEYOND_CARD_MARK] = float(criterion.beyond_card)
             return MemberResult(figures)
 
-        lanes = _lanes_of(whole)
+        lanes = lanes_of(whole)
         if lanes is None:
             return _each(ask_one)
         trials = manoeuvring_trials(largest_trial_rudder(parameters))
 
-        def ask(count: int, values: Mapping[str, Array], kept: bool) -> BatchResult:
+        def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
             members = _members_of(count, values)
-            p, troubles = _ships(model, count, values)
+            p, troubles = ships_of(model, count, values)
             stops = values.get("steering.max_angle", np.zeros(0))
             rudders = {largest_trial_rudder({"steering.max_angle": stop}) for stop in stops.tolist()}
             if rudders - {largest_trial_rudder(parameters)}:  # the gear's stops are uncertain
@@ -272,7 +279,8 @@ class OfCriteria:
         return AskTogether(ask)
 
 
-def _lanes_of(model: Model) -> LaneManoeuvres | None:
+def lanes_of(model: Model) -> LaneManoeuvres | None:
+    """Runs of a model in lanes; None if it has none."""
     try:
         return LaneManoeuvres(model)
     except NoLanesError:
@@ -293,6 +301,14 @@ def _members_of(count: int, values: Mapping[str, Array]) -> list[dict[str, float
     return [dict(zip(values, row, strict=True)) for row in zip(*columns, strict=True)] if columns else [{}] * count
 
 
+def _joined(parts: Sequence[tuple[Mapping[str, Array], int]]) -> dict[str, Array]:
+    """Figures of ships one part after the other, from those of each part with its number of ships."""
+    names = dict.fromkeys(name for figures, _ in parts for name in figures)
+    return {
+        name: np.concatenate([figures.get(name, np.full(count, np.nan)) for figures, count in parts]) for name in names
+    }
+
+
 def _usable(figures: dict[str, Array], troubles: Sequence[str]) -> BatchResult:
     """The figures of a batch, nan for unusable members."""
     bad = [number for number, trouble in enumerate(troubles) if trouble]
@@ -301,7 +317,7 @@ def _usable(figures: dict[str, Array], troubles: Sequence[str]) -> BatchResult:
     return BatchResult(figures, None, troubles)
 
 
-def _ships(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Array, list[str]]:
+def ships_of(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Array, list[str]]:
     """Parameters (n, np) of n members with `values` (n,) by name, without those that the model lacks; and the fault of
     the mass matrix of each, empty without one."""
     p = np.tile(model.parameter_values(), (count, 1))

@@ -19,6 +19,7 @@ from tank2sim.analysis.ensemble.questions import (
     signals_with_bands,
 )
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
+from tank2sim.analysis.ensemble.steps import STEP_TOLERANCE, TRIED_MEMBERS, largest_step_factor
 from tank2sim.analysis.ensemble.tails import Tail, tails
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
@@ -77,18 +78,24 @@ class Members:
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvreBands:
-    """Bands of a manoeuvre: of its figures, of signals at `times_s` (n,), and of the track."""
+    """Bands of a manoeuvre: of its figures, of signals at `times_s` (n,), and of the track.
+
+    `steps_s` are the integration steps of the first :data:`tank2sim.simulation.ensemble.KEPT` members, whose histories
+    are kept, and of all later ones.
+    """
 
     asked: Members
     figures: Mapping[str, Band]
     times_s: Array
     histories: Mapping[str, BandOverTime]
     track: TrackBand | None
+    steps_s: tuple[float, float]
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
         return {
             **self.asked.as_json(),
+            "steps_s": self.steps_s,
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "t_s": self.times_s,
             "histories": {name: band.as_json() for name, band in self.histories.items()},
@@ -223,10 +230,18 @@ def manoeuvre_bands(
     draws, notices = draws_of(card, request.seed)
     times = np.linspace(0.0, run_s[1], TIMES)
     question = OfManoeuvre(ShipText.of(card), manoeuvre, run_s[0], times)
-    found = ensemble(question, draws, request.members, executor)
+    model = build(card)
     if request.members > KEPT:
         notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
-    shown, histories, track = history_bands(found, times, tuple(signals_with_bands(build(card))))
+        question = replace(question, step_factor=largest_step_factor(question, draws))
+    steps = model.step_s, question.step_factor * model.step_s
+    if question.step_factor > 1:
+        notices.append(
+            f"integration steps are {steps[0]:.3g} s for the first {KEPT} members and {steps[1]:.3g} s for the others: "
+            f"no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
+        )
+    found = ensemble(question, draws, request.members, executor)
+    shown, histories, track = history_bands(found, times, tuple(signals_with_bands(model)))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
@@ -234,7 +249,7 @@ def manoeuvre_bands(
         last = shown[track.count - 1]
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it")
-    return ManoeuvreBands(_members(found, notices), figure_bands(found), shown, histories, track)
+    return ManoeuvreBands(_members(found, notices), figure_bands(found), shown, histories, track, steps)
 
 
 def stability_bands(

@@ -1,6 +1,7 @@
 """Physical effects on top of the polynomial: each a function from model to model."""
 
 from tank2sim.dynamics.effects import (
+    banks,
     depth,
     derivatives,
     dynamic_effects,
@@ -27,6 +28,7 @@ EFFECTS: Registry[Effect] = Registry(
         fields.WIND_FIELD,
         surroundings.WAVE_DRIFT,
         surroundings.BANK_SUCTION,
+        banks.BANK,
         propeller.PROPELLER_SIDE_FORCE,
         propeller.PROPELLER_WALK,
         propeller.LOADING_SIDE_FORCE,

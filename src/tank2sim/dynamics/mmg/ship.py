@@ -21,7 +21,13 @@ from tank2sim.cards.card import MmgCard
 from tank2sim.dynamics.hull import Hull, force_quantities, prime_motion, rudder_quantities
 from tank2sim.dynamics.low_speed import STILL_SPEED
 from tank2sim.dynamics.mmg.hull import bare_hull_forces, inertial_forces_with_water
-from tank2sim.dynamics.mmg.propeller import propeller_inflow, thrust_over_density, wake_by_polynomial, wake_ratio
+from tank2sim.dynamics.mmg.propeller import (
+    propeller_inflow,
+    thrust_over_density,
+    torque_over_density,
+    wake_by_polynomial,
+    wake_ratio,
+)
 from tank2sim.dynamics.mmg.rudder import (
     cross_flow_by_polynomial,
     normal_force,
@@ -45,6 +51,10 @@ DESCRIPTIONS: dict[str, str] = {
     "C_Pv": "Coefficient of v' in that change, over tau",
     "C_Pr": "Coefficient of r' in that change, over tau",
     "astern": "Thrust at rest with reversed revolutions over that ahead",
+    "q_0": "K_Q at J = 0",
+    "q_1": "Coefficient of J in K_Q",
+    "q_2": "Coefficient of J^2 in K_Q",
+    "eta_R": "Relative rotative efficiency: torque in open water over that behind the hull",
     "f_alpha": "Slope of the rudder's normal force by angle, on 1/2 rho A_R U_R^2",
     "t_R": "Steering resistance deduction",
     "a_H": "Force on the hull by the rudder over that of the rudder",
@@ -180,14 +190,18 @@ class MmgShip:
 
 
 def mmg_forces(ship: MmgShip) -> tuple[Quantity, ...]:
-    """Flow, thrust and normal force of each side, ``rudder.*``, ``propeller.X``, ``propeller.N`` and ``force.*``."""
+    """Quantities of each side (flow, thrust, normal force, and torque of a card with K_Q), ``propeller.power``,
+    ``rudder.*``, ``propeller.X``, ``propeller.N`` and ``force.*``."""
     hull = ship.hull
     found: list[Quantity] = []
+    power = ca.SX(0)
     X_P, N_P = ca.SX(0), ca.SX(0)
     X_R, Y_R, N_R = ca.SX(0), ca.SX(0), ca.SX(0)
     for side in ship.sides:
         quantities, thrust, F_N = _side_quantities(ship, side)
         found += quantities
+        for torque in (quantity for quantity in quantities if quantity.name.startswith("propeller.torque")):
+            power = power + hull["propeller.speed_actual"] * torque.symbol
         push = (1 - ship.p["t_P"]) * thrust
         X, Y, N = rudder_forces_of(ship.p, hull["ship.length"], F_N, hull["rudder.effective"])
         X_P, N_P = X_P + push, N_P - side.y_P * hull["ship.length"] * push
@@ -197,6 +211,9 @@ def mmg_forces(ship: MmgShip) -> tuple[Quantity, ...]:
         Quantity(name="propeller.X", unit="N", description="Surge force by propellers, positive forward", value=X_P),
         Quantity(name="propeller.N", unit="N.m", description="Yaw moment by propellers, + to starboard", value=N_P),
     )
+    if "q_0" in ship.p:
+        description = "Power delivered to the propellers"
+        found.append(Quantity(name="propeller.power", unit="W", description=description, nominal=1e6, value=power))
     bare, inertial = bare_hull_forces(hull), inertial_forces_with_water(hull)
     X, Y, N = (a + b + c.symbol for a, b, c in zip(bare, inertial, by_rudder, strict=True))
     forces = X + by_propeller[0].symbol, Y, N + by_propeller[1].symbol
@@ -262,4 +279,8 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
             ship.still,
         ),
     )
-    return [u_P, thrust, u_R, v_R, F_N], thrust.symbol, F_N.symbol
+    flow = [u_P, thrust, u_R, v_R, F_N]
+    if "q_0" in p:
+        value = density * torque_over_density(p, diameter, n, u_P.symbol)
+        flow.append(quantity("propeller.torque", "N.m", "Torque that turns the propeller, positive ahead", value))
+    return flow, thrust.symbol, F_N.symbol

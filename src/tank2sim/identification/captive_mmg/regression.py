@@ -27,10 +27,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import MmgCard
+from tank2sim.cards.card import TORQUE_COEFFICIENTS, MmgCard
 from tank2sim.cards.mmg import open_water_fit
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
+from tank2sim.dynamics.mmg.propeller import torque_over_density
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses, tested_card
@@ -66,8 +67,6 @@ _LIMITS: dict[str, tuple[float, float]] = {
 }
 """Limits in which a coefficient is looked for. Project choice: beyond them it is not that of a ship; the regression
 would otherwise fit a normal force of the other sign by eps < 0."""
-OF_TORQUE = ("q_0", "q_1", "q_2", "eta_R")
-"""Coefficients of K_Q in open water, and the relative rotative efficiency; a card does not have them."""
 OPEN = 0.7
 """Standard error over that of ordinary ships from which a coefficient is called open. Project choice: the tests then
 halve the variance at best."""
@@ -230,7 +229,7 @@ def _fitted_names(tests: SteadyTests) -> tuple[list[str], tuple[str, ...]]:
             hull.append(name)
     turning = ("l_R", "Xudot", "Yvdot")
     others = [name for name in (*ORDINARY, "Xudot", "Yvdot") if name not in turning or np.any(r)]
-    torque = OF_TORQUE if TORQUE in tests.channels else ()
+    torque = TORQUE_COEFFICIENTS if TORQUE in tests.channels else ()
     return ["k_0", "k_1", "k_2", *others, *hull, *torque, "rudder_offset"], tuple(missing)
 
 
@@ -282,12 +281,11 @@ def computed_readings(model: Model, names: Sequence[str], units: Array, channels
     found = ca.Function("forces", [model.x, model.u, model.p], [quantities])(states, inputs, parameters)
     forces = found[:-1]
     if "eta_R" in names:
-        q_0, q_1, q_2, eta_R = (theta[names.index(name)] for name in OF_TORQUE)
+        curve = {name: theta[names.index(name)] for name in TORQUE_COEFFICIENTS} | {"astern": 0.0}
         of_ship = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
         density, diameter = of_ship["ship.water_density"], of_ship["ship.propeller_diameter"]
-        n, u_P = motion[4] / (2 * ca.pi), found[-1]
-        K_Q = q_0 * (n * diameter) ** 2 + q_1 * n * diameter * u_P + q_2 * u_P**2  # times (n D)^2
-        forces = ca.vertcat(forces, density * diameter**3 * K_Q / eta_R)
+        torque = density * torque_over_density(curve, ca.SX(diameter), motion[4] / (2 * ca.pi), found[-1])
+        forces = ca.vertcat(forces, torque)
     return ca.Function("readings", [motion, theta], [forces, ca.jacobian(forces, theta)])
 
 

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.cards.card import TORQUE_COEFFICIENTS, ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import read_covariance
 from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
@@ -163,7 +163,8 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
 
     Every derivative that the card has (with a value or an uncertainty) except for accelerations, unless `inertia`
     requests them: motion alone does not determine a mass and a force. Every parameter of the card's effects that is
-    not an input. Every coefficient of an MMG propeller or rudder whose standard error the card states.
+    not an input. Every coefficient of an MMG propeller or rudder whose standard error the card states, except for those
+    of the torque alone.
     """
     free = {}
     for name in {**card.derivatives, **card.uncertainty}:
@@ -174,7 +175,7 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
             free[f"derivatives.{name}"] = card.derivatives.get(name, 0.0), error
     if isinstance(card, MmgCard):
         for key, error in card.interaction_errors.items():
-            if error > 0:
+            if error > 0 and key not in TORQUE_COEFFICIENTS:
                 free[f"mmg.{key}"] = card.interaction(key), error
     for entry in card.effects:
         effect = EFFECTS[entry.name]

@@ -1,0 +1,117 @@
+"""Banks alongside: by hand, and against the tests of Lataire, Vantorre and Eloot (2009)."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tank2sim.dynamics.effects.banks import FAR_M, SQUAT_BY_BANK, SQUAT_BY_PROPELLER, SWAY, YAW, mean_nearness
+from tank2sim.errors import InputError
+
+from .ships import N0, RHO, U0, B, L, T, added_forces, mariner_text, ship, state, values
+
+AT_WORK = {"propeller.speed": N0}
+STOPPED = {"propeller.speed": 0.0}
+AHEAD = {**state(6.0, 0.0, 0.0), **AT_WORK}
+
+
+def bank(port: float = FAR_M, starboard: float = FAR_M, **more: float) -> dict[str, float]:
+    return {"port_distance_m": port, "starboard_distance_m": starboard, **more}
+
+
+def test_a_wall_to_starboard_draws_the_ship_and_turns_its_bow_away() -> None:
+    nearness = B / 2 * (1 / (40.0 + B / 2) - 1 / (FAR_M + B / 2))
+    scale = 0.5 * RHO * L * T * 6.0**2 * nearness
+    found = added_forces("bank", bank(starboard=40.0), AHEAD)
+    np.testing.assert_allclose(found, [0.0, scale * SWAY, -scale * L * YAW], rtol=1e-9)
+    assert found[1] > 0 > found[2]
+
+
+def test_banks_at_equal_distances_cancel_and_mirrored_ones_mirror_the_force() -> None:
+    np.testing.assert_allclose(added_forces("bank", bank(30.0, 30.0), AHEAD), 0.0, atol=1e-6)
+    near, mirrored = (added_forces("bank", bank(*sides), AHEAD) for sides in ((80.0, 25.0), (25.0, 80.0)))
+    np.testing.assert_allclose(mirrored, -near, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1e-4, 1.5, 4.0])
+def test_a_sloping_bank_counts_by_the_mean_of_its_nearness_over_the_draught(slope: float) -> None:
+    height = (np.arange(20_000) + 0.5) / 20_000 * T - T / 2
+    y = 35.0 + B / 2 + slope * height
+    expected = np.mean(1 / y)
+    x = ca.SX.sym("x")
+    found = ca.Function("f", [x], [mean_nearness(x, ca.SX(slope * T / 2))])(35.0 + B / 2)
+    assert float(found) == pytest.approx(expected, rel=1e-7)
+    wall, sloping = (added_forces("bank", bank(starboard=35.0, slope=one), AHEAD)[1] for one in (0.0, slope))
+    far = 1 / (FAR_M + B / 2)
+    assert sloping / wall == pytest.approx((expected - far) / (1 / (35.0 + B / 2) - far), rel=1e-5)
+
+
+def test_a_stopped_propeller_lets_the_ship_be_pushed_away_near_the_bottom_alone() -> None:
+    model_at = {"bank": bank(starboard=20.0), "finite_depth": {"depth_m": 1.1 * T, "resistance": 0.0}}
+    ordered = {name: model_at[name] for name in ("finite_depth", "bank")}
+    shallow, bare = ship(ordered), ship({"finite_depth": model_at["finite_depth"]})
+    moving = {**state(5.0, 0.0, 0.0), **STOPPED}
+    names = ["force.Y", "force.N"]
+    Y, N = values(shallow, names, moving) - values(bare, names, moving)
+    deep_Y, deep_N = added_forces("bank", model_at["bank"], moving)[1:]
+    assert Y < 0 < deep_Y and N < deep_N < 0
+    working_Y, working_N = added_forces("bank", model_at["bank"], {**moving, **AT_WORK})[1:]
+    assert working_Y > deep_Y and working_N < deep_N
+
+
+def test_nothing_is_felt_at_rest_and_going_astern() -> None:
+    for u in (0.0, -3.0):
+        np.testing.assert_allclose(
+            added_forces("bank", bank(starboard=20.0), {**state(u, 0.0, 0.0), **STOPPED}), 0.0, atol=1e-6
+        )
+
+
+def test_a_bank_and_a_propeller_at_work_add_squat_and_take_from_the_water_under_the_keel() -> None:
+    depth, u = 1.5 * T, 5.0
+    effects = {"finite_depth": {"depth_m": depth}, "bank": bank(FAR_M, 20.0)}
+    names = ["squat.bank", "water.under_keel_clearance", "squat.icorels", "squat.barrass"]
+    nearness = B / 2 * (1 / (20.0 + B / 2) - 1 / (FAR_M + B / 2))
+    for order, propeller in ((AT_WORK, SQUAT_BY_PROPELLER), (STOPPED, 0.0)):
+        squat, clearance, icorels, barrass = values(ship(effects), names, {**state(u, 0.0, 0.0), **order})
+        assert squat == pytest.approx(icorels * (1 + SQUAT_BY_BANK * nearness + propeller), rel=1e-9)
+        assert clearance == pytest.approx(depth - T - max(squat, icorels, barrass), rel=1e-9)
+
+
+def test_validity_falls_nearer_than_was_measured_and_a_negative_distance_is_refused() -> None:
+    model = ship({"bank": bank(starboard=40.0)})
+    inside, near = (
+        values(model, ["validity_by.bank"], {**state(U0, 0.0, 0.0), "bank.starboard_distance": distance})[0]
+        for distance in (40.0, 8.0)
+    )
+    assert inside == 1.0 and near < 0.5
+    with pytest.raises(InputError):
+        model.input_values({"bank.port_distance": -1.0})
+
+
+EQUIVALENT = {"B": (0.536, 3.5), "D": (0.571, 4.575), "E": (1.024, 3.765), "I": (0.681, 3.8), "J": (2.705, 3.765)}
+"""Tests with the propeller at work: distances of walls as near in the mean as the bank, by hand from its shape, and of
+the tank's other side, m."""
+
+
+@pytest.mark.parametrize("name", EQUIVALENT)
+def test_a_container_ship_with_its_propeller_at_work_feels_a_bank_as_measured(name: str, data: Path) -> None:
+    """Moments within 30 %, forces with the measured sign (Lataire, Vantorre and Eloot 2009)."""
+    with (data / "data" / "bank_effects" / "subset2_forces.csv").open() as file:
+        (row,) = (row for row in csv.DictReader(file) if row["test"] == name)
+    side = -1 if row["psi_deg"] == "180.0" else 1  # the bank is to port
+    size = {
+        "length_m": 0.945 * 4.332, "beam_m": 0.530, "draught_m": float(row["draught_m"]), "speed_mps": 0.6,
+        "block_coefficient": 0.65, "projected_area_front_m2": 0.1, "projected_area_side_m2": 0.5,
+        "water_density_kgpm3": 1000.0,
+    }  # fmt: skip
+    text = mariner_text(valid_speed_mps="", **{key: f"{key} = {value}" for key, value in size.items()})
+    near, far = EQUIVALENT[name]
+    sides = (far, near) if side > 0 else (near, far)
+    _, Y, N = added_forces("bank", bank(*sides), {**state(float(row["u_mps"]), 0.0, 0.0), **AT_WORK}, text)
+    assert pytest.approx(float(row["N_Nm"]), rel=0.30) == N
+    assert math.copysign(1, Y) == math.copysign(1, float(row["Y_N"]))
