@@ -19,11 +19,11 @@ PICTURE = Path(__file__).parent / "static" / "steering_page.png"
 CURRENT = '\n[[effects]]\nname = "current"\nparameters = { speed_mps = 0.8, direction_deg = 90.0 }\n'
 STEERED = """<script>
 const waiting = setInterval(() => {
-  const [follow, finish] = ["follow", "finish"].map((name) => document.getElementById(name));
+  const [trial, finish] = ["trial", "finish"].map((name) => document.getElementById(name));
   if (!finish.disabled) {
     clearInterval(waiting);
     finish.click();
-  } else if (!follow.disabled) follow.click();
+  } else if (!trial.disabled) trial.click();
 }, 300);
 </script>"""
 FLAGS = (

@@ -10,9 +10,12 @@ from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import set_option
 
+DEFAULT_SHIP = "esso-osaka-ship"
+"""Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
+
 
 @click.command("steer")
-@click.argument("card")
+@click.argument("card", default=DEFAULT_SHIP)
 @click.option(
     "-o",
     "--page",
@@ -30,7 +33,10 @@ from tank2sim.cli.options import set_option
 @set_option
 @json_option
 def command(card: str, page: Path, ghost: Path | None, values: dict[str, object], json_file: Path | None) -> None:
-    """Write a page in which CARD (a file, or the name of a bundled ship) can be steered; it needs no network."""
+    """Write a page in which CARD (a file, or the name of a bundled ship; the tanker Esso Osaka without) can be steered.
+
+    It needs no network.
+    """
     from tank2sim.api.steering_page import make_steering_page
 
     ship = load(card, values)

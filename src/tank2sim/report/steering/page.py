@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jinja2
@@ -16,7 +18,16 @@ from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
 from tank2sim.report.kit.page import json_in_html, resource_text
 from tank2sim.report.steering.ghost import Ghost
-from tank2sim.report.steering.ship import NO_WASM_COMPILER, TOKEN, Control, controls, references, shown_in
+from tank2sim.report.steering.members import NO_COVARIANCE
+from tank2sim.report.steering.ship import (
+    NO_WASM_COMPILER,
+    TOKEN,
+    Control,
+    controls,
+    references,
+    shown_in,
+    telegraph_of,
+)
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
@@ -30,7 +41,25 @@ _WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 FASTEST_APPROACH = 2.0
 """Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
 
-_SCRIPTS = ("ship.js", "voyage.js", "pen.js", "track.js", "history.js", "page.js")
+PREDICTED_MINUTES = 3
+"""Minutes ahead that the page predicts at first: amid those that it offers, 1 to 6. Project choice."""
+
+_TURNING = (10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 600.0, 1200.0, 1800.0)
+"""Ends of the dial of the rate of turn, deg/min: round ones, project choice."""
+
+_USUAL_TURNING = 0.5
+"""Yaw rate in ship lengths, r L/u0, that the dial shows at first: a hard turn of most ships. Project choice."""
+
+_DIALS = ("motion.psi", "motion.r", "rudder.angle")
+"""Signals with an instrument of their own."""
+
+_SCRIPTS = tuple(
+    f"{name}.js"
+    for name in (
+        *("ship", "voyage", "trial", "attempt", "helm", "words"),
+        *("pen", "view", "track", "history", "instruments", "telegraph", "gamepad", "page"),
+    )
+)
 _BEAM = 1 / 7
 """Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
 
@@ -48,7 +77,15 @@ _READOUTS = (
 )
 
 
-def steering_page(model: Model, library: str | None, ghost: Ghost | None = None, notices: Sequence[str] = ()) -> str:
+def steering_page(
+    model: Model,
+    library: str | None,
+    ghost: Ghost | None = None,
+    notices: Sequence[str] = (),
+    *,
+    members: Sequence[Mapping[str, float]] = (),
+    autopilot: str = "",
+) -> str:
     """The page as one HTML file.
 
     Parameters
@@ -63,6 +100,11 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         A measured trial.
     notices : sequence of str
         What the user should know.
+    members : sequence of mapping
+        Parameters by name of ships that are steered together with the card's (:mod:`.members`).
+    autopilot : str
+        How the autopilot in the model (:func:`tank2sim.dynamics.autopilot_loop.ship_steered_by_either`) was designed;
+        empty if there is none.
 
     Raises
     ------
@@ -92,22 +134,43 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         engine=engine,
         approach=_approach(model, ghost),
         windows=_windows(model),
+        telegraph=telegraph_of(model),
+        members=len(members),
+        no_members=NO_COVARIANCE,
+        autopilot=autopilot,
+        ahead=PREDICTED_MINUTES,
+        dials=_DIALS,
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
         style=Markup(resource_text("kit/page.css") + resource_text("steering/page.css")),
         script=Markup("\n".join(resource_text(f"steering/{name}") for name in _SCRIPTS)),
-        data=json_in_html(_data(model, library, ghost)),
+        data=json_in_html(_data(model, library, ghost, members)),
     )
 
 
-def _data(model: Model, library: str | None, ghost: Ghost | None) -> dict[str, Any]:
+def _data(
+    model: Model, library: str | None, ghost: Ghost | None, members: Sequence[Mapping[str, float]]
+) -> dict[str, Any]:
+    data = _ship_data(model, library, ghost, members)
+    # Names the ship, the trial and all that moves them: a link with an attempt is of this page alone.
+    return {**data, "id": hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:8]}
+
+
+def _ship_data(
+    model: Model, library: str | None, ghost: Ghost | None, members: Sequence[Mapping[str, float]]
+) -> dict[str, Any]:
     length, speed = _start(model, "ship.length"), _start(model, "ship.speed")
     gear = [math.degrees(parameter.start) for parameter in model.parameters if parameter.name == "steering.max_angle"]
     return {
         "name": model.name,
         "library": library,
         "token": TOKEN,
-        "references": references(interface(model)),
+        "references": references(interface(model), {name for member in members for name in member}),
+        "members": [dict(member) for member in members],
+        "telegraph": [{"name": order.name, "value": order.value} for order in telegraph_of(model)],
+        "turning": _turning(_USUAL_TURNING * speed / length),
+        "largestRudder": _controls(model, ghost)[0].maximum,
+        "speed": speed,
         "step": model.step_s,
         "start": {"initial.u": _start(model, "initial.u")} | dict(ghost.start if ghost else {}),
         "length": length,
@@ -133,6 +196,11 @@ def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
     place = min(range(1, len(_WINDOWS) - 2), key=lambda index: abs(math.log(_WINDOWS[index] / wanted)))
     shown = _WINDOWS[place - 1 : place + 3]
     return [(index, f"{index} s" if index < 120 else f"{index / 60:g} min") for index in shown], _WINDOWS[place]
+
+
+def _turning(usual: float) -> list[float]:
+    """Ends of the dial of the rate of turn, deg/min, from the one that holds a usual rate (rad/s) on."""
+    return [end for end in _TURNING if end >= 60 * math.degrees(usual)] or [_TURNING[-1]]
 
 
 def _series(ghost: Ghost) -> dict[str, list[float | None]]:
