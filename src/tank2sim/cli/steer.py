@@ -30,9 +30,17 @@ DEFAULT_SHIP = "esso-osaka-ship"
     metavar="TRIAL",
     help="A measured trial next to the ship.",
 )
+@click.option("--scenario", metavar="FILE", help="Waters as GeoJSON, or 'channel' or 'basin'.")
 @set_option
 @json_option
-def command(card: str, page: Path, ghost: Path | None, values: dict[str, object], json_file: Path | None) -> None:
+def command(
+    card: str,
+    page: Path,
+    ghost: Path | None,
+    scenario: str | None,
+    values: dict[str, object],
+    json_file: Path | None,
+) -> None:
     """Write a page in which CARD (a file, or the name of a bundled ship; the tanker Esso Osaka without) can be steered.
 
     It needs no network.
@@ -40,6 +48,7 @@ def command(card: str, page: Path, ghost: Path | None, values: dict[str, object]
     from tank2sim.api.steering_page import make_steering_page
 
     ship = load(card, values)
-    result = make_steering_page(ship, ghost, report=screen.print)
-    write_result(result, [Path(ship.card.source), *([ghost] if ghost else [])], json_file=json_file, page=page)
+    result = make_steering_page(ship, ghost, scenario, report=screen.print)
+    inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
+    write_result(result, [Path(ship.card.source), *inputs], json_file=json_file, page=page)
     show_result(result)

@@ -51,7 +51,7 @@ def sailed(html, folder, steps):
     """What the page reported after these steps, and the voyages that it saved."""
     html = html.replace("<body>", "<body>" + FRAMES).replace("</body>", DRIVE.format(steps=steps) + "</body>")
     seen, console = opened(html, folder)
-    assert console == []
+    assert console == [], console
     seen = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
     voyages = []
     for text in seen.pop("saved"):

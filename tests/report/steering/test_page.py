@@ -11,7 +11,7 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
 from tank2sim.report.steering.ghost import ghost_of
-from tank2sim.report.steering.page import steering_page
+from tank2sim.report.steering.page import PageShip, steering_page
 from tank2sim.report.steering.ship import WEB, controls, ship_following_angle, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
@@ -44,7 +44,7 @@ def mariner():
 
 @pytest.fixture(scope="module")
 def page(mariner):
-    return steering_page(mariner, ship_in_page(mariner))
+    return steering_page(PageShip(model=mariner, library=ship_in_page(mariner)))
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def worst(voyage, trajectory):
 
 
 def test_without_the_compiler_the_page_says_what_is_missing(mariner):
-    html = steering_page(mariner, None, None, ["another notice"])
+    html = steering_page(PageShip(model=mariner, library=None), None, ["another notice"])
     assert html.index("pip install tank2sim[platforms]") < html.index("another notice")
     assert "The ship in this page is" not in html
     assert "<canvas" not in html
@@ -85,7 +85,7 @@ def test_without_the_compiler_the_page_says_what_is_missing(mariner):
 
 def test_a_model_without_a_rudder_is_refused():
     with pytest.raises(InputError, match="has no rudder"):
-        steering_page(build(read_card("wilinski-zellman")), None)
+        steering_page(PageShip(model=build(read_card("wilinski-zellman")), library=None))
 
 
 def test_the_rudder_slider_ends_where_the_gear_does_and_shows_degrees(mariner):
@@ -103,7 +103,7 @@ def test_a_ghost_starts_the_ship_where_the_trial_starts(mariner, ghost):
             "initial.rudder_angle": 0,
         }
     )
-    data = data_of(steering_page(mariner, "AA==", ghost))
+    data = data_of(steering_page(PageShip(model=mariner, library="AA=="), ghost))
     assert data["start"]["initial.u"] == 7.5
     assert data["ghost"]["t"] == pytest.approx([0, 1, 2.05, 3, 4])
     assert data["ghost"]["x"][3] is None
@@ -138,7 +138,7 @@ def test_the_mean_wind_of_a_trial_is_that_at_the_start(mariner, pond, tmp_path):
     mean = {"wind.speed": 2.5, "wind.direction": np.arctan2(3, 4)}
     assert ghost.held == pytest.approx(mean)
     assert any("2.5 m/s from 37 deg" in one for one in ghost.notices)
-    data = data_of(steering_page(pond, "AA==", ghost))
+    data = data_of(steering_page(PageShip(model=pond, library="AA=="), ghost))
     assert {one["name"]: one["start"] for one in data["controls"] if one["name"] in mean} == pytest.approx(mean)
     assert ghost_of(read_trial_file(file), mariner).held == {}
 
@@ -151,7 +151,7 @@ def test_what_surrounds_the_ship_has_the_bounds_of_a_card(pond):
 
 
 def test_the_page_fetches_nothing(mariner):
-    html = steering_page(mariner, "AA==")
+    html = steering_page(PageShip(model=mariner, library="AA=="))
     assert not re.search(r"""(src|href)=["'](?!#)""", html)
     assert "default-src 'none'" in html
 
@@ -226,7 +226,7 @@ class TestInABrowser:
         put("set-wind.speed", "1e6", "change"); seen.wind = wind.value; seen.limit = at("said").textContent;
         put("set-wind.speed", "", "change"); seen.kept = wind.value; seen.empty = at("said").textContent;
         click("reset"); click("save");"""
-        reported, (voyage,) = sailed(steering_page(pond, ship_in_page(pond)), tmp_path, steps)
+        reported, (voyage,) = sailed(steering_page(PageShip(model=pond, library=ship_in_page(pond))), tmp_path, steps)
         assert (reported["wheel"], reported["taken"], reported["down"], reported["focus"]) == (False,) * 4
         assert (reported["rudder"], reported["engine"]) == ("midships", "600.0 rpm ahead")
         assert (reported["sailing"], reported["under"]) == ("Stop", "Under way.")
@@ -285,7 +285,7 @@ class TestInABrowser:
         click("zigzag"); click("finish"); click("save");
         put("set-current.speed", "2", "change"); put("set-current.direction", "90", "change");
         click("reset"); click("zigzag"); click("finish"); click("save");"""
-        _, (first, second) = sailed(steering_page(model, ship_in_page(model)), tmp_path, steps)
+        _, (first, second) = sailed(steering_page(PageShip(model=model, library=ship_in_page(model))), tmp_path, steps)
         zigzag = parse_manoeuvre("zigzag:20/20")
         assert worst(first, simulate(model, zigzag).trajectory) < 1e-9
         stream = {"current.speed": 2 * 1852 / 3600, "current.direction": np.pi / 2}
@@ -303,7 +303,9 @@ class TestInABrowser:
         ghost = ghost_of(read_trial_file(file), mariner)
         model = ship_following_angle(mariner)
         steps = "click('trial'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
-        _, (voyage, zigzag) = sailed(steering_page(model, ship_in_page(model), ghost), tmp_path, steps)
+        _, (voyage, zigzag) = sailed(
+            steering_page(PageShip(model=model, library=ship_in_page(model)), ghost), tmp_path, steps
+        )
         last = np.flatnonzero(voyage["t_s"] <= run.t[-1] + 1e-4)[-1]
         assert voyage["t_s"][last] == pytest.approx(run.t[-1], abs=1e-4)
         assert np.interp(run.t, voyage["t_s"], voyage["delta_deg"]) == pytest.approx(columns["delta_deg"], abs=1e-4)
@@ -315,7 +317,9 @@ class TestInABrowser:
     def test_orders_of_a_trial_are_followed_through_the_gear(self, mariner, tmp_path):
         file = tmp_path / "trial.csv"
         file.write_text(TRIAL.replace("delta_deg", "delta_order_deg"), encoding="utf-8")
-        html = steering_page(mariner, ship_in_page(mariner), ghost_of(read_trial_file(file), mariner))
+        html = steering_page(
+            PageShip(model=mariner, library=ship_in_page(mariner)), ghost_of(read_trial_file(file), mariner)
+        )
         _, (voyage,) = sailed(html, tmp_path, "click('trial'); click('finish'); click('save');")
         assert voyage["x_m"][0] == 100
         assert voyage["t_s"][-1] == pytest.approx(4)

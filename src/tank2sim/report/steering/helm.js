@@ -27,6 +27,7 @@ class Helm {
     this.programmeOf = () => []; // orders of the measured trial; the page knows them
     this.attempt = new Attempt();
     this.replayed = null;
+    this.score = data.scenario ? new Score(new Waters(data.scenario, data), data) : null;
   }
 
   get time() { return this.own.time; }
@@ -40,6 +41,7 @@ class Helm {
       member.lost = false;
       member.try((voyage) => voyage.begin(start, orders));
     }
+    this.score?.begin(this.own.ship.get("motion.u"));
     this.attempt = new Attempt(start, orders);
     this.replayed = attempt ? { events: [...attempt.events], end: attempt.end } : null;
     this.#replay();
@@ -72,14 +74,23 @@ class Helm {
     for (const member of this.members) member.try(what);
   }
 
-  // On to the next sample of the ship, and the members after it. Returns what has ended, as the voyage, or "replay".
+  // On to the next sample of the ship, and the members after it. Returns what has ended: as the voyage or the score, or
+  // "replay".
   advance() {
     const ended = this.own.advance();
     for (const member of this.members) member.catchUp(this.own.time);
     this.attempt.end = this.own.time;
-    if (!this.replayed) return ended;
+    const judged = this.#judge();
+    if (!this.replayed) return judged ?? ended;
     this.#replay();
-    return this.replayed ? null : "replay";
+    return this.replayed ? judged : judged ?? "replay";
+  }
+
+  #judge() {
+    if (!this.score) return null;
+    const [x, y, psi, u, v] = Voyage.SIGNALS.map((name) => this.own.samples[name].at(-1));
+    this.score.look(this.time, this.members);
+    return this.score.take(this.time, x, y, psi, Math.hypot(u, v));
   }
 
   // The orders of the replayed attempt that are due now. Times are those of the same samples, to the last digit.

@@ -3,7 +3,8 @@
   const data = JSON.parse(document.getElementById("ship").textContent);
   const find = (name) => document.getElementById(name);
   const view = new View(data.length);
-  const track = new TrackChart(find("track"), data, view);
+  const waters = data.scenario ? new Waters(data.scenario, data) : null;
+  const track = new TrackChart(find("track"), data, view, waters);
   const history = new HistoryChart(find("history"), data, Number(find("stretch").value));
   const tape = new HeadingTape(find("tape"));
   const turning = new Dial(find("turning"), data.turning[0], data.turning);
@@ -46,8 +47,10 @@
     turning.draw(now["motion.r"], null, paper);
     rudderDial.draw(now["rudder.angle"], voyage.orders["rudder.command"] / DEG, paper);
     for (const one of [rudder, engine]) if (one) showOrder(one);
+    if (helm.score) showScore(helm.score);
     telegraph?.show(voyage.orders[engine.name]);
     find("autopilot")?.setAttribute("aria-pressed", String(voyage.course !== null));
+    if (voyage.course !== null && document.activeElement !== find("course")) find("course").value = course(voyage.course);
     for (const mode of ["follow", "whole"]) find(mode).setAttribute("aria-pressed", String(view.mode === mode));
     find("finish").disabled = !voyage.zigzag && voyage.programme.length === 0 && !helm.replayed;
   }
@@ -63,6 +66,16 @@
       predicted = { at: now, places, minutes, time: helm.time, orders: helm.attempt.version };
     }
     return predicted.places;
+  }
+
+  function showScore(score) {
+    find("score-points").textContent = score.points.toFixed(0);
+    find("score-off").textContent = `${score.rms.toFixed(0)} m rms, ${score.most.toFixed(0)} m at most`;
+    find("score-out").textContent = clock(score.out);
+    find("score-buoys").textContent = String(score.buoys.size);
+    find("score-aground").textContent = score.aground ? `${score.aground.by}, ${clock(score.aground.time)}` : "no";
+    find("score-goal").textContent = score.arrived ? `reached, ${clock(score.arrived.time)}` : "not reached";
+    if (find("score-members")) find("score-members").textContent = `${score.lost.size} of ${helm.members.length}`;
   }
 
   function showOrder(one) {
@@ -91,6 +104,7 @@
   }
 
   function start(words) {
+    if (helm.score?.aground) { say(`${judged(helm.score)} Reset to begin again.`); return; }
     sailing = true;
     last = performance.now();
     goal = helm.time;
@@ -106,6 +120,7 @@
     try {
       while (helm.time < until - 1e-9 && performance.now() - begun < most) {
         const what = helm.advance();
+        if (what === "aground" || what === "arrived") return judged(helm.score);
         if (what === "replay") return `The attempt has been replayed, until ${clock(helm.time)}.`;
         if (what && !helm.replayed) return ended(what, own());
       }
@@ -164,8 +179,8 @@
     const wanted = typed(input, "The course", "deg", 0, 360);
     if (wanted === null) return;
     byHand();
-    const to = compass(wanted + change, 1);
-    input.value = course(to * DEG) * 1 === to ? course(to * DEG) : String(to);
+    const to = compass(Math.round(wanted) + change, 0); // a helmsman is given whole degrees
+    input.value = course(to * DEG);
     helm.steer(to * DEG);
     say(`The autopilot steers ${input.value}.`);
     show();

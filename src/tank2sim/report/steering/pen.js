@@ -2,9 +2,11 @@
 
 const colours = (paper) => {
   const light = { ink: "#16212c", muted: "#52606d", grid: "#e4e9ee", frame: "#aebac5", own: "#0072B2", other: "#D55E00",
-    hull: "#16212c", paper: "#ffffff", ahead: "#00795a", member: "#52606d", port: "#d4372c", starboard: "#1b9a63" };
+    hull: "#16212c", paper: "#ffffff", ahead: "#00795a", member: "#52606d", port: "#d4372c", starboard: "#1b9a63",
+    deep: "#eaf3fb", little: "#cfe3f3", shoal: "#b9d3b0", land: "#ecdcae" };
   const dark = { ink: "#e8edf2", muted: "#a3b0bd", grid: "#27313b", frame: "#4a5865", own: "#56B4E9", other: "#E69F00",
-    hull: "#e8edf2", paper: "#151c23", ahead: "#5fd3ab", member: "#a3b0bd", port: "#ff7b70", starboard: "#4cc38a" };
+    hull: "#e8edf2", paper: "#151c23", ahead: "#5fd3ab", member: "#a3b0bd", port: "#ff7b70", starboard: "#4cc38a",
+    deep: "#15222d", little: "#1b3447", shoal: "#2f4a3a", land: "#4a4129" };
   return !paper && matchMedia("(prefers-color-scheme: dark)").matches ? dark : light;
 };
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', Arial, sans-serif";

@@ -47,7 +47,7 @@ class TrackChart {
     pen.beginPath();
     pen.rect(box.left, box.top, box.across, box.up);
     pen.clip();
-    this.waters?.areas(pen, at);
+    this.waters?.areas(pen, colour, at);
     pen.restore();
     axes(pen, colour, box, scene.east, scene.north);
     pen.save();

@@ -41,3 +41,9 @@ function ended(what, voyage) {
 }
 
 const LEFT = { zigzag: "the zigzag is over", programme: "the trial's orders are left", autopilot: "the autopilot is off" };
+
+// How an attempt in a scenario has ended.
+function judged({ aground, arrived, points }) {
+  if (aground) return `Aground on ${aground.by} at ${clock(aground.time)}.`;
+  return `The goal is reached at ${clock(arrived.time)}: ${points.toFixed(0)} of 100 points.`;
+}
