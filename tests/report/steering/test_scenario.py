@@ -2,6 +2,7 @@
 
 import json
 import math
+import random
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import tank2sim as t2s
 from tank2sim.api.steering_page import make_steering_page
 from tank2sim.errors import InputError
 from tank2sim.report.steering.scenario import bundled_scenarios, read_scenario
+from tests.corpus.mutations import mutate
 from tests.report.steering.sailing import data_of, in_browser, sailed
 
 LATITUDE, LONGITUDE = 10.0, 20.0
@@ -118,6 +120,21 @@ def test_other_files_are_refused(text: str, words: str, tmp_path: Path):
         read_scenario(file)
 
 
+def test_a_changed_file_is_read_or_refused_with_its_name(tmp_path: Path):
+    file = tmp_path / "waters.json"
+    good = {file.name: bundled_scenarios()["channel"].read_bytes()}
+    refusals = 0
+    for seed in range(200):
+        changed, _, words = mutate(good, {"other.json": b'{"type": 1}'}, random.Random(seed))
+        file.write_bytes(changed[file.name])
+        try:
+            read_scenario(file)
+        except InputError as error:
+            refusals += 1
+            assert str(file) in str(error) and "\n" not in str(error), words
+    assert refusals > 40
+
+
 def test_a_missing_file_names_the_bundled_waters_and_a_trial_goes_not_with_a_scenario(tmp_path: Path):
     with pytest.raises(InputError, match="bundled scenario: basin, channel"):
         read_scenario(tmp_path / "none.geojson")
@@ -148,7 +165,8 @@ class TestInABrowser:
           aground: score.aground, arrived: score.arrived, points: score.points });
         const helm = window.helm;
         const until = (what) => { while (helm.time < 1500) if (helm.advance() === what) return helm.time; };
-        helm.steer(4 * DEG); seen.time = until(FIRST); seen.score = figures(helm.score); press("f"); seen.points = shown("points");
+        helm.steer(4 * DEG); seen.time = until(FIRST); seen.score = figures(helm.score); press("f");
+        seen.points = shown("points");
         seen.shown = [shown("aground"), shown("buoys"), shown("goal"), shown("off")];
         seen.pose = Voyage.POSE.map((name) => helm.own.samples[name].at(-1)); click("save");
         click("run"); seen.run = at("run").textContent; seen.again = at("said").textContent;"""

@@ -7,6 +7,7 @@ class Member {
   constructor(ship, data, parameters) {
     this.voyage = new Voyage(ship, data, Voyage.POSE, Member.MOST, parameters);
     this.lost = false; // its motion left all bounds
+    this.aground = false; // in a scenario: it has touched, and sails on here as if it had not
   }
 
   // Does this with the voyage, unless the member is lost; one whose motion leaves all bounds is lost from then on.
@@ -38,7 +39,7 @@ class Helm {
   begin(start, orders, attempt = null) {
     this.own.begin(start, orders);
     for (const member of this.members) {
-      member.lost = false;
+      member.lost = member.aground = false;
       member.try((voyage) => voyage.begin(start, orders));
     }
     this.score?.begin(this.own.ship.get("motion.u"));

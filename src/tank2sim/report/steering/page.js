@@ -75,7 +75,8 @@
     find("score-buoys").textContent = String(score.buoys.size);
     find("score-aground").textContent = score.aground ? `${score.aground.by}, ${clock(score.aground.time)}` : "no";
     find("score-goal").textContent = score.arrived ? `reached, ${clock(score.arrived.time)}` : "not reached";
-    if (find("score-members")) find("score-members").textContent = `${score.lost.size} of ${helm.members.length}`;
+    const aground = helm.members.filter((member) => member.aground).length;
+    if (find("score-members")) find("score-members").textContent = `${aground} of ${helm.members.length}`;
   }
 
   function showOrder(one) {

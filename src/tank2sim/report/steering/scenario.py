@@ -146,7 +146,7 @@ def _content(path: Path) -> dict[str, Any]:
         raise InputError(path, "", f"cannot be read ({error.strerror})", remedy) from error
     except UnicodeDecodeError as error:
         raise InputError(path, "", "is not UTF-8 text", "save the GeoJSON as UTF-8") from error
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # of a number with thousands of digits, too
         place = f"line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise InputError(path, place, "is not JSON", "give a GeoJSON file (RFC 7946)") from error
     if not isinstance(content, dict) or content.get("type") != "FeatureCollection":

@@ -18,7 +18,6 @@ class Score {
   begin(speed) {
     Object.assign(this, { time: 0, squares: 0, counted: 0, most: 0, out: 0, aground: null, arrived: null });
     this.buoys = new Set();
-    this.lost = new Set(); // members that are aground
     this.looked = 0;
     this.par = this.#length() / Math.max(speed, 0.1);
   }
@@ -53,11 +52,11 @@ class Score {
   look(time, members) {
     if (time < this.looked + Score.MEMBERS_EVERY) return;
     this.looked = time;
-    members.forEach((member, number) => {
-      if (this.lost.has(number) || member.lost) return;
+    for (const member of members) {
+      if (member.aground || member.lost) continue;
       const [x, y, psi] = Voyage.POSE.map((name) => member.voyage.samples[name].at(-1));
-      if (this.waters.aground(x, y, psi)) this.lost.add(number);
-    });
+      member.aground = this.waters.aground(x, y, psi) !== null;
+    }
   }
 
   get rms() { return this.counted > 0 ? Math.sqrt(this.squares / this.counted) : 0; }

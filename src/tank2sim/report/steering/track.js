@@ -56,7 +56,7 @@ class TrackChart {
     pen.clip();
     this.waters?.marks(pen, colour, at, scene.scale);
     if (this.ghost) this.#ghost(pen, colour, scene, own.time);
-    for (const member of members) this.#member(pen, colour, scene, member.voyage.samples);
+    for (const member of members) this.#member(pen, member.aground ? colour.port : colour.member, scene, member.voyage.samples);
     line(pen, x.length, (row) => at(x[row], y[row]), { colour: colour.own, width: 2.4 });
     this.#hulls(pen, colour, scene, samples);
     this.#ahead(pen, colour, scene, ahead);
@@ -82,9 +82,9 @@ class TrackChart {
 
   #member(pen, colour, scene, samples) {
     const [x, y, psi] = Voyage.POSE.map((name) => samples[name]);
-    const look = { colour: colour.member, width: 1, alpha: 0.4, most: TrackChart.MEMBER_POINTS };
+    const look = { colour, width: 1, alpha: 0.5, most: TrackChart.MEMBER_POINTS };
     line(pen, x.length, (row) => scene.at(x[row], y[row]), look);
-    this.#hull(pen, scene, x.at(-1), y.at(-1), psi.at(-1), { stroke: colour.member, width: 1, alpha: 0.55 });
+    this.#hull(pen, scene, x.at(-1), y.at(-1), psi.at(-1), { stroke: colour, width: 1, alpha: 0.7 });
   }
 
   // Outlines along the track at round times, each with its time in minutes.
