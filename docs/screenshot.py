@@ -1,13 +1,14 @@
 """Makes the README's picture of the page on which a ship is steered, ``docs/static/steering_page.png``.
 
-The Mariner turns in a current to the east, next to the track of the same turn without. Needs Chromium and the extra
-`platforms`::
+The Esso Osaka on autopilot in the bundled channel, with the ships that the measurements cannot exclude. Needs Chromium
+and the extra `platforms`::
 
     python docs/screenshot.py
 """
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -16,14 +17,19 @@ import tempfile
 from pathlib import Path
 
 PICTURE = Path(__file__).parent / "static" / "steering_page.png"
-CURRENT = '\n[[effects]]\nname = "current"\nparameters = { speed_mps = 0.8, direction_deg = 90.0 }\n'
+UNTIL = 1300  # s
+COURSES = {0: 0, 340: 22, 600: 35, 900: 34, 1100: 12}  # deg, by the time (s) of the order
+# The attempt as a link has it (src/tank2sim/report/steering/attempt.js), opened and sailed to its end.
 STEERED = """<script>
 const waiting = setInterval(() => {
-  const [follow, finish] = ["follow", "finish"].map((name) => document.getElementById(name));
-  if (!finish.disabled) {
-    clearInterval(waiting);
-    finish.click();
-  } else if (!follow.disabled) follow.click();
+  if (document.documentElement.dataset.ship !== "ready") return;
+  clearInterval(waiting);
+  const data = JSON.parse(document.getElementById("ship").textContent);
+  const courses = Object.entries(COURSES).map(([t, deg]) => `${t / data.step}!c!${deg * Math.PI / 180}`);
+  const start = Object.entries(data.start).map(([name, value]) => `s!${name}!${value}`);
+  const inputs = data.controls.map(({ start: value }, number) => `i!${number}!${value}`);
+  location.hash = [data.id, UNTIL / data.step, ...start, ...inputs, ...courses].join("~");
+  setTimeout(() => { for (const name of ["finish", "farther"]) document.getElementById(name).click(); }, 500);
 }, 300);
 </script>"""
 FLAGS = (
@@ -45,15 +51,12 @@ def main() -> int:
         return 2
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        card = Path(__file__).parents[1] / "models" / "mariner" / "ship.toml"
-        (folder / "ship.toml").write_text(card.read_text(encoding="utf-8") + CURRENT, encoding="utf-8")
-        turn = ["--manoeuvre", "turn:20", "--duration", "900"]
-        tank2sim("simulate", "mariner", *turn, "--out", "still.csv", folder=folder)
-        tank2sim("steer", "ship.toml", "--ghost", "still.csv", "-o", "page.html", folder=folder)
+        tank2sim("steer", "--scenario", "channel", "-o", "page.html", folder=folder)
         page = folder / "page.html"
+        script = STEERED.replace("COURSES", json.dumps(COURSES)).replace("UNTIL", str(UNTIL))
         # The page allows no script but its own.
         html = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text(encoding="utf-8"))
-        page.write_text(html.replace("</body>", f"{STEERED}</body>"), encoding="utf-8")
+        page.write_text(html.replace("</body>", f"{script}</body>"), encoding="utf-8")
         taken = [f"--user-data-dir={folder / 'profile'}", f"--screenshot={folder / 'page.png'}", page.as_uri()]
         subprocess.run([chromium, *FLAGS, *taken], check=True, capture_output=True, timeout=120)
         shutil.copyfile(folder / "page.png", PICTURE)

@@ -590,7 +590,13 @@ class Ship:
 
         return self._written(PilotCardResult(*bridges_of(self, ballast, orders or {})), path)
 
-    def steering_page(self, path: str | Path | None = None, *, ghost: str | Path | None = None) -> SteeringPageResult:
+    def steering_page(
+        self,
+        path: str | Path | None = None,
+        *,
+        ghost: str | Path | None = None,
+        scenario: str | Path | None = None,
+    ) -> SteeringPageResult:
         """A page in which the ship is steered in a browser; it needs no network.
 
         Parameters
@@ -599,15 +605,19 @@ class Ship:
             HTML file to write.
         ghost : path, optional
             A measured trial that moves next to the ship.
+        scenario : path or str, optional
+            Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
 
         Raises
         ------
         InputError
-            The ship has no rudder, the trial is at fault or has no positions, or the file cannot be written.
+            The ship has no rudder, the trial is at fault or has no positions, the scenario is at fault, or the file
+            cannot be written.
         """
         from tank2sim.api.steering_page import make_steering_page
 
-        return self._written(make_steering_page(self, ghost), path, *([ghost] if ghost else []))
+        inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
+        return self._written(make_steering_page(self, ghost, scenario), path, *inputs)
 
     def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
         """Write the page of a result to a path that is not an input, if one is given; return the result."""

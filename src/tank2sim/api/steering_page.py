@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from tank2sim.errors import InputError
 if TYPE_CHECKING:
     from tank2sim.dynamics.model import Model
     from tank2sim.report.steering.ghost import Ghost
+    from tank2sim.report.steering.scenario import Scenario
 
 FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
 
@@ -32,16 +33,31 @@ class SteeringPageResult(Result):
     ghost : Ghost, optional
         A measured trial next to the ship.
     notices : tuple of str
+    members : tuple of mapping
+        Parameters of ships that the measurements cannot exclude, which are steered together with the card's.
+    autopilot : str
+        How the autopilot of the page was designed; empty without one.
+    scenario : Scenario, optional
+        Waters to steer in.
     """
 
     command = "steer"
 
     def __init__(
-        self, ship: Ship, model: Model, library: str | None, ghost: Ghost | None, notices: tuple[str, ...]
+        self,
+        ship: Ship,
+        model: Model,
+        library: str | None,
+        ghost: Ghost | None,
+        notices: tuple[str, ...],
+        members: Sequence[Mapping[str, float]] = (),
+        autopilot: str = "",
+        scenario: Scenario | None = None,
     ) -> None:
         from tank2sim.report.steering.ship import NO_WASM_COMPILER
 
         self.ship, self.model, self.library, self.ghost = ship, model, library, ghost
+        self.members, self.autopilot, self.scenario = tuple(members), autopilot, scenario
         self._page_notices = tuple(dict.fromkeys(notices))  # the page itself says first that there is no ship in it
         self.notices = self._page_notices if library else (NO_WASM_COMPILER, *self._page_notices)
 
@@ -51,14 +67,20 @@ class SteeringPageResult(Result):
             "ship": self.ship.name,
             "ghost": self.ghost.label if self.ghost else None,
             "steerable": self.library is not None,
+            "members": len(self.members),
+            "autopilot": self.autopilot or None,
+            "scenario": self.scenario.name if self.scenario else None,
             "page_kB": self._size_kB,
             "notices": self.notices,
         }
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Name of the ship and size of the page."""
-        return (f"{self.ship.name}: a page of {self._size_kB:.0f} kB",)
+        """Name of the ship, size of the page, and the ships that are steered together with it."""
+        from tank2sim.report.steering.members import NO_COVARIANCE
+
+        size = f"{self.ship.name}: a page of {self._size_kB:.0f} kB"
+        return (size, f"{len(self.members)} ships from the covariance of the card" if self.members else NO_COVARIANCE)
 
     @property
     def tables(self) -> tuple[ResultTable, ...]:
@@ -71,9 +93,17 @@ class SteeringPageResult(Result):
 
     @cached_property
     def _html(self) -> str:
-        from tank2sim.report.steering.page import steering_page
+        from tank2sim.report.steering.page import PageShip, steering_page
 
-        return steering_page(self.model, self.library, self.ghost, self._page_notices)
+        ship = PageShip(
+            model=self.model,
+            library=self.library,
+            members=self.members,
+            autopilot=self.autopilot,
+            beam_m=self.ship.card.ship.beam_m,
+            draught_m=self.ship.card.ship.draught_m,
+        )
+        return steering_page(ship, self.ghost, self._page_notices, self.scenario)
 
     @property
     def _size_kB(self) -> float:
@@ -81,7 +111,10 @@ class SteeringPageResult(Result):
 
 
 def make_steering_page(
-    ship: Ship, ghost: str | Path | None = None, report: Callable[[str], None] = lambda _: None
+    ship: Ship,
+    ghost: str | Path | None = None,
+    scenario: str | Path | None = None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> SteeringPageResult:
     """Make the page, without writing it. Raises as :meth:`.Ship.steering_page`.
 
@@ -90,6 +123,8 @@ def make_steering_page(
     ship : Ship
     ghost : path, optional
         A measured trial.
+    scenario : path or str, optional
+        GeoJSON file of the waters, or the name of bundled ones.
     report : callable
         Called before what takes long.
     """
@@ -97,18 +132,37 @@ def make_steering_page(
     from tank2sim.native.cross import has_compiled
     from tank2sim.report.steering import ship as page_ship
     from tank2sim.report.steering.ghost import ghost_of
+    from tank2sim.report.steering.members import members_of
+    from tank2sim.report.steering.scenario import read_scenario
 
     card, model = ship.card, ship.model
     if not isinstance(card, ManoeuvringCard):
         raise InputError(card.source, "", "has no rudder", "only a ship (kind linear, abkowitz or mmg) can be steered")
+    if ghost and scenario:
+        raise InputError("--scenario", "", "goes not with --ghost", "both say where the ship starts: leave one out")
+    waters = read_scenario(scenario) if scenario else None
     trial = measured([Path(ghost)], card) if ghost else None
     shown = ghost_of(trial.trials[0], model) if trial else None
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)
+    model, autopilot, no_autopilot = _with_autopilot(model)
     library = None
     if page_ship.has_compiler():
         if not has_compiled(page_ship.WEB):
             report(FIRST_COMPILATION)
         library = page_ship.ship_in_page(model)
-    notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *model.notices)
-    return SteeringPageResult(ship, model, library, shown, notices)
+    notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
+    return SteeringPageResult(ship, model, library, shown, notices, members_of(card, model), autopilot, waters)
+
+
+def _with_autopilot(model: Model) -> tuple[Model, str, tuple[str, ...]]:
+    """The model with the autopilot of the command ``autopilot`` (PID), how it was designed, and a notice without it."""
+    from tank2sim.analysis.heading.designs import design_heading
+    from tank2sim.dynamics.autopilot_loop import ship_steered_by_either
+
+    try:
+        design = design_heading(model)
+    except InputError as error:
+        return model, "", (f"no autopilot: {error.problem}",)
+    gains = ", ".join(f"{name} {value:.3g}" for name, value in design.gains.items())
+    return ship_steered_by_either(model, design.autopilot), f"{design.source}: {gains}", ()

@@ -10,9 +10,12 @@ from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import set_option
 
+DEFAULT_SHIP = "esso-osaka-ship"
+"""Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
+
 
 @click.command("steer")
-@click.argument("card")
+@click.argument("card", default=DEFAULT_SHIP)
 @click.option(
     "-o",
     "--page",
@@ -27,13 +30,25 @@ from tank2sim.cli.options import set_option
     metavar="TRIAL",
     help="A measured trial next to the ship.",
 )
+@click.option("--scenario", metavar="FILE", help="Waters as GeoJSON, or 'channel' or 'basin'.")
 @set_option
 @json_option
-def command(card: str, page: Path, ghost: Path | None, values: dict[str, object], json_file: Path | None) -> None:
-    """Write a page in which CARD (a file, or the name of a bundled ship) can be steered; it needs no network."""
+def command(
+    card: str,
+    page: Path,
+    ghost: Path | None,
+    scenario: str | None,
+    values: dict[str, object],
+    json_file: Path | None,
+) -> None:
+    """Write a page in which CARD (a file, or the name of a bundled ship; the tanker Esso Osaka without) can be steered.
+
+    It needs no network.
+    """
     from tank2sim.api.steering_page import make_steering_page
 
     ship = load(card, values)
-    result = make_steering_page(ship, ghost, report=screen.print)
-    write_result(result, [Path(ship.card.source), *([ghost] if ghost else [])], json_file=json_file, page=page)
+    result = make_steering_page(ship, ghost, scenario, report=screen.print)
+    inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
+    write_result(result, [Path(ship.card.source), *inputs], json_file=json_file, page=page)
     show_result(result)

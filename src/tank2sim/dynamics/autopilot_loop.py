@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tank2sim.dynamics.model import Input, Model, Quantity, Variable, same_symbol
 
 YAW_DISTURBANCE = "waves.yaw_acceleration"
 """Input of :func:`with_yaw_disturbance`, rad/s2."""
+
+AUTOPILOT_STEERS, AUTOPILOT_ORDER = "autopilot.steers", "autopilot.order"
+"""Input and output of :func:`ship_steered_by_either`."""
 
 
 def closed_loop_model(ship: Model, autopilot: Model) -> Model:
@@ -46,6 +51,37 @@ def _joint(receiver: Input, sender: Variable) -> Quantity:
         value=sender.symbol,
     )
     return same_symbol(receiver, joint)
+
+
+def ship_steered_by_either(ship: Model, autopilot: Model) -> Model:
+    """One model of both, in which the autopilot steers while the input ``autopilot.steers`` is true, else the helm.
+
+        rudder order = autopilot.order  or  rudder.command
+
+    ``autopilot.order`` is an output. While the helm steers, the integral z of the autopilot goes to zero as
+    dz/dt = -z/Tt, Tt its anti-windup time, so that the autopilot begins without what it held before.
+
+    Parameters
+    ----------
+    autopilot : Model
+        Of :func:`tank2sim.dynamics.autopilot.autopilot_model`, with an integral.
+    """
+    order = next(quantity for quantity in autopilot.quantities if quantity.name == "rudder.command")
+    words = "Rudder order of the autopilot, positive to starboard"
+    renamed = same_symbol(order, replace(order, name=AUTOPILOT_ORDER, description=words))
+    others = tuple(quantity for quantity in autopilot.quantities if quantity is not order)
+    outputs = (*(name for name in autopilot.outputs if name != order.name), AUTOPILOT_ORDER)
+    loop = closed_loop_model(ship, replace(autopilot, quantities=(*others, renamed), outputs=outputs))
+    steers = Input(name=AUTOPILOT_STEERS, unit="1", description="True: the autopilot steers", boolean=True)
+    helm, on = loop.symbol("rudder.command"), steers.symbol
+    integral, time = loop.symbol("autopilot.integral"), loop.symbol("autopilot.anti_windup_time")
+    steered = (
+        loop.extend(steers)
+        .substitute("rudder.command", on * order.symbol + (1 - on) * helm)
+        .redefine("autopilot.integral_rate", lambda rate: on * rate - (1 - on) * integral / time)
+    )
+    # The states start and are trimmed with the helm.
+    return replace(steered, name=ship.name, description=ship.description, states=loop.states)
 
 
 def with_yaw_disturbance(ship: Model) -> Model:

@@ -1,10 +1,6 @@
 """The page one steers on: what stands in it, and, in a browser, that its ship sails as the simulation does."""
 
-import csv
-import io
-import json
 import re
-from html import unescape
 
 import numpy as np
 import pytest
@@ -15,17 +11,11 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
 from tank2sim.report.steering.ghost import ghost_of
-from tank2sim.report.steering.page import steering_page
-from tank2sim.report.steering.ship import WEB, controls, has_compiler, ship_following_angle, ship_in_page
+from tank2sim.report.steering.page import PageShip, steering_page
+from tank2sim.report.steering.ship import WEB, controls, ship_following_angle, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
-from tests.report.opened_page import CHROMIUM, opened
-
-in_browser = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in"),
-    pytest.mark.skipif(not has_compiler(), reason="ziglang is not installed, which compiles the ship for the page"),
-]
+from tests.report.steering.sailing import data_of, in_browser, sailed
 
 TRIAL = """t_s,delta_deg,u_mps,psi_deg,x_m,y_m
 10,0,7.5,90,100,200
@@ -46,34 +36,6 @@ COLUMNS = {
     "y_m": "motion.y",
 }
 
-# Frames by the clock, for a headless browser draws none that nobody asks for.
-FRAMES = "<script>window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 16);</script>"
-
-# Keeps what the page saves; then does `steps` one after the other and tells what came of it.
-DRIVE = """<script>{{
-  const saved = [];
-  const made = URL.createObjectURL;
-  URL.createObjectURL = (blob) => {{ saved.push(blob.text()); return made.call(URL, blob); }};
-  const at = (name) => document.getElementById(name);
-  const click = (name) => at(name).click();
-  const put = (name, value, kind) => {{
-    at(name).value = value;
-    at(name).dispatchEvent(new Event(kind, {{ bubbles: true }}));
-  }};
-  const press = (key, rest) =>
-    document.body.dispatchEvent(new KeyboardEvent("keydown", {{ key, bubbles: true, ...rest }}));
-  const ready = setInterval(async () => {{
-    if (document.documentElement.dataset.ship !== "ready") return;
-    clearInterval(ready);
-    const seen = {{}};
-    {steps}
-    const read = (one) => at(one).textContent;
-    seen.said = read("said");
-    for (const one of document.querySelectorAll("[id^=read-], output")) seen[one.id] = read(one.id);
-    document.body.dataset.seen = JSON.stringify({{ ...seen, saved: await Promise.all(saved) }});
-  }}, 50);
-}}</script>"""
-
 
 @pytest.fixture(scope="module")
 def mariner():
@@ -82,7 +44,7 @@ def mariner():
 
 @pytest.fixture(scope="module")
 def page(mariner):
-    return steering_page(mariner, ship_in_page(mariner))
+    return steering_page(PageShip(model=mariner, library=ship_in_page(mariner)))
 
 
 @pytest.fixture(scope="module")
@@ -102,20 +64,6 @@ def ghost(mariner, tmp_path):
     return ghost_of(read_trial_file(file), mariner)
 
 
-def sailed(html, folder, steps):
-    """What the page reported after these steps, and the voyages that it saved."""
-    html = html.replace("<body>", "<body>" + FRAMES).replace("</body>", DRIVE.format(steps=steps) + "</body>")
-    seen, console = opened(html, folder)
-    assert console == []
-    seen = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
-    voyages = []
-    for text in seen.pop("saved"):
-        lines = [one for one in text.splitlines() if not one.startswith("#")]
-        rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
-        voyages.append({name: np.array([float(row[name]) for row in rows]) for name in rows[0]})
-    return seen, voyages
-
-
 def worst(voyage, trajectory):
     """Largest difference between a voyage and a simulation, relative to the size of each signal."""
     np.testing.assert_allclose(voyage["t_s"], trajectory.t, rtol=0, atol=1e-9)
@@ -127,12 +75,8 @@ def worst(voyage, trajectory):
     return max(found.values())
 
 
-def data_of(html):
-    return json.loads(re.search(r'id="ship">(.*?)</script>', html, re.DOTALL)[1])
-
-
 def test_without_the_compiler_the_page_says_what_is_missing(mariner):
-    html = steering_page(mariner, None, None, ["another notice"])
+    html = steering_page(PageShip(model=mariner, library=None), None, ["another notice"])
     assert html.index("pip install tank2sim[platforms]") < html.index("another notice")
     assert "The ship in this page is" not in html
     assert "<canvas" not in html
@@ -141,7 +85,7 @@ def test_without_the_compiler_the_page_says_what_is_missing(mariner):
 
 def test_a_model_without_a_rudder_is_refused():
     with pytest.raises(InputError, match="has no rudder"):
-        steering_page(build(read_card("wilinski-zellman")), None)
+        steering_page(PageShip(model=build(read_card("wilinski-zellman")), library=None))
 
 
 def test_the_rudder_slider_ends_where_the_gear_does_and_shows_degrees(mariner):
@@ -159,7 +103,7 @@ def test_a_ghost_starts_the_ship_where_the_trial_starts(mariner, ghost):
             "initial.rudder_angle": 0,
         }
     )
-    data = data_of(steering_page(mariner, "AA==", ghost))
+    data = data_of(steering_page(PageShip(model=mariner, library="AA=="), ghost))
     assert data["start"]["initial.u"] == 7.5
     assert data["ghost"]["t"] == pytest.approx([0, 1, 2.05, 3, 4])
     assert data["ghost"]["x"][3] is None
@@ -194,7 +138,7 @@ def test_the_mean_wind_of_a_trial_is_that_at_the_start(mariner, pond, tmp_path):
     mean = {"wind.speed": 2.5, "wind.direction": np.arctan2(3, 4)}
     assert ghost.held == pytest.approx(mean)
     assert any("2.5 m/s from 37 deg" in one for one in ghost.notices)
-    data = data_of(steering_page(pond, "AA==", ghost))
+    data = data_of(steering_page(PageShip(model=pond, library="AA=="), ghost))
     assert {one["name"]: one["start"] for one in data["controls"] if one["name"] in mean} == pytest.approx(mean)
     assert ghost_of(read_trial_file(file), mariner).held == {}
 
@@ -207,7 +151,7 @@ def test_what_surrounds_the_ship_has_the_bounds_of_a_card(pond):
 
 
 def test_the_page_fetches_nothing(mariner):
-    html = steering_page(mariner, "AA==")
+    html = steering_page(PageShip(model=mariner, library="AA=="))
     assert not re.search(r"""(src|href)=["'](?!#)""", html)
     assert "default-src 'none'" in html
 
@@ -238,7 +182,7 @@ class TestInABrowser:
 
     def test_keys_steer_and_readouts_bear_units(self, page, tmp_path):
         steps = """
-        press("ArrowRight", { shiftKey: true }); press("ArrowRight"); press("ArrowLeft"); press("+");
+        press("ArrowRight", { shiftKey: true }); press("ArrowRight"); press("ArrowLeft"); press("]");
         seen.factor = at("factor").value;
         press("z"); press("ArrowRight", { shiftKey: true });  // a hand on the rudder ends the zigzag
         seen.finish = at("finish").disabled;
@@ -263,8 +207,8 @@ class TestInABrowser:
     def test_sliders_with_the_focus_keep_their_keys_and_orders_are_reported_with_their_side(self, pond, tmp_path):
         steps = """
         const engine = at("set-propeller.speed"), rudder = at("set-rudder.command");
-        const on = (place, key) => {
-          const event = new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
+        const on = (place, key, rest) => {
+          const event = new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true, ...rest });
           place.dispatchEvent(event);
           return event.defaultPrevented;
         };
@@ -277,12 +221,12 @@ class TestInABrowser:
         seen.focus = document.activeElement === engine;
         seen.astern = engine.getAttribute("aria-valuetext");
         seen.turning = at("read-propeller.speed_actual").textContent;
-        on(document.body, "w"); seen.ahead = at("now-propeller.speed").textContent;
+        on(document.body, "w", { shiftKey: true }); seen.ahead = at("now-propeller.speed").textContent;
         const wind = at("set-wind.speed");
         put("set-wind.speed", "1e6", "change"); seen.wind = wind.value; seen.limit = at("said").textContent;
         put("set-wind.speed", "", "change"); seen.kept = wind.value; seen.empty = at("said").textContent;
         click("reset"); click("save");"""
-        reported, (voyage,) = sailed(steering_page(pond, ship_in_page(pond)), tmp_path, steps)
+        reported, (voyage,) = sailed(steering_page(PageShip(model=pond, library=ship_in_page(pond))), tmp_path, steps)
         assert (reported["wheel"], reported["taken"], reported["down"], reported["focus"]) == (False,) * 4
         assert (reported["rudder"], reported["engine"]) == ("midships", "600.0 rpm ahead")
         assert (reported["sailing"], reported["under"]) == ("Stop", "Under way.")
@@ -341,7 +285,7 @@ class TestInABrowser:
         click("zigzag"); click("finish"); click("save");
         put("set-current.speed", "2", "change"); put("set-current.direction", "90", "change");
         click("reset"); click("zigzag"); click("finish"); click("save");"""
-        _, (first, second) = sailed(steering_page(model, ship_in_page(model)), tmp_path, steps)
+        _, (first, second) = sailed(steering_page(PageShip(model=model, library=ship_in_page(model))), tmp_path, steps)
         zigzag = parse_manoeuvre("zigzag:20/20")
         assert worst(first, simulate(model, zigzag).trajectory) < 1e-9
         stream = {"current.speed": 2 * 1852 / 3600, "current.direction": np.pi / 2}
@@ -358,8 +302,10 @@ class TestInABrowser:
         np.savetxt(file, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
         ghost = ghost_of(read_trial_file(file), mariner)
         model = ship_following_angle(mariner)
-        steps = "click('follow'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
-        _, (voyage, zigzag) = sailed(steering_page(model, ship_in_page(model), ghost), tmp_path, steps)
+        steps = "click('trial'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
+        _, (voyage, zigzag) = sailed(
+            steering_page(PageShip(model=model, library=ship_in_page(model)), ghost), tmp_path, steps
+        )
         last = np.flatnonzero(voyage["t_s"] <= run.t[-1] + 1e-4)[-1]
         assert voyage["t_s"][last] == pytest.approx(run.t[-1], abs=1e-4)
         assert np.interp(run.t, voyage["t_s"], voyage["delta_deg"]) == pytest.approx(columns["delta_deg"], abs=1e-4)
@@ -371,8 +317,10 @@ class TestInABrowser:
     def test_orders_of_a_trial_are_followed_through_the_gear(self, mariner, tmp_path):
         file = tmp_path / "trial.csv"
         file.write_text(TRIAL.replace("delta_deg", "delta_order_deg"), encoding="utf-8")
-        html = steering_page(mariner, ship_in_page(mariner), ghost_of(read_trial_file(file), mariner))
-        _, (voyage,) = sailed(html, tmp_path, "click('follow'); click('finish'); click('save');")
+        html = steering_page(
+            PageShip(model=mariner, library=ship_in_page(mariner)), ghost_of(read_trial_file(file), mariner)
+        )
+        _, (voyage,) = sailed(html, tmp_path, "click('trial'); click('finish'); click('save');")
         assert voyage["x_m"][0] == 100
         assert voyage["t_s"][-1] == pytest.approx(4)
         rows = np.searchsorted(voyage["t_s"], [0.55, 1.04, 2.04, 2.94, 3.04]) - 1

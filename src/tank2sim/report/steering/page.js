@@ -1,68 +1,91 @@
-// The bridge: sliders, keys and readouts on one side, the voyage on the other.
+// The bridge: what the hand sets on one side, the voyage on the other.
 (async () => {
   const data = JSON.parse(document.getElementById("ship").textContent);
   const find = (name) => document.getElementById(name);
-  const deg = Math.PI / 180;
-  const track = new TrackChart(find("track"), data);
+  const view = new View(data.length);
+  const waters = data.scenario ? new Waters(data.scenario, data) : null;
+  const track = new TrackChart(find("track"), data, view, waters);
   const history = new HistoryChart(find("history"), data, Number(find("stretch").value));
+  const tape = new HeadingTape(find("tape"));
+  const turning = new Dial(find("turning"), data.turning[0], data.turning);
+  const rudderDial = new Dial(find("rudder-dial"), data.largestRudder);
+  const gamepad = new GamepadHelm();
   const sliders = Object.fromEntries(
     data.controls.map((one) => [one.name, { ...one, input: find(`set-${one.name}`) }]));
   const rudder = sliders["rudder.command"];
   const engine = sliders["propeller.speed"];
-  let voyage = null;
+  const telegraph = engine && new Telegraph(find("telegraph"), data.telegraph, (value) => order(engine, value * engine.factor));
+  let helm = null;
   let sailing = false;
   let last = 0;
   let goal = 0;
   let pointed = false; // the last touch was by a pointer, not by a key
   let paper = false;
+  let predicted = { at: -Infinity, places: [] };
   const held = {}; // inputs set by hand, but rudder and engine, SI
   let approach = {}; // as the page was written, to the last digit, until it is set by hand
 
   const say = (text) => { find("said").textContent = text; };
-
-  function shown(value, digits) {
-    const text = value.toFixed(digits);
-    return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
-  }
-
-  // With no more digits than it has, two at most.
-  const plain = (value) => String(Number(value.toFixed(2))).replace("-", "\u2212");
-
-  function clock(time) {
-    const whole = Math.floor(time + 1e-6);
-    return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
-  }
-
-  // An order as one says it, with its side.
-  function spoken(one, value) {
-    const digits = one.unit === "rpm" ? 1 : Number.isInteger(Number(value.toFixed(6))) ? 0 : 1;
-    const size = `${shown(Math.abs(value), digits)} ${one.unit}`;
-    if (Number(Math.abs(value).toFixed(digits)) === 0) return one === rudder ? "midships" : "stopped";
-    return `${size} ${one === rudder ? (value > 0 ? "starboard" : "port") : (value > 0 ? "ahead" : "astern")}`;
-  }
+  const own = () => helm.own;
 
   // What the ship does.
   function show() {
-    track.draw(voyage.samples, voyage.time, voyage.orders, paper);
+    const voyage = own();
+    const seen = find("members")?.checked ? helm.sailing : [];
+    track.draw(voyage, seen, ahead(), paper);
     history.draw(voyage.samples, paper);
     find("read-time").textContent = clock(voyage.time);
+    const now = {};
     for (const one of data.readouts) {
       let value = voyage.ship.get(one.name) * one.factor;
-      if (one.name === "motion.psi") value = Number((((value % 360) + 360) % 360).toFixed(one.digits)) % 360;
+      now[one.name] = value;
+      if (one.name === "motion.psi") value = compass(value, one.digits);
       if (one.name === "validity") find("read-validity").closest("div").classList.toggle("outside", value < 0.5);
       find(`read-${one.name}`).textContent = shown(value, one.digits);
     }
+    tape.draw(now["motion.psi"], voyage.course === null ? null : voyage.course / DEG, paper);
+    turning.draw(now["motion.r"], null, paper);
+    rudderDial.draw(now["rudder.angle"], voyage.orders["rudder.command"] / DEG, paper);
     for (const one of [rudder, engine]) if (one) showOrder(one);
-    find("finish").disabled = !voyage.zigzag && voyage.programme.length === 0;
+    if (helm.score) showScore(helm.score);
+    telegraph?.show(voyage.orders[engine.name]);
+    find("autopilot")?.setAttribute("aria-pressed", String(voyage.course !== null));
+    if (voyage.course !== null && document.activeElement !== find("course")) find("course").value = course(voyage.course);
+    for (const mode of ["follow", "whole"]) find(mode).setAttribute("aria-pressed", String(view.mode === mode));
+    find("finish").disabled = !voyage.zigzag && voyage.programme.length === 0 && !helm.replayed;
+  }
+
+  // Where the ship comes to: computed again after an order, and ten times a second.
+  function ahead() {
+    const minutes = Number(find("ahead").value);
+    if (minutes === 0) return [];
+    const now = performance.now();
+    if (helm.time !== predicted.time && now - predicted.at > 100 || predicted.orders !== helm.attempt.version ||
+      predicted.minutes !== minutes) {
+      const places = own().ahead(60 * minutes, Math.max(1, minutes));
+      predicted = { at: now, places, minutes, time: helm.time, orders: helm.attempt.version };
+    }
+    return predicted.places;
+  }
+
+  function showScore(score) {
+    find("score-points").textContent = score.points.toFixed(0);
+    find("score-off").textContent = `${score.rms.toFixed(0)} m rms, ${score.most.toFixed(0)} m at most`;
+    find("score-out").textContent = clock(score.out);
+    find("score-buoys").textContent = String(score.buoys.size);
+    find("score-aground").textContent = score.aground ? `${score.aground.by}, ${clock(score.aground.time)}` : "no";
+    find("score-goal").textContent = score.arrived ? `reached, ${clock(score.arrived.time)}` : "not reached";
+    const aground = helm.members.filter((member) => member.aground).length;
+    if (find("score-members")) find("score-members").textContent = `${aground} of ${helm.members.length}`;
   }
 
   function showOrder(one) {
-    const value = (voyage.orders[one.name] ?? one.start) * one.factor;
+    const value = (own().orders[one.name] ?? one.start) * one.factor;
     one.input.value = value;
     const words = spoken(one, value);
     find(`now-${one.name}`).textContent = words;
     if (one.input.getAttribute("aria-valuetext") !== words) one.input.setAttribute("aria-valuetext", words);
-    showGauge(one, voyage.ship.get(one === rudder ? "rudder.angle" : "propeller.speed_actual") * one.factor);
+    showGauge(one, own().ship.get(one === rudder ? "rudder.angle" : "propeller.speed_actual") * one.factor);
   }
 
   // The rudder and the revolutions as they are, below the order.
@@ -82,33 +105,25 @@
   }
 
   function start(words) {
+    if (helm.score?.aground) { say(`${judged(helm.score)} Reset to begin again.`); return; }
     sailing = true;
     last = performance.now();
-    goal = voyage.time;
+    goal = helm.time;
     find("run").textContent = "Stop";
     find("run").setAttribute("aria-pressed", "true");
-    say(words ?? "Under way.");
+    say(words ?? (helm.replayed ? "Replayed." : "Under way."));
     requestAnimationFrame(frame);
   }
 
-  const titled = ({ first, rudder: angle, heading }) => `Zigzag ${plain(first * angle / deg)}/${plain(heading / deg)}`;
-
-  function ended(what) {
-    if (what === "programme") { voyage.release(); return "The trial's orders have ended."; }
-    const { overshoots } = voyage.done;
-    const figures = overshoots.map((one) => shown(one / deg, 1)).join(", ");
-    const whole = overshoots.length === Zigzag.EXECUTES - 1;
-    if (!whole) return `${titled(voyage.done)} was given up: the heading is not reached.`;
-    return `${titled(voyage.done)} has ended; overshoots ${figures} deg.`;
-  }
-
-  // Sails until `until` (s) or the end of a manoeuvre, for at most `most` ms.
+  // Sails until `until` (s) or the end of a manoeuvre, for at most `most` ms. Returns what is to be said, or null.
   function sail(until, most) {
     const begun = performance.now();
     try {
-      while (voyage.time < until - 1e-9 && performance.now() - begun < most) {
-        const what = voyage.advance();
-        if (what) return ended(what);
+      while (helm.time < until - 1e-9 && performance.now() - begun < most) {
+        const what = helm.advance();
+        if (what === "aground" || what === "arrived") return judged(helm.score);
+        if (what === "replay") return `The attempt has been replayed, until ${clock(helm.time)}.`;
+        if (what && !helm.replayed) return ended(what, own());
       }
     } catch (error) {
       return `${error.message}: reset to go on.`;
@@ -117,24 +132,26 @@
   }
 
   function frame(now) {
+    byGamepad();
     if (!sailing) return;
     const wanted = Math.min(100, now - last) / 1000 * Number(find("factor").value);
     last = now;
     goal += wanted;
     const words = sail(goal, 40);
-    if (goal - voyage.time > wanted + voyage.step) goal = voyage.time; // slower than asked: the page keeps alive
+    if (goal - helm.time > wanted + own().step) goal = helm.time; // slower than asked: the page keeps alive
     if (words) stop(words);
     show();
     if (sailing) requestAnimationFrame(frame);
   }
 
-  // What was set by hand stays, except rudder and engine.
-  function reset() {
+  // What was set by hand stays, except rudder and engine. With an `attempt` all is as it was then.
+  function reset(attempt = null) {
     stop();
     const given = Object.fromEntries(data.controls.map((one) => [one.name, one.start]));
     try {
-      voyage.begin({ ...data.start, ...approach }, { ...given, ...held });
-      if (find("failed")) voyage.ship.setTruth("steering.failed", find("failed").checked);
+      if (attempt) helm.begin(attempt.start, attempt.orders, attempt);
+      else helm.begin({ ...data.start, ...approach }, { ...given, ...held });
+      if (!attempt && find("failed")?.checked) helm.fail(true);
       say("At the start.");
     } catch (error) {
       say(error.message);
@@ -143,15 +160,38 @@
     show();
   }
 
+  // By hand, so that a replay is over.
+  function byHand() { helm.replayed = null; }
+
   function order(slider, value) {
+    byHand();
     const kept = Math.min(slider.maximum ?? Infinity, Math.max(slider.minimum ?? -Infinity, value));
-    if (slider === rudder) {
-      const left = { zigzag: "the zigzag is over", programme: "the trial's orders are left" }[voyage.release()];
-      if (left) say(`Steered by hand: ${left}.`);
-    }
-    voyage.order(slider.name, kept / slider.factor);
+    const left = LEFT[helm.order(slider.name, kept / slider.factor)];
+    if (left) say(`Steered by hand: ${left}.`);
     if (slider !== rudder && slider !== engine) held[slider.name] = kept / slider.factor;
     slider.input.value = kept;
+    show();
+  }
+
+  // The autopilot on the course of its field; `change` (deg) moves it first.
+  function steer(change = 0) {
+    const input = find("course");
+    if (!input) return;
+    const wanted = typed(input, "The course", "deg", 0, 360);
+    if (wanted === null) return;
+    byHand();
+    const to = compass(Math.round(wanted) + change, 0); // a helmsman is given whole degrees
+    input.value = course(to * DEG);
+    helm.steer(to * DEG);
+    say(`The autopilot steers ${input.value}.`);
+    show();
+  }
+
+  function toggleAutopilot() {
+    if (own().course === null) return steer();
+    byHand();
+    helm.release();
+    say("The autopilot is off: the rudder stays as it is.");
     show();
   }
 
@@ -161,36 +201,21 @@
       say("A zigzag needs a rudder angle, negative to begin to port, and a heading above 0, both below 90 deg.");
       return;
     }
+    byHand();
     const limited = data.stop !== null && Math.abs(angle) > data.stop + 1e-9;
-    voyage.startZigzag(limited ? Math.sign(angle) * data.stop * deg : angle * deg, heading * deg);
-    const lines = [`${titled(voyage.zigzag)} is executed.`];
+    helm.zigzag(limited ? Math.sign(angle) * data.stop * DEG : angle * DEG, heading * DEG);
+    const lines = [`${titled(own().zigzag)} is executed.`];
     if (limited) lines.push(`The rudder was to go to ${plain(angle)} deg: its gear stops at ${plain(data.stop)} deg.`);
     const words = lines.join(" ");
     if (sailing) say(words); else start(words);
     show();
   }
 
-  // What steered the trial, from its start: orders each once, or the measured angle from reading to reading.
   function follow() {
     reset();
-    const { t, angle, rudder: angles, engine: speeds } = data.ghost;
-    const programme = [];
-    let [rudderNow, engineNow] = [null, null];
-    const read = t.map((_, row) => row).filter((row) => angles[row] !== null);
-    const next = new Map(read.slice(0, -1).map((row, place) => [row, read[place + 1]]));
-    t.forEach((time, row) => {
-      const one = { t: time };
-      if (angles[row] !== null && (angle || angles[row] !== rudderNow)) one["rudder.command"] = rudderNow = angles[row];
-      if (angle && angles[row] !== null) {
-        const after = next.get(row);
-        one["ghost.rudder_rate"] = after === undefined ? 0 : (angles[after] - angles[row]) / (t[after] - time);
-        one["ghost.steers"] = true;
-      }
-      if (engine && speeds[row] !== null && speeds[row] !== engineNow) one["propeller.speed"] = engineNow = speeds[row];
-      if (Object.keys(one).length > 1) programme.push(one);
-    });
-    voyage.follow([...programme, { t: t.at(-1) }]);
-    start(angle ? "Steered as in the trial: the rudder follows the measured angle." : "Steered by the trial's orders.");
+    helm.follow();
+    start(data.ghost.angle ? "Steered as in the trial: the rudder follows the measured angle." :
+      "Steered by the trial's orders.");
     show();
   }
 
@@ -206,8 +231,8 @@
     const lines = [`steered in the page of ${data.name}`];
     for (const one of data.controls) {
       if (Voyage.ORDERS.includes(one.name)) continue;
-      const from = voyage.changes.filter(([, name]) => name === one.name);
-      const start = [0, one.name, voyage.begun[one.name]];
+      const from = own().changes.filter(([, name]) => name === one.name);
+      const start = [0, one.name, own().begun[one.name]];
       const words = [start, ...from].map(([t, , value]) => `${plain(value * one.factor)} ${one.unit} at ${plain(t)} s`);
       lines.push(`${one.label}: ${words.join(", ")}`);
     }
@@ -216,10 +241,49 @@
 
   function save() {
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([voyage.csv(comments())], { type: "text/csv" }));
+    link.href = URL.createObjectURL(new Blob([own().csv(comments())], { type: "text/csv" }));
     link.download = "steered.csv";
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  // The attempt from its start, at the pace that is set.
+  function replay() {
+    const attempt = helm.attempt;
+    reset(attempt);
+    start("Replayed.");
+  }
+
+  // A link to this page with the attempt in it: in the address, in the field, and where copying is allowed, copied.
+  async function share() {
+    const text = helm.attempt.text(data);
+    if (text.length > Attempt.MOST_TEXT) {
+      say(`The attempt has too many orders for a link (${text.length} letters): save the voyage.`);
+      return;
+    }
+    const link = `${location.href.split("#")[0]}#${text}`;
+    location.hash = text;
+    find("link").value = link;
+    find("link").hidden = false;
+    try {
+      await navigator.clipboard.writeText(link);
+      say("The link to this attempt is copied.");
+    } catch {
+      find("link").select();
+      say("The link to this attempt is in the address and below.");
+    }
+  }
+
+  // The attempt in the address, replayed from its start. A link of another page is reported.
+  function opened() {
+    const text = decodeURIComponent(location.hash.slice(1));
+    if (!text.includes("~") || text === helm.attempt.text(data)) return;
+    try {
+      reset(Attempt.parse(text, data));
+      start("Replayed from the link.");
+    } catch (error) {
+      say(`${error.message}.`);
+    }
   }
 
   // A number that was typed, brought within its bounds; null where there is none. Both are reported to the user.
@@ -250,8 +314,17 @@
 
   function setByHand(one) {
     const value = typed(one.input, one.label, one.unit, one.minimum, one.maximum);
-    if (value === null) one.input.value = String(Number((voyage.orders[one.name] * one.factor).toPrecision(6)));
+    if (value === null) one.input.value = String(Number((own().orders[one.name] * one.factor).toPrecision(6)));
     else order(one, value);
+  }
+
+  function byGamepad() {
+    for (const done of gamepad.read(rudder.maximum)) {
+      if (done.rudder !== undefined) order(rudder, done.rudder);
+      else if (done === "start") find("run").click();
+      else if (done === "midships") order(rudder, 0);
+      else telegraph?.step(done === "ahead" ? 1 : -1, own().orders[engine.name]);
+    }
   }
 
   // After a pointer the keys are the bridge's again; who goes by keys keeps the focus.
@@ -260,57 +333,87 @@
     if (pointed && event.target.matches?.(kind)) event.target.blur();
   }
 
+  function look(what) {
+    what();
+    show();
+  }
+
   function listen() {
-    find("run").addEventListener("click", () => (sailing ? stop(`Stopped at ${clock(voyage.time)}.`) : start()));
-    find("reset").addEventListener("click", reset);
-    find("midships").addEventListener("click", () => order(rudder, 0));
-    find("zigzag").addEventListener("click", zigzag);
-    find("finish").addEventListener("click", finish);
-    find("follow")?.addEventListener("click", follow);
-    find("save").addEventListener("click", save);
+    const clicks = {
+      run: () => (sailing ? stop(`Stopped at ${clock(helm.time)}.`) : start()), reset: () => reset(),
+      midships: () => order(rudder, 0), zigzag, finish, save, replay, share, follow: () => look(() => view.follow()),
+      whole: () => look(() => view.whole()), closer: () => look(() => view.zoom(View.STEP)),
+      farther: () => look(() => view.zoom(1 / View.STEP)), autopilot: toggleAutopilot, trial: follow,
+    };
+    for (const [name, does] of Object.entries(clicks)) find(name)?.addEventListener("click", does);
     find("approach").addEventListener("change", setApproach);
+    find("course")?.addEventListener("change", () => { if (own().course !== null) steer(); });
     find("stretch").addEventListener("change", (event) => { history.stretch = Number(event.target.value); show(); });
-    find("failed")?.addEventListener("change", (event) =>
-      voyage.ship.setTruth("steering.failed", event.target.checked));
+    for (const name of ["ahead", "members"]) find(name)?.addEventListener("change", show);
+    find("failed")?.addEventListener("change", (event) => { byHand(); helm.fail(event.target.checked); });
     for (const one of Object.values(sliders)) {
       const slides = one === rudder || one === engine;
       const changed = slides ? () => order(one, Number(one.input.value)) : () => setByHand(one);
       one.input.addEventListener(slides ? "input" : "change", changed);
     }
+    moveByHand(find("track"), view, show);
     document.addEventListener("keydown", key);
     document.addEventListener("pointerdown", () => { pointed = true; }, true);
     document.addEventListener("click", (event) => { if (!event.target.matches("select")) letGo(event); });
     document.addEventListener("change", letGo);
+    addEventListener("hashchange", opened);
+    addEventListener("gamepadconnected", () => { say("A gamepad steers, too."); waiting(); });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
     new ResizeObserver(show).observe(find("track"));
     addEventListener("beforeprint", () => { paper = true; show(); });
     addEventListener("afterprint", () => { paper = false; show(); });
   }
 
-  const now = (slider) => voyage.orders[slider.name] * slider.factor;
-  const faster = (by) => {
-    const box = find("factor");
+  // A gamepad is asked in each frame; while the ship is stopped, for its start.
+  function waiting() {
+    if (!sailing) byGamepad();
+    if ([...navigator.getGamepads()].some((one) => one)) requestAnimationFrame(waiting);
+  }
+
+  const now = (slider) => own().orders[slider.name] * slider.factor;
+  const choose = (name, by) => {
+    const box = find(name);
     box.selectedIndex = Math.min(box.length - 1, Math.max(0, box.selectedIndex + by));
+    show();
   };
 
   // Keys of the bridge. In a field they write; the arrows move the slider that has the focus; Space presses a button.
   function key(event) {
     pointed = false;
     const { target } = event;
-    if (event.ctrlKey || event.altKey || event.metaKey || target.matches("input[type=number], select")) return;
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (target.matches("input[type=number], input[type=text], select")) return;
     if (event.key.startsWith("Arrow") && target.matches("input[type=range]")) return;
-    if (event.key === " " && target.matches("button, input[type=checkbox], summary, a")) return;
+    if ([" ", "Enter"].includes(event.key) && target.matches("button, input[type=checkbox], summary, a")) return;
     const by = event.shiftKey ? 5 : 1;
+    const revolutions = (side) => (event.shiftKey ? order(engine, now(engine) + side) :
+      telegraph.step(side, own().orders[engine.name]));
     const keys = {
       " ": () => find("run").click(),
       ArrowLeft: () => order(rudder, now(rudder) - by),
       ArrowRight: () => order(rudder, now(rudder) + by),
-      ...(engine ? { w: () => order(engine, now(engine) + by), s: () => order(engine, now(engine) - by) } : {}),
+      ...(engine ? { w: () => revolutions(1), s: () => revolutions(-1) } : {}),
       m: () => order(rudder, 0),
+      a: toggleAutopilot,
+      ",": () => steer(-1),
+      ".": () => steer(1),
+      "<": () => steer(-10),
+      ">": () => steer(10),
       z: zigzag,
-      r: reset,
-      "+": () => faster(1),
-      "-": () => faster(-1),
+      r: () => reset(),
+      f: () => look(() => view.follow()),
+      v: () => look(() => view.whole()),
+      "+": () => look(() => view.zoom(View.STEP)),
+      "-": () => look(() => view.zoom(1 / View.STEP)),
+      "]": () => choose("factor", 1),
+      "[": () => choose("factor", -1),
+      p: () => choose("ahead", find("ahead").selectedIndex + 1 < find("ahead").length ? 1 : -find("ahead").length),
+      g: () => find("members")?.click(),
     };
     const what = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!what) return;
@@ -319,14 +422,16 @@
   }
 
   try {
-    voyage = new Voyage(await Ship.aboard(data), data);
+    helm = new Helm(await Ship.aboard(data), data);
   } catch (error) {
     say(`The ship cannot be steered here: ${error.message}`);
     console.error(error);
     return;
   }
+  if (data.ghost) helm.programmeOf = () => programme(data.ghost, engine !== undefined);
   for (const one of document.querySelectorAll(".bridge [disabled]")) one.disabled = false;
   listen();
   reset();
   document.documentElement.dataset.ship = "ready";
+  opened();
 })();

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import jinja2
@@ -16,7 +19,17 @@ from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
 from tank2sim.report.kit.page import json_in_html, resource_text
 from tank2sim.report.steering.ghost import Ghost
-from tank2sim.report.steering.ship import NO_WASM_COMPILER, TOKEN, Control, controls, references, shown_in
+from tank2sim.report.steering.members import NO_COVARIANCE
+from tank2sim.report.steering.scenario import Scenario
+from tank2sim.report.steering.ship import (
+    NO_WASM_COMPILER,
+    TOKEN,
+    Control,
+    controls,
+    references,
+    shown_in,
+    telegraph_of,
+)
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
@@ -30,7 +43,25 @@ _WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 FASTEST_APPROACH = 2.0
 """Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
 
-_SCRIPTS = ("ship.js", "voyage.js", "pen.js", "track.js", "history.js", "page.js")
+PREDICTED_MINUTES = 3
+"""Minutes ahead that the page predicts at first: amid those that it offers, 1 to 6. Project choice."""
+
+_TURNING = (10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 600.0, 1200.0, 1800.0)
+"""Ends of the dial of the rate of turn, deg/min: round ones, project choice."""
+
+_USUAL_TURNING = 0.5
+"""Yaw rate in ship lengths, r L/u0, that the dial shows at first: a hard turn of most ships. Project choice."""
+
+_DIALS = ("motion.psi", "motion.r", "rudder.angle")
+"""Signals with an instrument of their own."""
+
+_SCRIPTS = tuple(
+    f"{name}.js"
+    for name in (
+        *("ship", "voyage", "trial", "attempt", "score", "helm", "words"),
+        *("pen", "view", "waters", "track", "history", "instruments", "telegraph", "gamepad", "page"),
+    )
+)
 _BEAM = 1 / 7
 """Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
 
@@ -48,8 +79,9 @@ _READOUTS = (
 )
 
 
-def steering_page(model: Model, library: str | None, ghost: Ghost | None = None, notices: Sequence[str] = ()) -> str:
-    """The page as one HTML file.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PageShip:
+    """What sails in a page.
 
     Parameters
     ----------
@@ -59,16 +91,45 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     library : str or None
         Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page states
         before anything else.
+    members : sequence of mapping
+        Parameters by name of ships that are steered together with the card's (:mod:`.members`).
+    autopilot : str
+        How the autopilot in the model (:func:`tank2sim.dynamics.autopilot_loop.ship_steered_by_either`) was designed;
+        empty if there is none.
+    beam_m, draught_m : float, optional
+        Of the drawn hull, and of what goes aground; without them the hull has the beam of an ordinary merchant ship,
+        and no depth of a scenario holds it up.
+    """
+
+    model: Model
+    library: str | None
+    members: Sequence[Mapping[str, float]] = ()
+    autopilot: str = ""
+    beam_m: float | None = None
+    draught_m: float | None = None
+
+
+def steering_page(
+    ship: PageShip, ghost: Ghost | None = None, notices: Sequence[str] = (), scenario: Scenario | None = None
+) -> str:
+    """The page as one HTML file.
+
+    Parameters
+    ----------
+    ship : PageShip
     ghost : Ghost, optional
         A measured trial.
     notices : sequence of str
         What the user should know.
+    scenario : Scenario, optional
+        Waters to steer in.
 
     Raises
     ------
     InputError
         The model has no rudder.
     """
+    model, library = ship.model, ship.library
     if "rudder.command" not in model.input_names:
         raise InputError(model.origin, "", "has no rudder", "only a ship (kind linear, abkowitz or mmg) can be steered")
     if library is None:
@@ -90,28 +151,49 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         controls=set_by_hand,
         rudder=rudder,
         engine=engine,
-        approach=_approach(model, ghost),
+        approach=_approach(model, ghost, scenario),
         windows=_windows(model),
+        telegraph=telegraph_of(model),
+        members=len(ship.members),
+        no_members=NO_COVARIANCE,
+        autopilot=ship.autopilot,
+        scenario=scenario,
+        ahead=PREDICTED_MINUTES,
+        dials=_DIALS,
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
         style=Markup(resource_text("kit/page.css") + resource_text("steering/page.css")),
         script=Markup("\n".join(resource_text(f"steering/{name}") for name in _SCRIPTS)),
-        data=json_in_html(_data(model, library, ghost)),
+        data=json_in_html(_data(ship, ghost, scenario)),
     )
 
 
-def _data(model: Model, library: str | None, ghost: Ghost | None) -> dict[str, Any]:
+def _data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
+    data = _ship_data(ship, ghost, scenario)
+    # Names the ship, the trial, the scenario and all that moves them: a link with an attempt is of this page alone.
+    return {**data, "id": hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:8]}
+
+
+def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
+    model = ship.model
     length, speed = _start(model, "ship.length"), _start(model, "ship.speed")
     gear = [math.degrees(parameter.start) for parameter in model.parameters if parameter.name == "steering.max_angle"]
     return {
         "name": model.name,
-        "library": library,
+        "library": ship.library,
         "token": TOKEN,
-        "references": references(interface(model)),
+        "references": references(interface(model), {name for member in ship.members for name in member}),
+        "members": [dict(member) for member in ship.members],
+        "telegraph": [{"name": order.name, "value": order.value} for order in telegraph_of(model)],
+        "turning": _turning(_USUAL_TURNING * speed / length),
+        "largestRudder": _controls(model, ghost)[0].maximum,
+        "speed": speed,
         "step": model.step_s,
-        "start": {"initial.u": _start(model, "initial.u")} | dict(ghost.start if ghost else {}),
+        "start": {"initial.u": _start(model, "initial.u")} | _begin(ghost, scenario),
+        "scenario": None if scenario is None else scenario.as_data(),
         "length": length,
-        "beam": _start(model, "ship.beam") if "ship.beam" in model else length * _BEAM,
+        "beam": ship.beam_m or length * _BEAM,
+        "draught": ship.draught_m,
         "longest": LONGEST_ZIGZAG * length / speed,
         "stop": gear[0] if gear else None,
         "knots": shown_in(model["initial.u"], "knots")[1],
@@ -119,6 +201,14 @@ def _data(model: Model, library: str | None, ghost: Ghost | None) -> dict[str, A
         "readouts": _readouts(model),
         "ghost": None if ghost is None else {"label": ghost.label, "angle": ghost.by_angle, **_series(ghost)},
     }
+
+
+def _begin(ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
+    """Start of the ship by parameter: that of a measured trial, or of a scenario."""
+    if scenario is not None:
+        speed = {} if scenario.speed is None else {"initial.u": scenario.speed}
+        return {"initial.psi": scenario.heading, **speed}
+    return dict(ghost.start) if ghost else {}
 
 
 def _controls(model: Model, ghost: Ghost | None) -> list[Control]:
@@ -133,6 +223,11 @@ def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
     place = min(range(1, len(_WINDOWS) - 2), key=lambda index: abs(math.log(_WINDOWS[index] / wanted)))
     shown = _WINDOWS[place - 1 : place + 3]
     return [(index, f"{index} s" if index < 120 else f"{index / 60:g} min") for index in shown], _WINDOWS[place]
+
+
+def _turning(usual: float) -> list[float]:
+    """Ends of the dial of the rate of turn, deg/min, from the one that holds a usual rate (rad/s) on."""
+    return [end for end in _TURNING if end >= 60 * math.degrees(usual)] or [_TURNING[-1]]
 
 
 def _series(ghost: Ghost) -> dict[str, list[float | None]]:
@@ -159,10 +254,10 @@ def _readouts(model: Model) -> list[dict[str, Any]]:
     ]
 
 
-def _approach(model: Model, ghost: Ghost | None) -> dict[str, float]:
-    """Approach speed of the trial, else of the card, and its bounds, knots."""
+def _approach(model: Model, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
+    """Approach speed of the trial or the scenario, else of the card, and its bounds, knots."""
     factor = shown_in(model["initial.u"], "knots")[1]
-    measured = ghost.start.get("initial.u") if ghost else None
+    measured = _begin(ghost, scenario).get("initial.u")
     speed = _start(model, "initial.u") if measured is None else measured
     fastest = max(FASTEST_APPROACH * _start(model, "ship.fastest"), speed)
     return {"value": speed * factor, "minimum": min(0.0, speed * factor), "maximum": fastest * factor}

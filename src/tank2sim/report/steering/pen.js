@@ -1,10 +1,12 @@
-// What both charts are drawn with: colours, axes, lines.
+// What the charts are drawn with: colours, axes, lines, hulls.
 
 const colours = (paper) => {
   const light = { ink: "#16212c", muted: "#52606d", grid: "#e4e9ee", frame: "#aebac5", own: "#0072B2", other: "#D55E00",
-    hull: "#16212c", paper: "#ffffff" };
+    hull: "#16212c", paper: "#ffffff", ahead: "#00795a", member: "#52606d", port: "#d4372c", starboard: "#1b9a63",
+    deep: "#eaf3fb", little: "#cfe3f3", shoal: "#b9d3b0", land: "#ecdcae" };
   const dark = { ink: "#e8edf2", muted: "#a3b0bd", grid: "#27313b", frame: "#4a5865", own: "#56B4E9", other: "#E69F00",
-    hull: "#e8edf2", paper: "#151c23" };
+    hull: "#e8edf2", paper: "#151c23", ahead: "#5fd3ab", member: "#a3b0bd", port: "#ff7b70", starboard: "#4cc38a",
+    deep: "#15222d", little: "#1b3447", shoal: "#2f4a3a", land: "#4a4129" };
   return !paper && matchMedia("(prefers-color-scheme: dark)").matches ? dark : light;
 };
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', Arial, sans-serif";
@@ -80,9 +82,9 @@ function axes(pen, colour, box, across, up) {
 
 // A line through the points place(0) ... place(count - 1); a gap where one is null.
 function line(pen, count, place, look) {
-  const stride = Math.max(1, Math.ceil(count / MOST_POINTS));
+  const stride = Math.max(1, Math.ceil(count / (look.most ?? MOST_POINTS)));
   pen.save();
-  Object.assign(pen, { strokeStyle: look.colour, lineWidth: look.width ?? 2 });
+  Object.assign(pen, { strokeStyle: look.colour, lineWidth: look.width ?? 2, globalAlpha: look.alpha ?? 1 });
   pen.setLineDash(look.dash ?? []);
   pen.beginPath();
   let down = false;
@@ -112,5 +114,29 @@ function arrow(pen, x, y, towards, colour) {
   pen.lineTo(-5, -2);
   pen.closePath();
   pen.fill();
+  pen.restore();
+}
+
+const LEAST_HULL = 22; // px: a ship is never drawn too small to see
+const LEAST_BEAM = 1 / 7; // of the drawn length
+
+// A ship seen from above, `length` and `beam` in px, its middle at [left, top], its bow at `psi` from north.
+function hull(pen, [left, top], psi, length, beam, look) {
+  const long = Math.max(length, LEAST_HULL);
+  const half = Math.max(beam, long * LEAST_BEAM) / 2;
+  pen.save();
+  pen.translate(left, top);
+  pen.rotate(psi);
+  pen.beginPath();
+  pen.moveTo(0, -long / 2);
+  pen.quadraticCurveTo(half, -long / 3, half, -long / 6);
+  pen.lineTo(half, long / 2);
+  pen.lineTo(-half, long / 2);
+  pen.lineTo(-half, -long / 6);
+  pen.quadraticCurveTo(-half, -long / 3, 0, -long / 2);
+  pen.closePath();
+  pen.globalAlpha = look.alpha ?? 1;
+  if (look.fill) { pen.fillStyle = look.fill; pen.fill(); }
+  if (look.stroke) { pen.strokeStyle = look.stroke; pen.lineWidth = look.width ?? 1.8; pen.stroke(); }
   pen.restore();
 }

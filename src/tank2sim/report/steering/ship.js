@@ -1,17 +1,18 @@
 "use strict";
-// The ship: the FMI 3 library of the FMU, compiled to WebAssembly, called by its own functions.
+// Ships: instances of the FMI 3 library of the FMU, compiled to WebAssembly, called by its own functions.
 
 class Ship {
   static async aboard(data) {
     const bytes = Uint8Array.from(atob(data.library), (letter) => letter.charCodeAt(0));
     const { instance } = await WebAssembly.instantiate(bytes, {});
+    instance.exports._initialize();
     return new Ship(instance.exports, data);
   }
 
   constructor(library, data) {
     this.library = library;
+    this.data = data;
     this.references = data.references;
-    library._initialize();
     // Scratch memory: a value reference, a value, flags, the time come to, a state of the FMU (none yet).
     this.room = library.malloc(64);
     this.state = library.malloc(4);
@@ -21,7 +22,14 @@ class Ship {
     if (!this.self) throw new Error("the ship in this page cannot be started");
   }
 
-  memory() { return new DataView(this.library.memory.buffer); }
+  // One more ship of the same library.
+  another() { return new Ship(this.library, this.data); }
+
+  memory() {
+    const { buffer } = this.library.memory;
+    if (this.view?.buffer !== buffer) this.view = new DataView(buffer); // memory that has grown is another
+    return this.view;
+  }
 
   #text(letters) {
     const bytes = new TextEncoder().encode(`${letters}\0`);
@@ -54,6 +62,17 @@ class Ship {
     this.memory().setUint32(this.room, this.references[name], true);
     this.#done(this.library.fmi3GetFloat64(this.self, this.room, 1, this.room + 8, 1), `${name} cannot be read`);
     return this.memory().getFloat64(this.room + 8, true);
+  }
+
+  // A function that reads these signals in one call; what it returns holds until the next call.
+  reader(names) {
+    const [wanted, found] = [this.library.malloc(4 * names.length), this.library.malloc(8 * names.length)];
+    names.forEach((name, place) => this.memory().setUint32(wanted + 4 * place, this.references[name], true));
+    return () => {
+      const status = this.library.fmi3GetFloat64(this.self, wanted, names.length, found, names.length);
+      this.#done(status, "the motion cannot be read");
+      return new Float64Array(this.library.memory.buffer, found, names.length);
+    };
   }
 
   begin(values) {

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import base64
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, SHARES
+from tank2sim.dynamics.autopilot_loop import AUTOPILOT_ORDER
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Input, Model, Variable
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import Interface, interface
 from tank2sim.fmu.sources import c_sources
 from tank2sim.native.cross import CompileTarget, cross_compiled, require_cross_compiler
+from tank2sim.simulation.manoeuvres import FULL_ASTERN
 from tank2sim.units import UNITS
 
 TOKEN = "page"
@@ -42,12 +46,15 @@ NO_WASM_COMPILER = (
 _LARGEST_RUDDER = math.radians(35.0)
 """End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
 
-FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
+MOST_AHEAD, MOST_ASTERN = 1.2, -1.0
 """Ends of the engine slider, in nominal revolutions. Project choice: the little overload that engines allow, and as
 much astern as ahead."""
 
 GHOST_STEERS, GHOST_RATE = "ghost.steers", "ghost.rudder_rate"
 """Inputs of a model that can follow a measured rudder (:func:`ship_following_angle`)."""
+
+COURSE = "heading.command"
+"""Input of the autopilot in the page."""
 
 _SMALL = {"deg": 1.0, "knots": 0.1, "rpm": 1.0}
 """By what a control moves at a time, in the unit shown. Project choice."""
@@ -65,6 +72,49 @@ class Control:
     step: float
     minimum: float | None = None
     maximum: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TelegraphOrder:
+    """An order of the engine telegraph: its revolutions (rad/s, negative astern), and the button's words and column."""
+
+    name: str
+    short: str
+    side: str
+    column: int
+    value: float
+
+    @property
+    def rpm(self) -> float:
+        """Revolutions, rpm."""
+        return self.value * 30 / math.pi
+
+
+def telegraph_of(model: Model) -> list[TelegraphOrder]:
+    """Orders of the telegraph from full astern to full sea speed; empty without an engine.
+
+    Names and shares of the nominal revolutions are those of the wheelhouse poster; full astern is
+    :data:`tank2sim.simulation.manoeuvres.FULL_ASTERN` of the nominal revolutions, and the orders below it have the
+    shares of full astern that those ahead have of full ahead.
+    """
+    if "propeller.speed" not in model.input_names:
+        return []
+    nominal = model["propeller.speed"]
+    assert isinstance(nominal, Input)
+    sea, *harbour = zip(ORDERS_AHEAD, SHARES, strict=True)
+    full = harbour[0][1]
+    astern, ahead = [], []
+    for column, (name, share) in enumerate(reversed(harbour), start=2):
+        short = name.removesuffix(" ahead")
+        value = nominal.start * share
+        ahead.append(TelegraphOrder(name=name, short=short, side="ahead", column=column, value=value))
+        back = -nominal.start * FULL_ASTERN * share / full
+        astern.append(TelegraphOrder(name=f"{short} astern", short=short, side="astern", column=column, value=back))
+    stop = TelegraphOrder(name="Stop", short="Stop", side="", column=1, value=0.0)
+    fastest = TelegraphOrder(
+        name=sea[0], short="Sea", side="ahead", column=len(ahead) + 2, value=nominal.start * sea[1]
+    )
+    return [*reversed(astern), stop, *ahead, fastest]
 
 
 def has_compiler() -> bool:
@@ -104,21 +154,22 @@ def ship_following_angle(model: Model) -> Model:
     return followed.redefine("rudder.rate", lambda gear: gear * (1 - steers.symbol) + rate.symbol * steers.symbol)
 
 
-def references(described: Interface) -> dict[str, int]:
-    """Name to value reference of what the page sets and reads: all but parameters of the hull."""
-    wanted = ("initial.", "motion.", "rudder.", "steering.failed", "propeller.", "validity")
-    inputs = {variable.name for variable in described.with_causality("input")}
+def references(described: Interface, drawn: Iterable[str] = ()) -> dict[str, int]:
+    """Name to value reference of what the page sets and reads; `drawn` are parameters that its members differ in."""
+    wanted = ("initial.", "motion.", "rudder.", "steering.failed", "propeller.", "validity", AUTOPILOT_ORDER)
+    named = {*(variable.name for variable in described.with_causality("input")), *drawn}
     return {
         variable.name: variable.reference
         for variable in described.variables
-        if variable.name in inputs or variable.name.startswith(wanted)
+        if variable.name in named or variable.name.startswith(wanted)
     }
 
 
 def controls(model: Model) -> list[Control]:
     """The inputs of a ship that a hand sets: rudder and engine first, then what the card's effects take."""
+    others = {GHOST_RATE, COURSE}
     found = [
-        _control(model, variable) for variable in model.inputs if not variable.boolean and variable.name != GHOST_RATE
+        _control(model, variable) for variable in model.inputs if not variable.boolean and variable.name not in others
     ]
     first = ("rudder.command", "propeller.speed")
     return sorted(found, key=lambda variable: first.index(variable.name) if variable.name in first else len(first))
@@ -132,7 +183,7 @@ def _control(model: Model, variable: Input) -> Control:
         high = limits[0] if limits else _LARGEST_RUDDER
         low = -high
     if variable.name == "propeller.speed":
-        low, high = FULL_ASTERN * variable.start, FULL_AHEAD * variable.start
+        low, high = MOST_ASTERN * variable.start, MOST_AHEAD * variable.start
     return Control(
         name=variable.name,
         label=_label(variable.name),

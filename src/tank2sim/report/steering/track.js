@@ -1,19 +1,26 @@
-// The track, north up and to scale, with the ghost and the wind and current that act.
+// The chart, north up and to scale: waters, tracks, hulls at times, what is ahead, and the wind and current that act.
 
 const FLOWS = [["current", "towards", 0], ["wind", "from", Math.PI]];
 
 class TrackChart {
-  constructor(canvas, data) {
-    Object.assign(this, { canvas, length: data.length, beam: data.beam, ghost: data.ghost });
+  static INTERVALS = [15, 30, 60, 120, 300, 600, 1200, 1800, 3600]; // s between hulls along the track
+  static APART = 1.7; // drawn lengths between hulls along the track, at least
+  static HULLS = 60; // most hulls along the track: the last
+  static MEMBER_POINTS = 250; // of the track of a member
+
+  constructor(canvas, data, view, waters = null) {
+    Object.assign(this, { canvas, view, waters });
+    Object.assign(this, { length: data.length, beam: data.beam, speed: data.speed, ghost: data.ghost });
     this.forget();
   }
 
-  // Bounds of what was sailed begin again, with the ghost in view.
+  // Bounds of what was sailed begin again, with the measured trial and the waters in view.
   forget() {
     this.seen = 0;
     this.bounds = { north: -Infinity, south: Infinity, east: -Infinity, west: Infinity };
     const { ghost } = this;
     if (ghost) ghost.x.forEach((x, row) => { if (x !== null && ghost.y[row] !== null) this.#take(x, ghost.y[row]); });
+    for (const [x, y] of this.waters?.corners ?? []) this.#take(x, y);
   }
 
   #take(x, y) {
@@ -24,34 +31,48 @@ class TrackChart {
     bounds.west = Math.min(bounds.west, y);
   }
 
-  // `orders` are the inputs that act now, SI, by name.
-  draw(samples, ghostTime, orders, paper = false) {
+  // `own` is the voyage, `members` those whose tracks are shown, `ahead` the places that the ship comes to.
+  draw(own, members, ahead, paper = false) {
+    const { samples } = own;
     const [x, y] = [samples["motion.x"], samples["motion.y"]];
     for (let row = Math.min(this.seen, x.length - 1); row < x.length; row += 1) this.#take(x[row], y[row]);
     this.seen = x.length;
+    const last = x.length - 1;
     const { pen, width, height } = prepared(this.canvas);
     const colour = colours(paper);
-    const flows = this.#flows(pen, width, orders);
-    const view = this.#view(pen, width, height, flows.high);
-    axes(pen, colour, view.box, view.east, view.north);
+    const flows = this.#flows(pen, width, own.orders);
+    const scene = this.#scene(pen, width, height, flows.high, [x[last], y[last]]);
+    const { box, at } = scene;
     pen.save();
     pen.beginPath();
-    pen.rect(view.box.left, view.box.top, view.box.across, view.box.up);
+    pen.rect(box.left, box.top, box.across, box.up);
     pen.clip();
-    if (this.ghost) this.#ghost(pen, colour, view, ghostTime);
-    line(pen, x.length, (row) => view.at(x[row], y[row]), { colour: colour.own, width: 2.4 });
-    const last = x.length - 1;
-    this.#hull(pen, view.at(x[last], y[last]), samples["motion.psi"][last], view.scale, { fill: colour.hull });
+    this.waters?.areas(pen, colour, at);
+    pen.restore();
+    axes(pen, colour, box, scene.east, scene.north);
+    pen.save();
+    pen.beginPath();
+    pen.rect(box.left, box.top, box.across, box.up);
+    pen.clip();
+    this.waters?.marks(pen, colour, at, scene.scale);
+    if (this.ghost) this.#ghost(pen, colour, scene, own.time);
+    for (const member of members) this.#member(pen, member.aground ? colour.port : colour.member, scene, member.voyage.samples);
+    line(pen, x.length, (row) => at(x[row], y[row]), { colour: colour.own, width: 2.4 });
+    this.#hulls(pen, colour, scene, samples);
+    this.#ahead(pen, colour, scene, ahead);
+    this.#hull(pen, scene, x[last], y[last], samples["motion.psi"][last], { fill: colour.hull });
     pen.restore();
     for (const flow of flows.found) this.#flow(pen, colour, flow);
   }
 
-  #ghost(pen, colour, view, time) {
+  #hull(pen, { at, scale }, x, y, psi, look) { hull(pen, at(x, y), psi, this.length * scale, this.beam * scale, look); }
+
+  #ghost(pen, colour, scene, time) {
     const { x, y, psi } = this.ghost;
-    const at = (row) => (x[row] === null || y[row] === null ? null : view.at(x[row], y[row]));
+    const at = (row) => (x[row] === null || y[row] === null ? null : scene.at(x[row], y[row]));
     line(pen, x.length, at, { colour: colour.other, dash: [7, 4], width: 1.8 });
     const row = this.#ghostRow(time);
-    if (row >= 0 && at(row)) this.#hull(pen, at(row), psi[row] ?? 0, view.scale, { stroke: colour.other });
+    if (row >= 0 && at(row)) this.#hull(pen, scene, x[row], y[row], psi[row] ?? 0, { stroke: colour.other });
   }
 
   #ghostRow(time) {
@@ -59,29 +80,73 @@ class TrackChart {
     return after < 0 ? this.ghost.t.length - 1 : after - 1;
   }
 
+  #member(pen, colour, scene, samples) {
+    const [x, y, psi] = Voyage.POSE.map((name) => samples[name]);
+    const look = { colour, width: 1, alpha: 0.5, most: TrackChart.MEMBER_POINTS };
+    line(pen, x.length, (row) => scene.at(x[row], y[row]), look);
+    this.#hull(pen, scene, x.at(-1), y.at(-1), psi.at(-1), { stroke: colour, width: 1, alpha: 0.7 });
+  }
+
+  // Outlines along the track at round times, each with its time in minutes.
+  #hulls(pen, colour, scene, samples) {
+    const { t } = samples;
+    const [x, y, psi] = Voyage.POSE.map((name) => samples[name]);
+    const drawn = Math.max(this.length * scene.scale, LEAST_HULL);
+    const enough = TrackChart.APART * drawn / (this.speed * scene.scale);
+    const every = TrackChart.INTERVALS.find((one) => one >= enough) ?? Math.ceil(enough / 3600) * 3600;
+    const count = Math.floor((t.at(-1) + 1e-6) / every);
+    Object.assign(pen, { fillStyle: colour.muted, textAlign: "left", textBaseline: "middle" });
+    for (let number = Math.max(0, count - TrackChart.HULLS); number <= count; number += 1) {
+      const row = Math.max(0, HistoryChart.place(t, number * every + 1e-6) - 1);
+      this.#hull(pen, scene, x[row], y[row], psi[row], { stroke: colour.own, width: 1.2, alpha: 0.75 });
+      const [left, top] = scene.at(x[row], y[row]);
+      const [side, off] = [psi[row] + Math.PI / 2, this.beam * scene.scale / 2 + 12];
+      const minutes = number * every / 60;
+      if (number === 0 || drawn * TrackChart.APART < 34) continue; // no room for its words
+      const words = Number.isInteger(minutes) ? `${minutes} min` : `${number * every} s`;
+      const back = Math.sin(side) < -0.2 ? pen.measureText(words).width : 0;
+      pen.fillText(words, left + Math.sin(side) * off - back, top - Math.cos(side) * off);
+    }
+  }
+
+  // The curve of what is ahead, with an outline at each whole minute from now.
+  #ahead(pen, colour, scene, ahead) {
+    if (ahead.length < 2) return;
+    const look = { colour: colour.ahead, width: 2.2, dash: [6, 4] };
+    line(pen, ahead.length, (row) => scene.at(ahead[row].x, ahead[row].y), look);
+    const [from, end] = [ahead[0].t, ahead.at(-1)];
+    let minute = 1;
+    for (const { t, x, y, psi } of ahead) {
+      if (t < from + 60 * minute - 1e-6) continue;
+      minute += 1;
+      this.#hull(pen, scene, x, y, psi, { stroke: colour.ahead, width: t === end.t ? 2 : 1.2 });
+    }
+    Object.assign(pen, { fillStyle: colour.ahead, textAlign: "left", textBaseline: "middle" });
+    const [left, top] = scene.at(end.x, end.y);
+    const off = this.beam * scene.scale / 2 + 12;
+    pen.fillText(`in ${label(Math.round((end.t - from) / 6) / 10)} min`, left + off, top);
+  }
+
   // Twice, for the room on the left follows from the labels, and they from the room. `above` is kept free.
-  #view(pen, width, height, above) {
+  #scene(pen, width, height, above, ship) {
     const within = (values) => {
       const margin = margins(pen, values);
-      return this.#viewWithin({ ...margin, top: margin.top + above }, width, height);
+      return this.#sceneWithin({ ...margin, top: margin.top + above }, width, height, ship);
     };
     return within(within([-1000]).north.values);
   }
 
-  #viewWithin(margin, width, height) {
-    const { north, south, east, west } = this.bounds;
-    const [across, up] = [width - margin.left - margin.right, height - margin.top - margin.bottom];
-    const least = 8 * this.length;
-    const shown = (span) => Math.max(least, span * 1.16);
-    const scale = Math.min(across / shown(east - west), up / shown(north - south));
-    const [x0, y0] = [(north + south) / 2, (east + west) / 2];
-    const [left, top] = [margin.left + across / 2, margin.top + up / 2];
+  #sceneWithin(margin, width, height, ship) {
+    const box = { left: margin.left, top: margin.top };
+    Object.assign(box, { across: width - margin.left - margin.right, up: height - margin.top - margin.bottom });
+    const { centre: [x0, y0], scale } = this.view.within(box, ship, this.bounds);
+    const [left, top] = [box.left + box.across / 2, box.top + box.up / 2];
     const at = (x, y) => [left + (y - y0) * scale, top - (x - x0) * scale];
-    const [far, wide] = [up / 2 / scale, across / 2 / scale];
+    const [far, wide] = [box.up / 2 / scale, box.across / 2 / scale];
     return {
-      scale, at, box: { left: margin.left, top: margin.top, across, up },
-      north: { values: ticks(x0 - far, x0 + far, up / 60), at: (x) => at(x, y0)[1], title: "x, north (m)" },
-      east: { values: ticks(y0 - wide, y0 + wide, across / 75), at: (y) => at(x0, y)[0], title: "y, east (m)" },
+      scale, at, box,
+      north: { values: ticks(x0 - far, x0 + far, box.up / 60), at: (x) => at(x, y0)[1], title: "x, north (m)" },
+      east: { values: ticks(y0 - wide, y0 + wide, box.across / 75), at: (y) => at(x0, y)[0], title: "y, east (m)" },
     };
   }
 
@@ -107,25 +172,5 @@ class TrackChart {
     arrow(pen, left + 13, top + 13, towards, colour.own);
     Object.assign(pen, { fillStyle: colour.ink, textAlign: "left", textBaseline: "middle" });
     pen.fillText(text, left + 34, top + 14);
-  }
-
-  // A ship seen from above, to scale, but never too small to see.
-  #hull(pen, [left, top], psi, scale, look) {
-    const long = Math.max(this.length * scale, 22);
-    const half = Math.max(this.beam * scale, long / 7) / 2;
-    pen.save();
-    pen.translate(left, top);
-    pen.rotate(psi);
-    pen.beginPath();
-    pen.moveTo(0, -long / 2);
-    pen.quadraticCurveTo(half, -long / 3, half, -long / 6);
-    pen.lineTo(half, long / 2);
-    pen.lineTo(-half, long / 2);
-    pen.lineTo(-half, -long / 6);
-    pen.quadraticCurveTo(-half, -long / 3, 0, -long / 2);
-    pen.closePath();
-    if (look.fill) { pen.fillStyle = look.fill; pen.fill(); }
-    if (look.stroke) { pen.strokeStyle = look.stroke; pen.lineWidth = 1.8; pen.stroke(); }
-    pen.restore();
   }
 }

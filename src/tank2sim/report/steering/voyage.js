@@ -32,25 +32,27 @@ class Zigzag {
   }
 }
 
-// Columns of samples. When they are full every second row goes, and of what follows fewer are kept; the last row is
-// always that of now.
+// Columns of samples, at most `most` rows. When they are full every second row goes, and of what follows fewer are kept;
+// the last row is always that of now.
 class Record {
   static MOST = 100000; // even, so that the last row stays; the longest zigzag of a bundled ship has fewer
 
-  constructor(names) {
+  constructor(names, most = Record.MOST) {
     this.columns = Object.fromEntries(names.map((name) => [name, []]));
+    this.lists = Object.values(this.columns);
+    this.most = most;
     this.stride = 1;
     this.passing = false;
   }
 
   get length() { return this.columns.t.length; }
 
-  // One row; if it is `passing` the next takes its place.
+  // One row, in the order of the names; if it is `passing` the next takes its place.
   add(row, passing = false) {
     const place = this.passing ? this.length - 1 : this.length;
-    for (const [name, column] of Object.entries(this.columns)) column[place] = row[name];
+    for (let column = 0; column < row.length; column += 1) this.lists[column][place] = row[column];
     this.passing = passing;
-    if (this.length > Record.MOST) this.#thin();
+    if (this.length > this.most) this.#thin();
   }
 
   // A value of the last row, which stays.
@@ -63,30 +65,35 @@ class Record {
     for (const [name, column] of Object.entries(this.columns)) {
       this.columns[name] = column.filter((_, row) => row % 2 === 0);
     }
+    this.lists = Object.values(this.columns);
     this.stride *= 2;
   }
 }
 
 // A ship under way. Steps lie on a grid of whole ones; a switch or an order between two of them is one more sample.
 class Voyage {
-  static SIGNALS = ["motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "rudder.angle"];
+  static POSE = ["motion.x", "motion.y", "motion.psi"];
+  static SIGNALS = [...Voyage.POSE, "motion.u", "motion.v", "motion.r", "rudder.angle"];
   static ORDERS = ["rudder.command", "propeller.speed", "wind.speed", "wind.direction"];
 
-  constructor(ship, data) {
-    this.ship = ship;
+  // `signals` and `most` rows are recorded; `parameters` are the ship's, where they are not those of the card.
+  constructor(ship, data, signals = Voyage.SIGNALS, most = undefined, parameters = {}) {
+    Object.assign(this, { ship, signals, most, parameters });
     this.step = data.step;
     this.longest = data.longest;
+    this.read = ship.reader(signals);
     this.begin(data.start);
   }
 
   begin(start, orders = {}) {
-    this.ship.begin({ ...start, ...orders });
+    this.ship.begin({ ...this.parameters, ...start, ...orders });
     this.time = 0;
     this.steps = 0;
     this.zigzag = null;
     this.programme = [];
+    this.course = null; // rad, that the autopilot keeps
     this.orders = { "rudder.command": 0, ...orders };
-    this.record = new Record(["t", ...Voyage.SIGNALS, ...Voyage.ORDERS]);
+    this.record = new Record(["t", ...this.signals, ...Voyage.ORDERS], this.most);
     this.begun = { ...this.orders };
     this.changes = []; // [t, name, value] of what no column holds
     this.#sample(true);
@@ -101,13 +108,26 @@ class Voyage {
     if (!Voyage.ORDERS.includes(name)) this.changes.push([this.time, name, value]);
   }
 
-  // The rudder is the hand's again, and the gear's. Returns what has ended: "zigzag", "programme" or null.
+  // The rudder is the hand's again, and the gear's. Returns what has ended: "zigzag", "programme", "autopilot" or null.
   release() {
     const ended = this.zigzag ? "zigzag" : this.programme.length > 0 ? "programme" : null;
     this.zigzag = null;
     this.programme = [];
     if (this.ship.has("ghost.steers")) this.ship.setTruth("ghost.steers", false);
-    return ended;
+    if (this.course === null) return ended;
+    this.order("rudder.command", this.ship.get("autopilot.order")); // it stays where the autopilot has put it
+    this.ship.setTruth("autopilot.steers", false);
+    this.course = null;
+    return "autopilot";
+  }
+
+  // The autopilot brings the ship to a course (rad), the short way, and keeps it.
+  steer(course) {
+    if (this.course === null) this.release();
+    this.course = course;
+    this.ship.set("heading.command", course);
+    this.ship.setTruth("autopilot.steers", true);
+    this.record.passing = false;
   }
 
   startZigzag(rudder, heading) {
@@ -123,12 +143,12 @@ class Voyage {
     this.#obey();
   }
 
-  // On to the next sample. Returns "zigzag", "programme" if that has just ended, else null.
-  advance() {
+  // On to the next sample, at `until` (s) at the latest. Returns "zigzag", "programme" if that has just ended, else null.
+  advance(until = Infinity) {
     const tolerance = 1e-9 * this.step;
     const onGrid = this.time <= this.steps * this.step + tolerance;
     const grid = (this.steps + 1) * this.step;
-    const ordered = this.programme[0]?.t ?? Infinity;
+    const ordered = Math.min(this.programme[0]?.t ?? Infinity, until);
     const whole = ordered >= grid - tolerance;
     const size = whole ? (onGrid ? this.step : grid - this.time) : ordered - this.time;
     const before = this.time;
@@ -140,6 +160,30 @@ class Voyage {
     this.#sample(!whole);
     if (this.zigzag && this.time >= this.zigzag.latest) return this.#ended("zigzag");
     return this.#obey();
+  }
+
+  // Where the ship comes to in `seconds` with its orders held: [{t, x, y, psi}, ...], `stride` s (whole steps) apart.
+  ahead(seconds, stride) {
+    const [from, every] = [this.time, Math.max(1, Math.round(stride / this.step))];
+    const places = [];
+    const note = (t) => {
+      const [x, y, psi] = this.read();
+      places.push({ t, x, y, psi });
+    };
+    note(from);
+    this.ship.keep();
+    try {
+      const count = Math.ceil(seconds / this.step / every - 1e-9) * every;
+      for (let [time, taken] = [from, 0]; taken < count;) {
+        const next = (this.steps + taken + 1) * this.step;
+        this.ship.step(time, taken === 0 && time > this.steps * this.step + 1e-9 * this.step ? next - time : this.step);
+        [time, taken] = [next, taken + 1];
+        if (taken % every === 0) note(time);
+      }
+    } finally {
+      this.ship.back();
+    }
+    return places;
   }
 
   // Halves the step until the heading is met within rounding, and goes there.
@@ -173,7 +217,9 @@ class Voyage {
         else this.order(name, value);
       }
     }
-    return begun && this.programme.length === 0 ? "programme" : null;
+    if (!begun || this.programme.length > 0) return null;
+    this.release();
+    return "programme";
   }
 
   #ended(what) {
@@ -183,11 +229,11 @@ class Voyage {
   }
 
   #sample(kept) {
-    const row = { t: this.time };
-    for (const name of Voyage.SIGNALS) row[name] = this.ship.get(name);
-    for (const name of Voyage.ORDERS) row[name] = this.orders[name] ?? 0;
+    const values = this.read();
+    if (this.course !== null) this.orders["rudder.command"] = this.ship.get("autopilot.order");
+    const row = [this.time, ...values, ...Voyage.ORDERS.map((name) => this.orders[name] ?? 0)];
     this.record.add(row, !kept && this.steps % this.record.stride !== 0);
-    this.zigzag?.watch(row["motion.psi"]);
+    this.zigzag?.watch(values[2]);
   }
 
   // The voyage as a trial file of tank2sim, with all digits; `comments` are its first lines.
