@@ -169,18 +169,29 @@ class ReplayKeys(_Part):
     simulated: Columns
 
 
+class OtherSideKeys(_Part):
+    """A pull-out from the other side."""
+
+    figures: FigureValues
+    histories: Columns
+
+
 class SimulateKeys(_Keys):
-    """A simulated manoeuvre."""
+    """A simulated manoeuvre; `limits` by name of figure, of IMO MSC.137(76)."""
 
     ship: str
+    length_m: Number
+    beam_m: Number
     manoeuvre: str
     figures: FigureValues
+    limits: dict[str, float]
     left_card_range_s: Number
     left_card_range_by: str
     outside_card_range: list[str]
     notices: list[str]
     histories: Columns
     ensemble: NotRequired[ManoeuvreEnsembleKeys]
+    other_side: NotRequired[OtherSideKeys]
 
 
 class OperatingPointKeys(_Part):

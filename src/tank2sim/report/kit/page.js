@@ -134,12 +134,16 @@
   darkScreen.addEventListener("change", onScreen);
   // Paper has no switches: it shows the first choice of each.
   let left = [];
+  const folded = [];
   addEventListener("beforeprint", () => {
+    folded.push(...document.querySelectorAll("details:not([open])"));
+    for (const part of folded) part.open = true;
     left = charts.map((_, place) => chosen(place));
     charts.forEach((_, place) => choose(place, switches(place).map(({ name, value }) => [name, value])));
     if (darkScreen.matches) drawAll(light);
   });
   addEventListener("afterprint", () => {
+    for (const part of folded.splice(0)) part.open = false;
     left.forEach((values, place) => choose(place, values));
     if (darkScreen.matches) onScreen();
   });
