@@ -16,6 +16,8 @@ from tank2sim.report.kit.manoeuvre_charts import (
     turn_dimensions,
     zigzag_chart,
 )
+from tank2sim.report.kit.page import Verdict
+from tank2sim.report.results.page import result_page
 
 RADIUS, LENGTH, BEAM = 300.0, 100.0, 15.0
 QUARTER = 90.0
@@ -152,3 +154,21 @@ def test_the_loop_of_a_spiral_is_marked_between_its_rudders_of_no_yaw_rate():
     specification = chart_specification(spiral_chart([spiral], loop_rad=(np.radians(-2.0), np.radians(2.5))))
     (mark,) = in_style(specification, "overshoot")
     assert (mark["d"], mark["to"], mark["r"]) == (-2.0, 2.5, 0.0)
+
+
+def test_limits_are_those_of_the_trials_of_the_standard():
+    mariner = t2s.load("mariner-nominal")
+    assert mariner.turn(35, duration_s=10).limits == {"advance_lengths": 4.5, "tactical_diameter_lengths": 5.0}
+    assert mariner.turn(30, duration_s=10).limits == {}
+    time = 160.93 / 7.7175  # L/V, between 10 and 30 s: 5 + V/2 deg
+    limits = mariner.zigzag(-10, 10, duration_s=10).limits
+    assert limits["overshoot_1_deg"] == pytest.approx(5 + time / 2, rel=1e-3)
+    assert "overshoot_1_deg" not in t2s.load("kvlcc2-l7").zigzag(10, 10, duration_s=10).limits
+
+
+def test_a_figure_outside_the_range_of_the_card_has_no_claim_of_a_limit_met():
+    result = t2s.load("mariner-nominal").turn(35).to_dict()
+    first = result_page(result, "r.json").figures[0]
+    assert (first.verdict, first.limit) == (Verdict.PASSED, pytest.approx(4.5 * 160.93))
+    outside = result_page({**result, "outside_card_range": ["advance_m"]}, "r.json").figures[0]
+    assert outside.verdict == Verdict.CAUTION

@@ -796,6 +796,7 @@ class BridgeKeys(_Keys):
     full_astern_from: list[Any]
     hard_over_to_hard_over_s: Number
     rudder_neutral_deg: Number
+    squat: list[dict[str, float]]
     notices: list[str]
     ballast: dict[str, Any] | None
 

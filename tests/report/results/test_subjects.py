@@ -292,13 +292,13 @@ PILOTED = {
 def test_an_autopilot_has_its_loop_and_its_steps() -> None:
     charts = drawn(PILOTED)
     assert list(charts) == [
+        "Course change by 20 deg",
+        "A change that takes the rudder to its limit",
+        "Course keeping, the last waves",
         "Loop transfer",
         "Nyquist curve",
         "Sensitivity and closed loop",
         "Poles of the closed loop",
-        "Course change by 20 deg",
-        "A change that takes the rudder to its limit",
-        "Course keeping, the last waves",
     ]
     magnitude, phase = panels(charts["Loop transfer"]).values()
     assert [row["v"] for row in magnitude] == pytest.approx(20 * np.log10(np.abs(LOOP)), rel=1e-4)

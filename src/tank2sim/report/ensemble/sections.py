@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.charts import curve_charts
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
@@ -102,7 +103,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
     if together and together["tail"]:
         rare.append(("any of these", together["tail"]))
     return PageSection(
-        heading=f"Ensemble of {found['members']}",
+        heading=f"Ensemble of {found['members']}{assumed_words(found['notices'])}",
         text=_TEXT + _CHANCES + stable + (_RARE if rare else ""),
         tables=[
             criteria_table,
@@ -117,7 +118,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
 def figures_section(found: Json) -> PageSection:
     """Return the section of a page of influence coefficients, from ``ensemble`` of the JSON."""
     return PageSection(
-        heading=f"Ensemble of {found['members']}",
+        heading=f"Ensemble of {found['members']}{assumed_words(found['notices'])}",
         text=_TEXT,
         tables=[_table("Figures over the ensemble.", found["figures"])],
         notes=found["notices"],

@@ -89,8 +89,8 @@ def vega_config(tone: Tone) -> Config:
         | {"subtitleColor": tone.muted, "subtitleFontSize": 12, "subtitlePadding": 5},
         "axis": {"domain": False, "gridColor": tone.grid, "tickColor": tone.line, "tickSize": 4, "labelPadding": 4}
         | {"labelColor": tone.muted, "labelFontSize": 11.5, "labelFlush": False}
-        | {"labelOverlap": True, "labelSeparation": 6}
         | {"titleColor": tone.ink, "titleFontSize": 12, "titleFontWeight": 500, "titlePadding": 8},
+        "axisQuantitative": {"labelOverlap": True, "labelSeparation": 6},
         "header": {"labelColor": tone.ink, "labelFontSize": 12, "labelFontWeight": 600, "title": None},
         "legend": {"orient": "top", "title": None, "labelColor": tone.ink, "titleColor": tone.ink, "labelFontSize": 12}
         | {
@@ -120,6 +120,7 @@ def _styles(tone: Tone) -> Config:
         "overshoot": {"color": tone.limit, "strokeWidth": 2.5, "opacity": 1},
         "interval": {"color": tone.palette[1], "strokeWidth": 8, "opacity": 0.45},
         "band": {"fill": tone.palette[0], "fillOpacity": BAND_OPACITY, "strokeWidth": 0},
+        "uncertainty": {"fill": tone.palette[0], "fillOpacity": 0.25, "stroke": tone.palette[0], "strokeWidth": 1},
         "hull": {"fill": tone.muted, "fillOpacity": 0.35, "stroke": tone.muted, "strokeWidth": 0.75},
         "words": {"fill": tone.ink, "fontSize": 12, "fontWeight": 600},
         "rim": {"fill": tone.paper, "stroke": tone.paper, "strokeWidth": 4, "fontSize": 12, "fontWeight": 600},

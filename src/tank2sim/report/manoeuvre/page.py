@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tank2sim.marks import assumed_words
 from tank2sim.report.kit.json_values import Json, is_number_value, words
 from tank2sim.report.kit.manoeuvre_charts import (
     Motion,
@@ -97,7 +98,12 @@ def _title(result: Json) -> str:
 
 
 def _members(ensemble: Json) -> str:
-    return f"{ensemble.get('usable', ensemble.get('members'))} ships within the errors of the card"
+    errors = "assumed errors" if _assumed(ensemble) else "the errors of the card"
+    return f"{ensemble.get('usable', ensemble.get('members'))} ships within {errors}"
+
+
+def _assumed(ensemble: Json) -> str:
+    return assumed_words(ensemble.get("notices") or ())
 
 
 def _in_lengths(name: str) -> str:
@@ -160,7 +166,7 @@ def _charts(result: Json, figures: Mapping[str, float], ensemble: Json) -> list[
     except KeyError:  # a craft or a file without a position or a yaw rate
         return []
     kind, title = _kind(result), _title(result)
-    title = title[:1].upper() + title[1:]
+    title = title[:1].upper() + title[1:] + _assumed(ensemble)
     bands: Quantiles = ensemble.get("figures") or {}
     shaded = f"Shaded: nine of ten of {_members(ensemble)}. Bars: nine of ten of each figure." if ensemble else ""
     if kind in ("turn", "difference"):
