@@ -27,6 +27,11 @@ CHECK = "CHECK:"
 were asked for, or tests contradict each other or give what no ship has."""
 
 
+def assumed_words(messages: Iterable[str]) -> str:
+    """Words for the title of what rests on assumed standard errors, with a comma before them; empty otherwise."""
+    return ", standard errors assumed" if any(ASSUMED in text for text in messages) else ""
+
+
 def marked(messages: Iterable[str]) -> list[str]:
     """The messages that contain a mark, each once, in their order."""
     return list(

@@ -200,3 +200,34 @@ def test_cards_leave_few_gaps_in_their_last_row(count, across):
     html = render_page(page)
     assert f'class="cards across-{across}"' in html
     assert f".cards.across-{across} " in html
+
+
+def one_section(**content):
+    return Reader(render_page(Page(title="T", sections=[PageSection(heading="H", **content)])))
+
+
+@pytest.mark.parametrize(("rows", "folded", "details"), [(10, None, 0), (11, None, 1), (11, False, 0), (1, True, 1)])
+def test_a_long_table_is_folded_unless_it_says_otherwise(rows, folded, details):
+    table = PageTable(caption="Long", columns=[Column(title="a")], rows=[[1.0]] * rows, folded=folded)
+    reader = one_section(tables=[table])
+    assert len(reader.all("details")) == details
+    assert "Long" in reader.words("summary" if details else "caption")
+
+
+def test_two_notices_are_seen_and_more_are_folded():
+    reader = one_section(notes=["first", "second", "third"])
+    assert reader.words("summary").strip() == "1 more notices"
+    assert "third" in reader.words("details") and "second" not in reader.words("details")
+
+
+def test_a_notice_that_marks_the_page_is_at_its_top_alone():
+    mark = "EXTRAPOLATED beyond what the card was measured in"
+    reader = one_section(text="Text.", notes=[mark])
+    assert mark in reader.words("header") and mark not in reader.words("main")
+
+
+def test_the_bar_of_a_figure_is_in_proportion_to_its_limit():
+    below, above = (KeyFigure(label="a", value=value, limit=4.0) for value in (1.0, -8.0))
+    assert below.reach_percent / below.limit_percent == pytest.approx(0.25, rel=1e-2)
+    assert above.reach_percent / above.limit_percent == pytest.approx(2.0, rel=1e-2)
+    assert 0 < below.limit_percent < 100 and 0 < above.reach_percent < 100

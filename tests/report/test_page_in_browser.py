@@ -2,7 +2,7 @@
 
 import json
 import re
-from html import unescape
+from html import escape, unescape
 
 import pytest
 
@@ -94,3 +94,26 @@ def test_a_name_that_is_a_script_is_not_run(tmp_path):
     assert console == []
     assert 'data-charts="drawn"' in seen
     assert "data-run" not in seen
+
+
+MEASURE = """<script>
+const frame = document.querySelector("iframe");
+const measure = () => {
+  const page = frame.contentDocument;
+  if (page?.documentElement.dataset.charts !== "drawn") return setTimeout(measure, 100);
+  const charts = [...page.querySelectorAll(".drawing")].map((drawing) => ({
+    room: drawing.clientWidth, chart: drawing.querySelector("svg").width.baseVal.value }));
+  document.body.dataset.seen = JSON.stringify({ page: page.documentElement.scrollWidth, charts });
+};
+measure();
+</script>"""
+
+
+def test_charts_fit_a_window_of_400_px_at_the_size_of_their_letters(charts, tmp_path):
+    shown = [Illustration(chart=charts[name]) for name in ("track", "history", "bode")]
+    inner = render_page(Page(title="Narrow", sections=[PageSection(heading="Charts", charts=shown)]))
+    html = f'<body><iframe width="400" height="800" srcdoc="{escape(inner)}"></iframe>{MEASURE}</body>'
+    seen, _ = opened(html, tmp_path)
+    found = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
+    assert found["page"] <= 400
+    assert all(chart["chart"] <= chart["room"] + 1 for chart in found["charts"]), found

@@ -14,7 +14,15 @@ from tank2sim.dynamics import build
 from tank2sim.files import plain_json
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import render_page
-from tank2sim.report.stability.charts import DIRECT, STABLE, UNSTABLE, influence_chart, steering_diagram, trim_chart
+from tank2sim.report.stability.charts import (
+    DIRECT,
+    STABLE,
+    UNSTABLE,
+    criteria_chart,
+    influence_chart,
+    steering_diagram,
+    trim_chart,
+)
 from tank2sim.report.stability.page import stability_page
 
 
@@ -31,12 +39,12 @@ def test_the_page_holds_every_part(study) -> None:
     page = stability_page(plain_json({**study.as_json(), "notices": ["a notice"]}))
     headings = [section.heading for section in page.sections]
     assert headings == [
+        "IMO criteria",
+        "Steady turning",
         "Straight-line stability",
         "What moves the margin",
         "Response to the rudder",
-        "Steady turning",
         "Nonlinear steering characteristic",
-        "IMO criteria",
         "Notices",
     ]
     assert any(figure.label == "Hysteresis loop" for figure in page.figures)
@@ -77,3 +85,17 @@ def test_influences_and_trims_are_drawn_as_they_were_found(study) -> None:
         if "run" in row
     }
     assert len(lines) == 3
+
+
+def test_bars_of_the_criteria_are_shares_of_their_limits(study) -> None:
+    criteria = [
+        {"name": "advance", "found": 3.0, "allowed": 4.5, "unit": "L", "beyond_card": False},
+        {"name": "tactical diameter", "found": 6.0, "allowed": 5.0, "unit": "L", "beyond_card": True},
+        {"name": "stopping", "found": None, "allowed": 15.0, "unit": "L", "beyond_card": False},
+    ]
+    specification = chart_specification(criteria_chart(criteria))
+    (rows,) = (rows for rows in specification["datasets"].values() if "name" in rows[0])
+    assert [(row["percent"], row["beyond"]) for row in rows] == [
+        (pytest.approx(100 * 3.0 / 4.5), False),
+        (pytest.approx(120.0), True),
+    ]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tank2sim.simulation import ensemble as module
-from tank2sim.simulation.bands import FOLLOWED, figure_bands, history_bands, small_edge_first, track_band
+from tank2sim.simulation.bands import FOLLOWED, figure_bands, history_bands, track_band
 from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, ensemble
 from tank2sim.simulation.member_streams import member_stream
 
@@ -188,20 +188,6 @@ def test_a_question_is_prepared_once_for_many_batches() -> None:
     module._prepared.cache_clear()
     ensemble(Linear(), DRAWS, 20, batch=4)
     assert module._prepared.cache_info().misses == 1 and pickle.loads(pickle.dumps(Linear())) == Linear()
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0], ids=["starboard", "port"])
-def test_the_edge_of_the_small_figures_is_the_inner_one_of_a_turn(side: float) -> None:
-    angle = np.linspace(0.0, 2.0, 50)
-
-    def circle(radius: float) -> np.ndarray:
-        return np.column_stack([radius * np.sin(angle), side * (100.0 - radius * np.cos(angle))])
-
-    inner, middle, outer = circle(90.0), circle(100.0), circle(110.0)
-    left, right = (outer, inner) if side > 0 else (inner, outer)
-    small, large = small_edge_first(left, middle, right)
-    assert small is inner and large is outer
-    assert np.abs(small).max() < np.abs(large).max()
 
 
 def test_a_member_is_followed_for_ten_steps_to_the_next_normal_and_not_further():

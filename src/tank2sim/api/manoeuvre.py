@@ -8,25 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.dynamics.external_forces import external_inputs, with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.simulation.card_range import entry_name, single_figures
-from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.simulation.manoeuvres import Manoeuvre, PullOut, parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trial_file import histories, trial_columns, trial_csv
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
-    import altair as alt
     import pandas as pd
 
     from tank2sim.analysis.ensemble.results import ManoeuvreBands
     from tank2sim.api.ship import Ship
 
 
-class ManoeuvreResult(Result):
+class ManoeuvreResult(PagedResult):
     """A simulated manoeuvre.
 
     Parameters
@@ -38,6 +37,8 @@ class ManoeuvreResult(Result):
         Motion and figures, SI and radians.
     bands : ManoeuvreBands, optional
         Of an ensemble.
+    other_side : Run, optional
+        Of a pull-out, that from the other side.
 
     Examples
     --------
@@ -51,8 +52,10 @@ class ManoeuvreResult(Result):
 
     command = "simulate"
 
-    def __init__(self, ship: Ship, words: str, run: Run, bands: ManoeuvreBands | None = None) -> None:
-        self.ship, self.words, self.run, self.bands = ship, words, run, bands
+    def __init__(
+        self, ship: Ship, words: str, run: Run, bands: ManoeuvreBands | None = None, other_side: Run | None = None
+    ) -> None:
+        self.ship, self.words, self.run, self.bands, self.other_side = ship, words, run, bands, other_side
         self.notices = tuple(dict.fromkeys([*run.notices, *(bands.asked.notices if bands else ())]))
 
     @property
@@ -82,15 +85,28 @@ class ManoeuvreResult(Result):
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
+        particulars = getattr(self.ship.card, "ship", None)
+        other = self.other_side
         return {
             "ship": self.ship.name,
+            "length_m": getattr(particulars, "length_m", None),
+            "beam_m": getattr(particulars, "beam_m", None),
             "manoeuvre": self.words,
             "figures": self.run.figures,
+            "limits": self.limits,
             **self.run.reading.as_json(),
             "notices": self.run.notices,
             "histories": histories(self.run.trajectory),
             **({"ensemble": self.bands.as_json()} if self.bands else {}),
+            **({"other_side": {"figures": other.figures, "histories": histories(other.trajectory)}} if other else {}),
         }
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Largest figures that IMO MSC.137(76) allows, by name with unit; empty of manoeuvres that it does not have."""
+        from tank2sim.analysis.stability.imo import limits_of
+
+        return {} if self.words.startswith("file:") else limits_of(parse_manoeuvre(self.words), self.ship.model)
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -110,14 +126,6 @@ class ManoeuvreResult(Result):
         from tank2sim.api.ensemble import band_table
 
         return figures, band_table(self.bands.figures, self.bands.asked)
-
-    def charts(self) -> dict[str, alt.TopLevelMixin]:
-        """Track and time histories."""
-        from tank2sim.report.ensemble.sections import banded_chart
-        from tank2sim.report.kit.run_series import run_chart
-
-        title, run = self._title, self.run.trajectory
-        return {"motion": banded_chart(title, run, self.bands) if self.bands else run_chart(title, run)}
 
     @property
     def _title(self) -> str:
@@ -161,9 +169,11 @@ def simulate_manoeuvre(
     if external and ensemble.members:
         raise InputError("external", "", "cannot act on an ensemble", "leave out either the members or the force")
     inputs = external_inputs(external or {}, rolls="force.K" in ship.model)
-    run = simulate(
-        with_external_forces(ship.model) if inputs else ship.model, manoeuvre, duration_s=duration_s, inputs=inputs
-    )
+    model = with_external_forces(ship.model) if inputs else ship.model
+    run = simulate(model, manoeuvre, duration_s=duration_s, inputs=inputs)
+    other = None
+    if isinstance(manoeuvre, PullOut):
+        other = simulate(model, PullOut(-manoeuvre.rudder), duration_s=duration_s, inputs=inputs)
     bands = None
     if ensemble.members:
         from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
@@ -173,4 +183,4 @@ def simulate_manoeuvre(
         request = EnsembleRequest(ensemble.members, ensemble.seed)
         with ensemble.computing(FEW_IN_LANES if runs_in_lanes(manoeuvre) else FEW) as executor:
             bands = manoeuvre_bands(ship.manoeuvring(), manoeuvre, length, request, executor)
-    return ManoeuvreResult(ship, words, run, bands)
+    return ManoeuvreResult(ship, words, run, bands, other)

@@ -37,7 +37,7 @@ class ReportResult(PagedResult):
     --------
     >>> import tank2sim as t2s
     >>> t2s.make_report(t2s.load("mariner").turn(35)).title
-    'Simulated manoeuvre: Mariner class'
+    'Mariner class: turning circle, 35° of rudder to starboard'
     """
 
     command = "report"

@@ -172,18 +172,29 @@ class ReplayKeys(_Part):
     simulated: Columns
 
 
+class OtherSideKeys(_Part):
+    """A pull-out from the other side."""
+
+    figures: FigureValues
+    histories: Columns
+
+
 class SimulateKeys(_Keys):
-    """A simulated manoeuvre."""
+    """A simulated manoeuvre; `limits` by name of figure, of IMO MSC.137(76)."""
 
     ship: str
+    length_m: Number
+    beam_m: Number
     manoeuvre: str
     figures: FigureValues
+    limits: dict[str, float]
     left_card_range_s: Number
     left_card_range_by: str
     outside_card_range: list[str]
     notices: list[str]
     histories: Columns
     ensemble: NotRequired[ManoeuvreEnsembleKeys]
+    other_side: NotRequired[OtherSideKeys]
 
 
 class OperatingPointKeys(_Part):
@@ -815,6 +826,7 @@ class BridgeKeys(_Keys):
     full_astern_from: list[Any]
     hard_over_to_hard_over_s: Number
     rudder_neutral_deg: Number
+    squat: list[dict[str, float]]
     notices: list[str]
     ballast: dict[str, Any] | None
 

@@ -61,6 +61,7 @@ GROUPS = {
         "pilotcard": "a pilot card (A4)",
         "steer": "a page on which the ship is steered",
         "report": "one page of any result",
+        "open": "a page, in the browser",
         "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
     },
 }

@@ -8,7 +8,7 @@ import click
 
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import ensemble_options, plot_option, set_option
+from tank2sim.cli.options import ensemble_options, page_option, plot_option, set_option
 from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS
 
 
@@ -28,6 +28,7 @@ from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS
 @click.option(
     "-o", "--output", "--out", type=click.Path(path_type=Path), metavar="RUN.csv", help="Write the motion as a trial."
 )
+@page_option()
 @plot_option
 @ensemble_options
 @json_option
@@ -37,6 +38,7 @@ def command(
     duration: float | None,
     values: dict[str, object],
     output: Path | None,
+    page: Path | None,
     plot: Path | None,
     members: int | None,
     seed: int,
@@ -48,5 +50,5 @@ def command(
     result = ship.simulate(manoeuvre, duration_s=duration, members=members or 0, seed=seed, executor=executor)
     inputs = [ship.card.source, manoeuvre.removeprefix("file:")]
     files = {output: result.to_csv()} if output else {}
-    write_result(result, inputs, json_file=json_file, plot=plot, files=files)
+    write_result(result, inputs, json_file=json_file, page=page, plot=plot, files=files)
     show_result(result)

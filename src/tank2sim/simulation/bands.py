@@ -88,22 +88,6 @@ class TrackBand:
         return {"middle_m": self.middle, "low_m": self.low, "high_m": self.high}
 
 
-def small_edge_first(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """The edges of a track's band, first the one of the 5 % quantile of figures such as the advance.
-
-    On a turn to either side it is the inner edge; where the middle turns by less than 90 deg, the left one.
-
-    Parameters
-    ----------
-    left, middle, right : arrays (n, 2)
-        x and y, m, of the lines of a :class:`TrackBand`; nan beyond their end.
-    """
-    steps = np.diff(middle[np.isfinite(middle).all(axis=1)], axis=0)
-    course = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    to_starboard = len(course) > 0 and course[-1] - course[0] > np.pi / 2
-    return (right, left) if to_starboard else (left, right)
-
-
 def figure_bands(found: Ensemble) -> dict[str, Band]:
     """The band of every figure, by name."""
     bands = {}

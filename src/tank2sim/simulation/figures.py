@@ -220,6 +220,22 @@ def _pull_out(run: Trajectory, rudder: float) -> Figures:
     }
 
 
+def zero_rate_rudders(rudders: Array, rates: Array) -> tuple[float, float]:
+    """Return the rudder at which the yaw rate of a spiral is zero, on its way out and on its way back.
+
+    Parameters
+    ----------
+    rudders, rates : array (n,)
+        Rudder angles and steady yaw rates in the order they were run, in any units; the way back has the rudders of
+        the way out.
+    """
+    half = len(rudders) // 2
+    outward, back = (
+        float(np.interp(0.0, way[::-1], rudders[: half + 1][::-1])) for way in (rates[: half + 1], rates[half:][::-1])
+    )
+    return outward, back
+
+
 def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
     changes = np.flatnonzero(np.diff(run["rudder.command"]) != 0)
     ends = np.append(changes[len(changes) - len(rudders) + 1 :] + 1, len(run.t) - 1)
@@ -231,7 +247,7 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
     # as the rudder has to go beyond one crossing of zero rate to reach the other.
     height = float(np.max(np.abs(outward - back)))
     loop = height > LOOP_HEIGHT * np.max(np.abs(rates))
-    crossings = [np.interp(0.0, way[::-1], angles[: half + 1][::-1]) for way in (outward, back)]
+    crossings = zero_rate_rudders(angles, rates)
     return {
         "rudder_deg": [float(angle) for angle in np.round(angles, 9)],
         "rate_degps": [float(rate) for rate in rates],

@@ -44,6 +44,7 @@ SIDES = {
 }
 SIMULATED = {"ship": "A ship", "manoeuvre": "turn:10", "figures": {"advance_m": 570.0}, "notices": []}
 SIMULATED |= {"histories": HISTORIES}
+TURN = "Turning circle, 10° of rudder to starboard"
 ENSEMBLE = {"members": 5, "t_s": TIMES, "histories": {"u_mps": BAND, "x_m": BAND, "y_m": BAND}, "track": SIDES}
 AUDITED = {
     "findings": [
@@ -123,34 +124,34 @@ def panels(chart: Illustration) -> dict[str, list[dict[str, Any]]]:
 
 def test_a_simulated_manoeuvre_has_its_track_and_its_histories_in_their_units() -> None:
     charts = drawn(SIMULATED)
-    assert list(charts) == ["Track: turn:10", "Histories: turn:10"]
-    track = [(row["x"], row["y"]) for row in rows_of(charts["Track: turn:10"].chart) if row["run"] == "simulated"]
+    assert list(charts) == [TURN, "Time histories"]
+    track = [(row["x"], row["y"]) for row in rows_of(charts[TURN].chart) if row.get("run") == "track"]
     assert track[:4] == list(zip(HISTORIES["x_m"], HISTORIES["y_m"], strict=True))
-    shown = panels(charts["Histories: turn:10"])
+    shown = panels(charts["Time histories"])
     assert list(shown) == [
         "rudder, + to starboard (deg)",
-        "revolutions (rpm)",
         "heading (deg)",
         "yaw rate (deg/s)",
         "surge velocity (m/s)",
     ]
-    for title, name in (("heading (deg)", "psi_deg"), ("revolutions (rpm)", "n_rpm"), ("yaw rate (deg/s)", "r_degps")):
+    for title, name in (("heading (deg)", "psi_deg"), ("yaw rate (deg/s)", "r_degps")):
         assert [row["v"] for row in shown[title]] == pytest.approx(HISTORIES[name])
     assert [row["v"] for row in shown["surge velocity (m/s)"]] == HISTORIES["u_mps"]
+    assert "revolutions 60 rpm" in charts["Time histories"].caption
 
 
 def test_an_ensemble_is_drawn_as_bands_next_to_the_run() -> None:
     charts = drawn({**SIMULATED, "ensemble": ENSEMBLE})
-    speeds = panels(charts["Histories: turn:10"])["surge velocity (m/s)"]
-    for label, quantile in (("5 %", "p5"), ("50 %", "p50"), ("95 %", "p95")):
-        assert [row["v"] for row in speeds if row["run"] == label] == BAND[quantile]
-    low = [row["y"] for row in rows_of(charts["Track: turn:10"].chart) if row["run"] == "5 %"][:4]
-    assert low == pytest.approx([y - 0.1 for y in HISTORIES["y_m"]])
+    speeds = [row for row in rows_of(charts["Time histories"].chart) if row.get("run") == "band"]
+    assert [(row["low"], row["high"]) for row in speeds] == list(zip(BAND["p5"], BAND["p95"], strict=True))
+    edges = [row["y"] for row in rows_of(charts[TURN].chart) if row.get("run") == "band"]
+    port = [y - 0.1 for y in HISTORIES["y_m"]]
+    assert edges == pytest.approx(port + [y + 0.1 for y in HISTORIES["y_m"]][::-1])
 
 
 def test_a_spiral_is_drawn_against_its_rudder() -> None:
     figures = {"rudder_deg": [10.0, 0.0, -10.0], "rate_degps": [0.5, 0.1, -0.4]}
-    chart = drawn({**SIMULATED, "manoeuvre": "spiral", "figures": figures})["Steady yaw rate: spiral"]
+    chart = drawn({**SIMULATED, "manoeuvre": "spiral", "figures": figures})["Direct spiral"]
     rows = [(row["d"], row["r"]) for row in rows_of(chart.chart) if "i" in row]
     assert [value for row in rows for value in row] == pytest.approx([10.0, 0.5, 0.0, 0.1, -10.0, -0.4])
 
@@ -291,13 +292,13 @@ PILOTED = {
 def test_an_autopilot_has_its_loop_and_its_steps() -> None:
     charts = drawn(PILOTED)
     assert list(charts) == [
+        "Course change by 20 deg",
+        "A change that takes the rudder to its limit",
+        "Course keeping, the last waves",
         "Loop transfer",
         "Nyquist curve",
         "Sensitivity and closed loop",
         "Poles of the closed loop",
-        "Course change by 20 deg",
-        "A change that takes the rudder to its limit",
-        "Course keeping, the last waves",
     ]
     magnitude, phase = panels(charts["Loop transfer"]).values()
     assert [row["v"] for row in magnitude] == pytest.approx(20 * np.log10(np.abs(LOOP)), rel=1e-4)

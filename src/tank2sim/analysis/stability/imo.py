@@ -202,19 +202,62 @@ def imo_criteria(
         found = trials.worst(trial.manoeuvres, *trial.criteria.values())
         worst |= dict(zip(trial.criteria, found, strict=True))
 
-    def criterion(name: str, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
+    limits = largest_allowed(time)
+
+    def criterion(name: str, unit: str, remark: str = "") -> ImoCriterion:
         text = "; ".join(text_part for text_part in (worst[name].remark, remark) if text_part)
-        return ImoCriterion(name, worst[name].value, allowed, unit, text, worst[name].beyond)
+        return ImoCriterion(name, worst[name].value, limits[name], unit, text, worst[name].beyond)
 
     return (
-        criterion(ADVANCE, 4.5, "L"),
-        criterion(TACTICAL, 5.0, "L"),
-        criterion(INITIAL, 2.5, "L"),
-        criterion(FIRST_OF_TEN, min(max(5 + 0.5 * time, 10.0), 20.0), "deg", scale),
-        criterion(SECOND_OF_TEN, min(max(17.5 + 0.75 * time, 25.0), 40.0), "deg", scale),
-        criterion(FIRST_OF_TWENTY, 25.0, "deg"),
+        criterion(ADVANCE, "L"),
+        criterion(TACTICAL, "L"),
+        criterion(INITIAL, "L"),
+        criterion(FIRST_OF_TEN, "deg", scale),
+        criterion(SECOND_OF_TEN, "deg", scale),
+        criterion(FIRST_OF_TWENTY, "deg"),
         _stopping(trials),
     )
+
+
+def largest_allowed(time: float) -> dict[str, float]:
+    """Return the limit of each criterion (5.3.1 to 5.3.4), in L or deg, by its name.
+
+    Parameters
+    ----------
+    time : float
+        L/V at the speed of the trials, s.
+    """
+    return {
+        ADVANCE: 4.5,
+        TACTICAL: 5.0,
+        INITIAL: 2.5,
+        FIRST_OF_TEN: min(max(5 + 0.5 * time, 10.0), 20.0),
+        SECOND_OF_TEN: min(max(17.5 + 0.75 * time, 25.0), 40.0),
+        FIRST_OF_TWENTY: 25.0,
+        TRACK_REACH: STOPPING,
+    }
+
+
+def limits_of(manoeuvre: Manoeuvre, model: Model) -> dict[str, float]:
+    """Return the limits of MSC.137(76) for the figures of a manoeuvre, by name; empty if it is not one of its trials.
+
+    Those that go with L/V in seconds are left out of a model's, which does not keep it.
+
+    Parameters
+    ----------
+    manoeuvre : Manoeuvre
+        A turning circle at the largest rudder up to 35 deg, a 10/10 or 20/20 zigzag, or a stop with full astern.
+    model : Model
+        The ship, at the speed of its card.
+    """
+    values = dict(zip(model.parameter_names, model.parameter_values(None).tolist(), strict=True))
+    allowed = largest_allowed(values["ship.length"] / values["ship.speed"])
+    if manoeuvre == Stop():
+        return {"track_reach_lengths": allowed[TRACK_REACH]}
+    trials = manoeuvring_trials(largest_trial_rudder(values))
+    criteria = next((trial.criteria for trial in trials if manoeuvre in trial.manoeuvres), {})
+    left_out = (FIRST_OF_TEN, SECOND_OF_TEN) if values["ship.length"] < SHORTEST_SHIP_M else ()
+    return {figure: allowed[name] for name, figure in criteria.items() if name not in left_out}
 
 
 def stopping_reach(model: Model, changed: Mapping[str, float], integrator: Integrator) -> float | None:

@@ -19,6 +19,7 @@ from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, circle
 from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import undisturbed_inputs
+from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
 from tank2sim.errors import InputError
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
@@ -32,6 +33,10 @@ DEEP = 20.0
 
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 """Revolutions over nominal ones of the reported speeds without given telegraph orders: project choice."""
+
+UNDER_KEEL, SQUAT_SPEEDS = (0.2, 0.5), (0.5, 0.75)
+"""Water under the keel over the draught, and speeds over that of the card, of the table of squat: project choice, about
+what a channel has, and speeds that a ship makes in one."""
 
 ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
 """Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
@@ -72,6 +77,15 @@ class StopFrom:
     within: bool = True
 
 
+@dataclass(frozen=True)
+class Squat:
+    """Estimated largest sinkage by squat at a speed, with the water under the keel of the ship at rest."""
+
+    clearance_m: float
+    speed_mps: float
+    squat_m: float
+
+
 @dataclass(frozen=True, eq=False)
 class Bridge:
     """Data of a ship in the loading condition of its card.
@@ -95,6 +109,8 @@ class Bridge:
         From hard over to hard over, by the gear's rate.
     neutral_deg : float or None
         Rudder that keeps a straight course, + to starboard; None without one.
+    squat : tuple of Squat
+        Empty without block coefficient, beam and draught.
     notices : tuple of str
     """
 
@@ -108,6 +124,7 @@ class Bridge:
     stops_from: tuple[StopFrom, ...]
     hard_over_s: float | None
     neutral_deg: float | None
+    squat: tuple[Squat, ...] = ()
     notices: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, object]:
@@ -124,6 +141,7 @@ class Bridge:
             "full_astern_from": [vars(row) for row in self.stops_from],
             "hard_over_to_hard_over_s": self.hard_over_s,
             "rudder_neutral_deg": self.neutral_deg,
+            "squat": [vars(row) for row in self.squat],
             "notices": list(self.notices),
         }
 
@@ -163,8 +181,30 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         stops_from=_stops_from(ship, telegraph, deep),
         hard_over_s=2 * largest / rate if largest and rate else None,
         neutral_deg=_neutral(ship),
+        squat=squat_of(card),
         notices=tuple(dict.fromkeys((*circle_notes, *troubles))),
     )
+
+
+def squat_of(card: ManoeuvringCard) -> tuple[Squat, ...]:
+    """Return the larger squat by Barrass and ICORELS at shares of the speed and of the draught under the keel.
+
+    Speeds of a depth Froude number above 0.7, for which the formulas are not made, are left out.
+    """
+    ship, gravity = card.ship, card.environment.gravity_mps2
+    if ship.draught_m is None or ship.beam_m is None or ship.block_coefficient is None:
+        return ()
+    volume = ship.block_coefficient * ship.length_m * ship.beam_m * ship.draught_m
+    found = []
+    for under_keel in UNDER_KEEL:
+        clearance = under_keel * ship.draught_m
+        for share in SQUAT_SPEEDS:
+            speed = share * card.model.speed_mps
+            square = speed**2 / (gravity * (ship.draught_m + clearance))
+            if square <= LARGEST_DEPTH_FROUDE**2:
+                sizes = barrass_squat(ship.block_coefficient, speed), icorels_squat(volume, ship.length_m, square)
+                found.append(Squat(clearance, speed, max(sizes)))
+    return tuple(found)
 
 
 def _check_orders(card: ManoeuvringCard, orders: Mapping[str, float]) -> None:

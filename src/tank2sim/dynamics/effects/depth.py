@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
@@ -44,6 +46,16 @@ def _relative_loss(model: Model, section: ca.SX, depth: ca.SX, gravity: float) -
     return ca.fmin(0.1242 * blocked + waves, LARGEST_LOSS)
 
 
+def barrass_squat(block: Any, speed_mps: Any) -> Any:
+    """Return the largest sinkage in open shallow water, m, by Barrass (2004); numbers, or symbols of a model."""
+    return block * (speed_mps / KNOT_MPS) ** 2 / 100
+
+
+def icorels_squat(volume_m3: Any, length_m: Any, square: Any) -> Any:
+    """Return the largest sinkage, m, by ICORELS (1980); `square` is that of the depth Froude number, below 1."""
+    return 2.4 * volume_m3 / length_m**2 * square / (1 - square) ** 0.5
+
+
 def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Derivatives as in ``water_depth``, and with Fr_h = u/sqrt(g H):
 
@@ -64,14 +76,13 @@ def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard
     resistance = scales(model, ca.SX(1)).force * resistance_prime(model, card) * u * ca.fabs(u)
     slowed = with_forces(model, X=-resistance * (1 / (1 - loss) ** 2 - 1))
     square = u**2 / (gravity * depth)
-    below_critical = ca.sqrt(1 - ca.fmin(square, 0.9))
     volume = block * beam * draught * model.symbol("ship.length")
     described = (
-        ("squat.barrass", "Largest sinkage by squat, Barrass (2004)", block * (u / KNOT_MPS) ** 2 / 100),
+        ("squat.barrass", "Largest sinkage by squat, Barrass (2004)", barrass_squat(block, u)),
         (
             "squat.icorels",
             "Largest sinkage by squat, ICORELS (1980)",
-            2.4 * volume / model.symbol("ship.length") ** 2 * ca.fmin(square, 0.9) / below_critical,
+            icorels_squat(volume, model.symbol("ship.length"), ca.fmin(square, 0.9)),
         ),
     )
     squats = [

@@ -71,7 +71,7 @@ CUBIC_YAW_DAMPING = Effect(
     name="cubic_yaw_damping",
     acts_on="force",
     description="The hull resists fast turning more than in proportion to the rate of turn.",
-    source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
+    source="(3.8) of Krezelewski and Misiag; Abkowitz (1964)",
     parameters=(
         # About 15 % of the Mariner's N by turning at r' = 0.5, as cubic terms have there (project choice).
         EffectParameter("Yrrr", "change of Yrrr, prime", -0.1, 0.1, absent=0.0, typical=(1e-3,)),
@@ -85,7 +85,7 @@ SWAY_YAW_COUPLING = Effect(
     name="sway_yaw_coupling",
     acts_on="force",
     description="Drifting and turning together give a force and a moment that neither gives alone.",
-    source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
+    source="(3.8) of Krezelewski and Misiag; Abkowitz (1964)",
     parameters=(
         # At v' = 0.2 and r' = 0.5 about 15 % of the forces of the linear terms (project choice).
         EffectParameter("Yvrr", "change of Yvrr, prime", -0.5, 0.5, absent=0.0, typical=(-5e-3,)),
@@ -99,7 +99,7 @@ TURNING_DRAG = Effect(
     name="turning_drag",
     acts_on="force",
     description="The ship loses more (or less) speed in a turn.",
-    source="(3.8) of paper 2, Krezelewski and Misiag: the term X_vr v r",
+    source="(3.8) of Krezelewski and Misiag: the term X_vr v r",
     parameters=(
         EffectParameter(
             "Xvr",
@@ -120,7 +120,7 @@ ADDED_YAW_INERTIA = Effect(
     name="added_yaw_inertia",
     acts_on="mass",
     description="More (or less) water turns with the ship when its rate of turn changes.",
-    source="(3.7) of paper 2, Krezelewski and Misiag: J_z - Nrdot; Alyshev (2019)",
+    source="(3.7) of Krezelewski and Misiag: J_z - Nrdot; Alyshev (2019)",
     parameters=(EffectParameter("factor", "relative change of Nrdot", -1.0, 5.0, absent=0.0, typical=(0.3,)),),
     equations=_magnified(("Nrdot",)),
     changes=("Nrdot",),
@@ -130,7 +130,7 @@ ADDED_SWAY_MASS = Effect(
     name="added_sway_mass",
     acts_on="mass",
     description="More (or less) water moves with the ship when its drift changes.",
-    source="(3.7) of paper 2, Krezelewski and Misiag: m - Yvdot",
+    source="(3.7) of Krezelewski and Misiag: m - Yvdot",
     parameters=(EffectParameter("factor", "relative change of Yvdot", -0.9, 5.0, absent=0.0, typical=(0.2,)),),
     equations=_magnified(("Yvdot",)),
     changes=("Yvdot",),
@@ -140,7 +140,7 @@ LINEAR_YAW_DAMPING = Effect(
     name="linear_yaw_damping",
     acts_on="force",
     description="The hull resists turning more (or less), at small rates of turn too.",
-    source="(3.5) of paper 2, Krezelewski and Misiag: hydrodynamic parts of Yr and Nr",
+    source="(3.5) of Krezelewski and Misiag: hydrodynamic parts of Yr and Nr",
     parameters=(
         EffectParameter(
             "factor", "relative change of the hydrodynamic Yr and Nr", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)
@@ -154,7 +154,7 @@ LINEAR_SWAY_DAMPING = Effect(
     name="linear_sway_damping",
     acts_on="force",
     description="The hull resists drifting sideways more (or less), at small drift too.",
-    source="(3.5) of paper 2, Krezelewski and Misiag: Yv and Nv",
+    source="(3.5) of Krezelewski and Misiag: Yv and Nv",
     parameters=(
         EffectParameter("factor", "relative change of Yv and Nv", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)),
     ),

@@ -58,7 +58,7 @@ RUDDER_EFFECTIVENESS = Effect(
     name="rudder_effectiveness",
     acts_on="force",
     description="The rudder gives more (or less) force than the card says.",
-    source="(3.8) of paper 2, Krezelewski and Misiag: its terms in delta",
+    source="(3.8) of Krezelewski and Misiag: its terms in delta",
     parameters=(
         EffectParameter(
             "factor",

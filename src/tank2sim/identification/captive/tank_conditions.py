@@ -200,7 +200,7 @@ def model_length(length_m: float) -> Iterator[Caution]:
         yield Caution(
             "model length",
             f"The model is {length_m:.3g} m long: below {SHORTEST_MODEL_M:g} m the scale effect grows, and most "
-            "coefficients of 2 m models differ by about 10 % from those of 4 m (paper 2).",
+            "coefficients of 2 m models differ by about 10 % from those of 4 m (Krezelewski and Misiag).",
         )
 
 
@@ -214,7 +214,7 @@ def frequency_parameters(
         yield Caution(
             "frequency parameter",
             f"omega U/g reaches {max(values[name] for name in high):.3g}; from {LARGEST_FREQUENCY_PARAMETER:g} on "
-            "coefficients fall steeply (paper 2): oscillate with periods above "
+            "coefficients fall steeply (Krezelewski and Misiag): oscillate with periods above "
             f"{shortest_period_s(speed_mps, gravity_mps2):.3g} s at this speed.",
             high,
         )
@@ -240,12 +240,12 @@ def flow_memory(runs: tuple[OscillationMotion, ...], speed_mps: float, length_m:
 def trim(trim_m: float | None, length_m: float) -> Iterator[Caution]:
     """A model that is not on even keel."""
     if trim_m is None:
-        yield lacking("trim", "the trim, which acts strongly on Y_r and N_r (paper 2)", "[model] trim_m")
+        yield lacking("trim", "the trim, which acts strongly on Y_r and N_r (Krezelewski and Misiag)", "[model] trim_m")
     elif trim_m != 0:
         yield Caution(
             "trim",
             f"The model is trimmed by {abs(trim_m):.3g} m ({100 * abs(trim_m) / length_m:.2g} % of the length): trim "
-            "acts strongly on Y_r and N_r, a change by 1 % changed one of them by 7.5 % (paper 2).",
+            "acts strongly on Y_r and N_r, a change by 1 % changed one of them by 7.5 % (Krezelewski and Misiag).",
         )
 
 
@@ -270,7 +270,7 @@ def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | Non
             yield Caution(
                 "similarity",
                 f"{name} is {of_model:.4g} of the model and {of_ship:.4g} of the ship card, {amount} apart; "
-                "derivatives hold for the ship only if both are equal (paper 2).",
+                "derivatives hold for the ship only if both are equal (Krezelewski and Misiag).",
             )
 
 

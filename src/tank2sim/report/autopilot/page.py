@@ -33,9 +33,10 @@ _SIGNALS = (
 
 def autopilot_page(found: Json) -> Page:
     """The page, from the JSON of an :class:`.AutopilotStudy`."""
-    sections = [_controller(found), _loop(found), _calm(found), _weather(found)]
+    sections = [_calm(found)]
     if found["track"]:
         sections.append(_track(found))
+    sections += [_weather(found), _controller(found), _loop(found)]
     if exported := found.get("export"):
         sections.append(exported_section(exported))
     if found["notices"]:
@@ -54,15 +55,6 @@ def _figures(found: Json) -> list[KeyFigure]:
     peak = Verdict.PASSED if first["sensitivity_peak"] <= HIGHEST_PEAK else Verdict.CAUTION
     stable = sum(speed["stable"] for speed in speeds)
     return [
-        KeyFigure(label="Phase margin", value=first["phase_margin_deg"], unit="deg"),
-        KeyFigure(label="Ms", value=first["sensitivity_peak"], verdict=peak, note=f"no more than {HIGHEST_PEAK:g}"),
-        KeyFigure(label="Delay margin", value=first["delay_margin_s"], unit="s"),
-        KeyFigure(
-            label="Stable",
-            value=f"{stable} of {len(speeds)}",
-            verdict=Verdict.PASSED if stable == len(speeds) else Verdict.FAILED,
-            note="speeds" if len(speeds) > 1 else "speed of the design",
-        ),
         KeyFigure(
             label="Overshoot",
             value=change["overshoot_deg"],
@@ -70,6 +62,21 @@ def _figures(found: Json) -> list[KeyFigure]:
             note=f"in a change by {change['ordered_deg']:.3g} deg",
         ),
         KeyFigure(label="Heading error", value=keeping["heading_error_rms_deg"], unit="deg", note="rms, in weather"),
+        KeyFigure(label="Phase margin", value=first["phase_margin_deg"], unit="deg"),
+        KeyFigure(
+            label="Peak of sensitivity, Ms",
+            value=first["sensitivity_peak"],
+            verdict=peak,
+            note=f"no more than {HIGHEST_PEAK:g}",
+            limit=HIGHEST_PEAK,
+        ),
+        KeyFigure(label="Delay margin", value=first["delay_margin_s"], unit="s"),
+        KeyFigure(
+            label="Stable",
+            value=f"{stable} of {len(speeds)}",
+            verdict=Verdict.PASSED if stable == len(speeds) else Verdict.FAILED,
+            note="speeds" if len(speeds) > 1 else "speed of the design",
+        ),
     ]
 
 
@@ -269,9 +276,10 @@ def _track(found: Json) -> PageSection:
     runs = found["track_histories"].items()
     sailed = [TrackData(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs]
     points = np.array(found["waypoints_m"], dtype=float)
-    wanted = TrackData(
-        label="waypoints", x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=True
-    )
+    wanted = [
+        TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
+        for label, measured in (("legs", False), ("waypoints", True))
+    ]
     errors = [CrossTrack(label=name, time_s=one["t_s"], error_m=one["cross_track_error_m"]) for name, one in runs]
     text = (
         "Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap where a leg "
@@ -282,7 +290,7 @@ def _track(found: Json) -> PageSection:
         text=text,
         tables=[PageTable(caption="Cross-track errors, positive to starboard", columns=columns, rows=rows)],
         charts=[
-            Illustration(chart=track_chart([wanted, *sailed], title="Track")),
+            Illustration(chart=track_chart([*sailed, *wanted], title="Track and its legs")),
             Illustration(chart=cross_track_chart(errors, title="Cross-track error")),
         ],
     )

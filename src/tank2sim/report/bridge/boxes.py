@@ -265,10 +265,15 @@ def draught_increase(bridge: Bridge) -> Box:
     return Box("Draught increase by heel", (Row("Heel", values),), tuple(f"{heel}°" for heel in HEELS_DEG), note)
 
 
-def squat() -> Box:
-    """Squat is not on a card."""
-    heads = ("under-keel clearance", "speed, kn", "bow squat")
-    return Box("Draught increase by squat (loaded), estimated", (Row("", (None,) * 3),) * 2, heads)
+def squat(bridge: Bridge) -> Box:
+    """Estimated squat, as A.601(15) allows it, with the formulas it is from; blank without the ship's form."""
+    heads = ("under-keel clearance", "speed, kn", "largest squat")
+    rows = tuple(
+        Row("", (_number(row.clearance_m, "m", 3), knots(row.speed_mps), _number(row.squat_m, "m", 2)))
+        for row in bridge.squat
+    )
+    note = "Larger of Barrass (2004) and ICORELS (1980), open shallow water: an estimate." if rows else ""
+    return Box("Draught increase by squat, estimated", rows or (Row("", (None,) * 3),) * 2, heads, note)
 
 
 def thrusters() -> Box:

@@ -75,7 +75,7 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
         boxes.stopping(bridge),
         boxes.zigzags(bridge),
         boxes.draught_increase(bridge),
-        boxes.squat(),
+        boxes.squat(bridge),
         boxes.thrusters(),
         boxes.overboard(),
     )

@@ -29,8 +29,8 @@ from tank2sim.report.kit.chart_parts import (
     vector,
     with_unit,
 )
+from tank2sim.report.kit.theme import BAND_OPACITY
 
-BAND_OPACITY = 0.16
 _CROWDED = 40
 _USUAL_LIMIT = 2.0
 

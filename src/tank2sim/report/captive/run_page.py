@@ -10,7 +10,6 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.report.captive.charts import BAND_OPACITY
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
     axis_above,
@@ -33,6 +32,7 @@ from tank2sim.report.kit.page import (
     Verdict,
     notices_section,
 )
+from tank2sim.report.kit.theme import BAND_OPACITY
 
 _FORCES = {"X": "X (N)", "Y": "Y (N)", "N": "N (N m)"}
 _KEYS = {"X": "N", "Y": "N", "N": "Nm"}

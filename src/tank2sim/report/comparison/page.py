@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
-from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
+from tank2sim.marks import assumed_words
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import TrackData, track_chart
 from tank2sim.report.kit.numbers import format_number
@@ -42,8 +43,12 @@ _TRIALS = (
 def compare_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim compare``."""
     labels = [card["label"] for card in found["cards"]]
-    sections = [_cards(found["cards"]), _coefficients(found["coefficients"], found.get("effects", []), labels)]
-    sections += [_trial(trial, labels, first=place == 0) for place, trial in enumerate(found["trials"])]
+    sections = [
+        *_figure_differences(found["trials"], labels, assumed_words(found["notices"])),
+        *(_trial(trial, labels) for trial in found["trials"]),
+        _coefficients(found["coefficients"], found.get("effects", []), labels),
+        _cards(found["cards"]),
+    ]
     sections += notices_section(found["notices"])
     return Page(
         title=found["cards"][0]["ship"],
@@ -75,15 +80,26 @@ def _cards(cards: Sequence[Mapping[str, Json]]) -> PageSection:
 def _coefficients(
     coefficients: Sequence[Mapping[str, Json]], effects: Sequence[Mapping[str, Json]], labels: Sequence[str]
 ) -> PageSection:
-    caption = "Coefficient by coefficient (values and errors times 1000)."
-    tables = [_coefficient_table(caption, coefficients, labels, 1000.0)]
-    if effects:
-        tables.append(_coefficient_table("Parameters of effects, SI.", effects, labels, 1.0))
+    tables, alike, alone = [], 0, []
+    for caption, rows, factor in (
+        ("Coefficients that differ (values and errors times 1000).", coefficients, 1000.0),
+        ("Parameters of effects that differ, SI.", effects, 1.0),
+    ):
+        shared = [row for row in rows if all(card["value"] is not None for card in row["cards"])]
+        differing = [row for row in shared if any(apart["percent"] for apart in row["differences"])]
+        alike += len(shared) - len(differing)
+        alone += [row["name"] for row in rows if row not in shared]
+        if differing:
+            tables.append(_coefficient_table(caption, differing, labels, factor))
+    omitted = [f"{alike} numbers are the same on all cards."] if alike else []
+    omitted += [f"Not on all cards: {', '.join(alone)}."] if alone else []
     charts, both = [], [*coefficients, *effects]
     if any(difference["standard_errors"] is not None for row in both for difference in row["differences"]):
         caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
         charts.append(Illustration(chart=_errors_chart(both, labels), caption=caption))
-    return PageSection(heading="Coefficients", text=f"{_COEFFICIENTS}\n\n{_ASSUMED}", tables=tables, charts=charts)
+    return PageSection(
+        heading="Coefficients", text="\n\n".join([_COEFFICIENTS, _ASSUMED, *omitted]), tables=tables, charts=charts
+    )
 
 
 def _coefficient_table(
@@ -147,13 +163,65 @@ def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[s
     return chart
 
 
-def _trial(trial: Mapping[str, Json], labels: Sequence[str], *, first: bool) -> PageSection:
+def _figure_differences(trials: Sequence[Mapping[str, Json]], labels: Sequence[str], assumed: str) -> list[PageSection]:
+    """Differences of the figures from those of the reference, all manoeuvres in one chart."""
+    rows = [
+        {
+            "run": label,
+            "name": f"{trial['name'].replace(' deg to', '')}: {in_words(name)[0]}",
+            "percent": plain(percent),
+        }
+        | (
+            {}
+            if z is None or not z
+            else {"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))}
+        )
+        for trial in trials
+        for name, row in trial["figures"].items()
+        for label, apart, z in zip(labels[1:], row["differences"], row["differences_standard_errors"], strict=True)
+        if apart is not None and row["values"][0] and not name.endswith("_lengths")
+        for percent in [100 * apart / abs(row["values"][0])]
+    ]
+    if not rows:
+        return []
+    chart = Illustration(chart=_percent_chart(rows, labels, assumed), caption=_PERCENT)
+    return [PageSection(heading="Figures of manoeuvres", text=_TRIALS, charts=[chart])]
+
+
+_PERCENT = (
+    "Points: difference from the reference. Bars: plus and minus two standard deviations, by the errors of both cards."
+)
+
+
+def _percent_chart(rows: Sequence[ChartRecord], labels: Sequence[str], assumed: str) -> alt.LayerChart:
+    """Differences in per cent of the reference's figure, a row a figure, a shape and colour for each card."""
+    names = list(dict.fromkeys(str(row["name"]) for row in rows))
+    look = series_look(labels[1:], as_points=labels[1:])
+    y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=180))
+    base = alt.Chart(data(rows)).encode(y=y, color=look.colour)
+    tooltip = ["run:N", "name:N", alt.Tooltip("percent:Q", title="difference (%)", format=NUMBER)]
+    x = alt.X("percent:Q", title=f"difference from {labels[0]} (%)")
+    points = base.mark_point(filled=True, size=60).encode(x=x, shape=look.shape, tooltip=tooltip)
+    bars = base.mark_rule(strokeWidth=2, opacity=0.6).encode(x="low:Q", x2="high:Q")
+    zero = alt.Chart(data([{"percent": 0.0}])).mark_rule(style="reference").encode(x="percent:Q")
+    chart: alt.LayerChart = alt.layer(zero, bars, points).properties(
+        title=f"Figures against the reference{assumed}",
+        width=440,
+        height=alt.Step(16),
+        description=f"Differences of {len(names)} figures from {labels[0]} in per cent.",
+    )
+    return chart
+
+
+def _trial(trial: Mapping[str, Json], labels: Sequence[str]) -> PageSection:
     columns = [Column(title="figure"), Column(title="unit")]
     columns += [Column(title=label) for label in labels]
     for label in labels[1:]:
         columns += [Column(title=f"{label}: difference", digits=3), Column(title="z", digits=3)]
     rows: list[list[Cell]] = []
     for name, row in trial["figures"].items():
+        if name.endswith("_lengths"):  # the figure in m has the same differences
+            continue
         cells: list[Cell] = [*in_words(name)]
         cells += [_with_error(*pair) for pair in zip(row["values"], row["standard_deviations"], strict=True)]
         for apart, z in zip(row["differences"], row["differences_standard_errors"], strict=True):
@@ -167,10 +235,8 @@ def _trial(trial: Mapping[str, Json], labels: Sequence[str], *, first: bool) -> 
             for track in trial["tracks"]
         ]
         charts = [Illustration(chart=track_chart(tracks, title=f"Tracks: {name}"))]
-    table = PageTable(caption=f"Figures of the {name}.", columns=columns, rows=rows)
-    return PageSection(
-        heading=name[:1].upper() + name[1:], text=_TRIALS if first else "", tables=[table], charts=charts
-    )
+    table = PageTable(caption=f"Figures of the {name}.", columns=columns, rows=rows, folded=True)
+    return PageSection(heading=name[:1].upper() + name[1:], tables=[table], charts=charts)
 
 
 def _with_error(value: float | None, error: float | None) -> str | None:

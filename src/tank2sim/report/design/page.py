@@ -52,13 +52,13 @@ def campaign_design_page(found: Json) -> Page:
     )
     charts = [Illustration(chart=chart) for chart in certainty_charts(found, "hours", "h")]
     sections = [
-        *notices_section(found["notices"]),
         PageSection(heading="Certainty of the figures", text=_FIGURES, charts=charts, tables=[figure_table(found)]),
         PageSection(
             heading="Where the runs are", text=_RUNS, charts=[Illustration(chart=chart) for chart in run_planes(found)]
         ),
         PageSection(heading="Coefficients that matter", text=_COEFFICIENTS, tables=[coefficient_table(found)]),
         PageSection(heading="The plan", tables=[_runs(found)]),
+        *notices_section(found["notices"]),
     ]
     return Page(
         title=f"{found['ship']}: the next captive campaign", subtitle=subtitle, figures=cards, sections=sections
@@ -167,7 +167,6 @@ def trial_design_page(found: Json) -> Page:
         [name, row["standard_error"], row["design"], row["usual"]] for name, row in found["coefficients"].items()
     ]
     sections = [
-        *notices_section(found["notices"]),
         PageSection(
             heading="Certainty of the figures",
             text=_TRIAL,
@@ -207,6 +206,7 @@ def trial_design_page(found: Json) -> Page:
                 )
             ],
         ),
+        *notices_section(found["notices"]),
     ]
     usual = found["usual_set"]
     subtitle = f"usual set: {', '.join(usual['manoeuvres'])}, {usual['minutes']:.3g} min"

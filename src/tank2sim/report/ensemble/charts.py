@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
-from tank2sim.report.captive.charts import BAND_OPACITY
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
     ChartRecord,
@@ -24,6 +23,7 @@ from tank2sim.report.kit.chart_parts import (
 )
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Illustration
+from tank2sim.report.kit.theme import BAND_OPACITY
 
 _WIDTH = 680
 _APART = 1e-6

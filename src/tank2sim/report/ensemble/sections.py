@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import altair as alt
-
-from tank2sim.analysis.ensemble.questions import signals_with_bands
-from tank2sim.analysis.ensemble.results import ManoeuvreBands
+from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.charts import curve_charts
-from tank2sim.report.kit.charts import History, TrackData, history_chart, track_chart
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
-from tank2sim.report.kit.run_series import history_of, shown_signals, signals_of, track_data
 from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
-from tank2sim.simulation.bands import small_edge_first
-from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words
 
 BEYOND_CARD_TEXT = "beyond the card"
@@ -39,31 +32,6 @@ _RARE = (
     "there is no probability. Distance, and the probability if linear, are those of a figure that changes in "
     "proportion to the card's numbers; the figure there shows whether it does."
 )
-
-
-def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VConcatChart:
-    """Track and histories of the card itself, with the quantiles of the ensemble; those of the track across it."""
-    tracks = [track_data(label, run)]
-    if bands.track is not None:
-        middle = bands.track.middle
-        small, large = small_edge_first(bands.track.low, middle, bands.track.high)
-        lines = ((LOW, small), (MIDDLE, middle), (HIGH, large))
-        kept = slice(bands.track.count)
-        tracks += [
-            TrackData(label=name, x_m=line[kept, 0], y_m=line[kept, 1], time_s=bands.times_s[kept])
-            for name, line in lines
-        ]
-    track = track_chart(tracks, title=label)
-    track.usermeta = alt.Undefined  # only a chart by itself may carry it
-    names = {variable: (name, factor) for name, (variable, factor) in signals_with_bands(run.model).items()}
-    shown = shown_signals(run.model)
-    histories = [history_of(label, run, shown)]
-    for quantile, name in ((LOW, "low"), (MIDDLE, "median"), (HIGH, "high")):
-        quantile_values = {
-            variable: getattr(bands.histories[names[variable][0]], name) / names[variable][1] for variable in shown
-        }
-        histories.append(History(label=quantile, time_s=bands.times_s, values=quantile_values))
-    return alt.vconcat(track, history_chart(histories, signals_of(run.model, shown)))
 
 
 def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
@@ -135,7 +103,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
     if together and together["tail"]:
         rare.append(("any of these", together["tail"]))
     return PageSection(
-        heading=f"Ensemble of {found['members']}",
+        heading=f"Ensemble of {found['members']}{assumed_words(found['notices'])}",
         text=_TEXT + _CHANCES + stable + (_RARE if rare else ""),
         tables=[
             criteria_table,
@@ -150,7 +118,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
 def figures_section(found: Json) -> PageSection:
     """Return the section of a page of influence coefficients, from ``ensemble`` of the JSON."""
     return PageSection(
-        heading=f"Ensemble of {found['members']}",
+        heading=f"Ensemble of {found['members']}{assumed_words(found['notices'])}",
         text=_TEXT,
         tables=[_table("Figures over the ensemble.", found["figures"])],
         notes=found["notices"],

@@ -153,6 +153,10 @@ def _explained(lacking: Json) -> alt.LayerChart:
     return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
 
 
+_LINES = "split(replace(datum.label, ' + ', '|+ '), '|')"
+"""Labels of two effects in two lines."""
+
+
 def _bars(
     rows: Sequence[ChartRecord], across: str, *, width: int, kind: str = "linear", domain: Sequence[float] | None = None
 ) -> alt.LayerChart:
@@ -164,11 +168,13 @@ def _bars(
     x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **scale_options))
     ticks = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
     x = x.axis(**({"values": ticks} if kind == "symlog" else {"tickCount": 4}))
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelLimit=260, ticks=False))
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelExpr=_LINES, labelLimit=200, ticks=False))
     base = alt.Chart(data(rows)).encode(x=x, y=y)
     bars = base.mark_bar(height=11, opacity=0.75, clip=True)
     texts = base.mark_text(align="left", dx=5, fontSize=10.5, style="reference").encode(text="text:N")
-    return alt.layer(bars, texts).properties(width=width, height=22 * max(1, len(rows)))
+    return alt.layer(bars, texts).properties(
+        width=width, height=(32 if any(" + " in name for name in names) else 22) * max(1, len(rows))
+    )
 
 
 def rival_chart(found: Json, *, title: str = "") -> alt.LayerChart | None:
@@ -185,7 +191,7 @@ def rival_chart(found: Json, *, title: str = "") -> alt.LayerChart | None:
         }
         for rival in (*shown, *none)
     ]
-    across = "how much worse than the best explanation (-2 log likelihood, penalised)"
+    across = "worse than the best by, -2 log likelihood"
     kind = "symlog" if max(row["v"] or 0.0 for row in rows) > 100 else "linear"
     return _bars(rows, across, width=430, kind=kind).properties(
         title=alt.Title(title, subtitle=_COMPARED),

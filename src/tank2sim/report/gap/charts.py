@@ -42,6 +42,9 @@ from tank2sim.units import to_si
 MOST_TRIALS_DRAWN = 12
 """Tracks in one picture: those of the largest misfit before; more are hard to look at (project choice)."""
 
+FEW_TRIALS = 3
+"""Tracks below the verdict: one row of pictures. Project choice."""
+
 MOST_PLACES = 6
 """Worst places that are shown over time: two rows of pictures (project choice)."""
 
@@ -92,6 +95,12 @@ def gap_tracks(found: Json, *, held_out: bool, title: str = "") -> alt.ConcatCha
     return track_grid(_worst(found, lambda trial: trial["held_out"] == held_out), title=title)
 
 
+def worst_tracks(found: Json, *, title: str = "") -> alt.ConcatChart | None:
+    """Tracks of the few trials whose misfit before was largest, those held out where there are any; None without."""
+    held_out = any(trial["held_out"] for trial in found["trials"])
+    return track_grid(_worst(found, lambda trial: trial["held_out"] == held_out, FEW_TRIALS), title=title)
+
+
 def gap_histories(found: Json, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
     """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
 
@@ -104,12 +113,12 @@ def gap_histories(found: Json, *, held_out: bool, title: str = "") -> list[alt.C
     return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
 
 
-def _worst(found: Json, chosen: Callable[[Json], bool]) -> list[Json]:
+def _worst(found: Json, chosen: Callable[[Json], bool], most: int = MOST_TRIALS_DRAWN) -> list[Json]:
     """Replays of the chosen trials, of many those whose misfit before was largest, by the names of the trials."""
     misfits = {
         place: as_number(trial["misfit"].get("before")) for place, trial in enumerate(found["trials"]) if chosen(trial)
     }
-    worst = sorted(misfits, key=lambda place: -misfits[place])[:MOST_TRIALS_DRAWN]
+    worst = sorted(misfits, key=lambda place: -misfits[place])[:most]
     replays = [found["replays"][place] for place in sorted(worst)]
     return [{**replay, "trial": trial_name(replay["trial"])} for replay in replays]
 

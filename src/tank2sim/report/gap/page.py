@@ -24,6 +24,7 @@ from tank2sim.report.gap.charts import (
     shown_models,
     signal_misfit,
     signal_of,
+    worst_tracks,
 )
 from tank2sim.report.gap.text import (
     GOOD,
@@ -54,6 +55,7 @@ def gap_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
     test = found["next_test"]
     lacking = {"signal": found["missing_signal"], "force": found["missing_force"]}
     made: dict[str, alt.TopLevelMixin | None] = {
+        "worst_tracks": worst_tracks(found, title="Measured tracks, and those of the card before and after"),
         "rivals": rival_chart(found, title="Explanations compared"),
         "misfit": misfit_chart(found, title="Misfit by signal and manoeuvre"),
         "places": place_chart(found, title="Where the misfit is worst"),
@@ -85,10 +87,21 @@ def gap_page(found: Json) -> Page:
     sections = [
         PageSection(
             heading="Verdict",
-            text="\n\n".join([verdict_in_words(found), *verdict_context(found)]),
-            tables=[*_parameters(found), *_by_trial(found), *_candidates(found), *_explanations(found)],
+            text=verdict_in_words(found),
+            tables=[*_parameters(found), *_by_trial(found)],
+            charts=drawn("worst_tracks"),
+        ),
+        PageSection(
+            heading="How sure, and what else it could be",
+            text="\n\n".join(verdict_context(found)),
+            tables=[*_candidates(found), *_explanations(found)],
             charts=drawn("rivals"),
         ),
+    ]
+    if hidden := _could_hide(found):
+        sections.append(PageSection(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
+    sections += [
+        PageSection(heading="Next test", text=_next_test(found), charts=drawn("expected")),
         PageSection(
             heading="Before and after" if changes_simulation(found) else "How well the card follows",
             text=_BEFORE_AND_AFTER
@@ -111,10 +124,6 @@ def gap_page(found: Json) -> Page:
         sections.append(PageSection(heading="Coefficients", text=_COEFFICIENTS, tables=[coefficients]))
     if "agreement" in charts:
         sections.append(PageSection(heading="Do the trials agree", text=_AGREEMENT, charts=drawn("agreement")))
-    if hidden := _could_hide(found):
-        sections.append(PageSection(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
-    sections.append(PageSection(heading="Next test", text=_next_test(found), charts=drawn("expected")))
-    # One section: a tenth would not find room for its number in the list of contents.
     notices = found["notices"][len(found["cautions"]) :]
     noise = [_noise(found), *([_table("Notices", ("",), [[notice] for notice in notices])] if notices else [])]
     sections.append(PageSection(heading="Noise and notices" if notices else "Noise", text=_NOISE, tables=noise))
@@ -190,6 +199,7 @@ _RUNS = ("tracks_held_out", "histories_held_out", "tracks_fitting", "histories_f
 
 _CAPTIONS = {
     "rivals": "",
+    "worst_tracks": f"The trials with the largest misfit. Points: measured. Lines: simulated. {_LINES}",
     "misfit": "u, v: velocity ahead and to starboard; r: yaw rate; psi: heading; x, y: north and east. The colour "
     "scale ends at 100.",
     "places": f"Points: measured. Shaded red: the time in which the misfit arises. {_LINES}",
@@ -209,7 +219,10 @@ def _key_figures(found: Json) -> list[KeyFigure]:
     named = ", ".join(effect_in_words(effect["name"]) for effect in effects)
     sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS) and not found["cautions"]
     caution = Verdict.NONE if sure else Verdict.CAUTION
-    figures = [KeyFigure(label="Verdict", value=found["verdict"], verdict=caution, note=named)]
+    missing = found["verdict"] == MISSING
+    value, note = (named, MISSING) if missing else (found["verdict"], named)
+    label = "What is missing" if missing else "Verdict"
+    figures = [KeyFigure(label=label, value=value, verdict=caution, note=note)]
     if effects:
         least = min(or_nan(effect["confidence"]) for effect in effects)
         unsure = Verdict.CAUTION if not least >= _SURE else Verdict.NONE

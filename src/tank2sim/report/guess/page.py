@@ -43,9 +43,8 @@ def guess_page(found: Json) -> Page:
     if found["next_figures"]:
         best, share = next(iter(found["next_figures"].items()))
         note = f"takes {100 * share:.0f} % of the variance of the others away"
-        cards.append(KeyFigure(label="Would help most", value=best, note=note))
+        cards.append(KeyFigure(label="Would help most", value=_named(best), note=note))
     parts = [
-        *notices_section(found["notices"]),
         PageSection(
             heading="Figures",
             text=_FIGURES,
@@ -56,8 +55,18 @@ def guess_page(found: Json) -> Page:
     ]
     if found["next_figures"]:
         parts.append(PageSection(heading="Which further figure would help most", text=_HELP, tables=[_help(found)]))
+    parts += notices_section(found["notices"])
     subtitle = f"{size}, block coefficient {dimensions['block']:g}, {dimensions['speed_kn']:g} kn"
     return Page(title=f"{found['ship']}: a guess", subtitle=subtitle, figures=cards, sections=parts)
+
+
+_MANOEUVRES = {"turn35": "turn 35°", "zigzag10": "zigzag 10/10", "zigzag20": "zigzag 20/20"}
+
+
+def _named(key: str) -> str:
+    """A figure as a reader sees it: ``overshoot_1@zigzag10`` is ``zigzag 10/10: overshoot 1``."""
+    figure, _, manoeuvre = key.partition("@")
+    return f"{_MANOEUVRES.get(manoeuvre, manoeuvre)}: {figure.replace('_', ' ')}"
 
 
 def figures_chart(found: Json) -> alt.TopLevelMixin:
@@ -67,10 +76,10 @@ def figures_chart(found: Json) -> alt.TopLevelMixin:
         middle = entry["found"]["p50"]
         for kind, name in (("by dimensions", "by_dimensions"), ("with the figures", "found")):
             band = entry[name]
-            rows.append({"figure": key, "kind": kind, "low": band["p5"] / middle, "high": band["p95"] / middle})
+            rows.append({"figure": _named(key), "kind": kind, "low": band["p5"] / middle, "high": band["p95"] / middle})
         if entry["given"] is not None:
             share = entry["given"] / middle
-            rows.append({"figure": key, "kind": "given", "low": share, "high": share})
+            rows.append({"figure": _named(key), "kind": "given", "low": share, "high": share})
     base = alt.Chart(alt.Data(values=rows))
     title = "over the median found"
     x = alt.X("low:Q", title=title, scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format="~g"))
@@ -91,7 +100,7 @@ def _figure_table(found: Json) -> PageTable:
         before, after = entry["by_dimensions"], entry["found"]
         given = entry["given"], entry["standard_error"]
         rows.append(
-            [key, entry["unit"], *given, before["p5"], before["p95"], *(after[q] for q in ("p5", "p50", "p95"))]
+            [_named(key), entry["unit"], *given, before["p5"], before["p95"], *(after[q] for q in ("p5", "p50", "p95"))]
         )
     return PageTable(caption="Figures, m and deg", columns=[Column(title=head) for head in heads], rows=rows)
 
@@ -110,6 +119,6 @@ def _number_table(found: Json) -> PageTable:
 
 
 def _help(found: Json) -> PageTable:
-    rows: list[list[Cell]] = [[key, 100 * share] for key, share in found["next_figures"].items()]
+    rows: list[list[Cell]] = [[_named(key), 100 * share] for key, share in found["next_figures"].items()]
     columns = [Column(title="figure"), Column(title="variance gone", unit="%", digits=2)]
     return PageTable(caption="One more figure", columns=columns, rows=rows)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.sections import figures_section
 from tank2sim.report.influence.charts import (
     PANELS,
@@ -18,6 +19,7 @@ from tank2sim.report.influence.charts import (
     variance_chart,
 )
 from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 from tank2sim.units import in_words
 
@@ -74,7 +76,7 @@ def _key_figure(text: str, figure: Mapping[str, Json], tuned: Mapping[str, Json]
     label = f"{words}, {argument} deg" if argument else words
     after, (target, verdict) = tuned.get("figures", {}).get(text), _targets_of(tuned).get(text, ({}, Verdict.NONE))
     if after is None:
-        note = f"standard error {figure['standard_error']:.2g}"
+        note = f"standard error {format_number(figure['standard_error'], 2)}"
         return KeyFigure(label=label, value=figure["value"], unit=unit, note=note)
     note = f"was {figure['value']:.5g} before tuning"
     if target:
@@ -119,8 +121,9 @@ def _uncertainty(found: Json, coefficients: InfluenceData) -> PageSection:
     ]
     known = any(figure["standard_error"] > 0 for figure in figures.values())
     charts = [Illustration(chart=variance_chart(coefficients))] if known else []
+    assumed = assumed_words(found["notices"])
     table = PageTable(caption="Figures and their standard errors", columns=columns, rows=rows)
-    return PageSection(heading="What is known of the figures", text=text, charts=charts, tables=[table])
+    return PageSection(heading=f"What is known of the figures{assumed}", text=text, charts=charts, tables=[table])
 
 
 def _together(agreed: Mapping[str, Json]) -> PageSection:

@@ -24,6 +24,7 @@ from tank2sim.report.kit.chart_parts import (
     equal_frame,
     every,
     pan_zoom,
+    plain,
     records,
     series_look,
     shown_unit,
@@ -31,6 +32,7 @@ from tank2sim.report.kit.chart_parts import (
     vector,
     with_unit,
 )
+from tank2sim.report.kit.numbers import format_number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,16 +61,27 @@ class Signal:
 
 
 @dataclass(frozen=True, kw_only=True)
+class HistoryBand:
+    """A band of one signal over time: `time_s`, and its edges `low` and `high`, (n,) in the unit of the signal."""
+
+    signal: str
+    time_s: ArrayLike
+    low: ArrayLike
+    high: ArrayLike
+
+
+@dataclass(frozen=True, kw_only=True)
 class History:
     """Signals of one run over time: `time_s` (n,) in s, `values` by name of signal, (n,) each, in the signal's unit.
 
-    A run need not have every signal; NaN leaves a gap.
+    A run need not have every signal; NaN leaves a gap. `bands` are those of an ensemble about it.
     """
 
     label: str
     time_s: ArrayLike
     values: Mapping[str, ArrayLike]
     measured: bool = False
+    bands: Sequence[HistoryBand] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,7 +182,8 @@ def history_chart(
         last = place == len(signals) - 1
         axis = alt.Axis(title="time (s)") if last else alt.Axis(title=None, labels=False, ticks=False)
         x = alt.X("t:Q", scale=time_scale, axis=axis)
-        layers = [*_history_layers(runs, signal, look, x), *_marked(marks, signal, x)]
+        shaded = [_shaded(band, signal, x) for run in runs for band in run.bands if band.signal == signal.name]
+        layers = [*_history_layers(runs, signal, look, x), *shaded, *_marked(marks, signal, x)]
         panels.append(alt.layer(*layers).properties(width=width_px, height=height_px))
     names = ", ".join(signal.title for signal in signals)
     return stacked(panels, title=title, description=f"Time histories of {names}, of {_listed(runs)}.")
@@ -208,9 +222,25 @@ def tow_chart(tows: Sequence[Tow], *, title: str = "", width_px: int = 720, heig
 
 
 def spiral_chart(
-    spirals: Sequence[SpiralData], *, title: str = "", width_px: int = 620, height_px: int = 400
+    spirals: Sequence[SpiralData],
+    *,
+    loop_rad: tuple[float, float] | None = None,
+    title: str = "",
+    width_px: int = 620,
+    height_px: int = 400,
 ) -> alt.LayerChart:
-    """Yaw rate against rudder angle, in degrees, the points joined in the order they were run."""
+    """Yaw rate against rudder angle, in degrees, the points joined in the order they were run.
+
+    Parameters
+    ----------
+    spirals : sequence of SpiralData
+    loop_rad : pair of float, optional
+        Rudder angles between which the ship has two steady turns, rad: the width of the loop is marked.
+    title : str
+        Title of the chart.
+    width_px, height_px : int
+        Size of the plot.
+    """
     labels = [spiral.label for spiral in spirals]
     look = series_look(labels, as_points=labels)
     degree = shown_unit("rad")[1]
@@ -232,13 +262,24 @@ def spiral_chart(
     ]
     lines = base.mark_line(clip=True).properties(name="plot")
     points = base.mark_point(clip=True).encode(shape=look.shape, tooltip=tooltip)
+    loop = _loop_layers(degree * vector(loop_rad), x, y) if loop_rad else []
     return _in_window(
-        [*zero, lines, points],
+        [*zero, lines, points, *loop],
         title=title,
         width=width_px,
         height=height_px,
         description=f"Steady yaw rate against rudder angle of {_listed(spirals)}.",
     )
+
+
+def _loop_layers(rudders: Array, x: alt.X, y: alt.Y) -> list[alt.Chart]:
+    """The width of a loop along the line of zero yaw rate, in deg."""
+    low, high = sorted(rudders.tolist())
+    row = {"d": plain(low), "to": plain(high), "r": 0.0, "middle": plain((low + high) / 2)}
+    base = alt.Chart(data([row | {"text": f"loop {format_number(high - low, 3)}°"}]))
+    width = base.mark_rule(style="overshoot", clip=True).encode(x=x, x2="to:Q", y=y)
+    words = base.encode(x=alt.X("middle:Q"), y=y, text="text:N")
+    return [width, *(words.mark_text(style=style, dy=-11) for style in ("rim", "words"))]
 
 
 def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[Tow] | Sequence[SpiralData]) -> str:
@@ -289,6 +330,13 @@ def _history_layers(runs: Sequence[History], signal: Signal, look: SeriesLook, x
     ]
     y = alt.Y("v:Q", scale=alt.Scale(zero=False), axis=axis_above(title))
     return _lines_and_points(rows, {"x": x, "y": y}, look, tooltip)
+
+
+def _shaded(band: HistoryBand, signal: Signal, x: alt.X) -> alt.Chart:
+    factor = shown_unit(signal.unit, signal.display_unit)[1]
+    columns = {"t": vector(band.time_s), "low": factor * vector(band.low), "high": factor * vector(band.high)}
+    area = alt.Chart(data(records("band", columns))).mark_area(style="band", clip=True)
+    return area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q")
 
 
 def _marked(marks: Sequence[TimeMark], signal: Signal, x: alt.X) -> list[alt.Chart]:

@@ -64,13 +64,13 @@
     return vegaEmbed(holder, chart, { mode: "vega-lite", actions: false, defaultStyle: false, ...looks });
   }
 
-  // Legends that are wider than the page leave no room for the chart: their entries then go under each other.
+  // Legends that reach beyond the page leave no room for the chart: their entries then go under each other.
   function legendsFit(holder, room) {
     const picture = holder.querySelector("svg"); // the style of the page may show it smaller than it is
-    const scale = picture.width.baseVal.value / picture.getBoundingClientRect().width;
+    const { left, width } = picture.getBoundingClientRect();
+    const scale = picture.width.baseVal.value / width;
     const boxes = [...holder.querySelectorAll(".role-legend")].map((legend) => legend.getBoundingClientRect());
     const right = Math.max(...boxes.map((box) => box.right));
-    const left = Math.min(...boxes.map((box) => box.left));
     return (right - left) * scale <= room;
   }
 
@@ -78,6 +78,11 @@
     const { layout, ...legend } = config.legend;
     const top = { ...layout.top, direction: "vertical", margin: 6 };
     return { ...config, legend: { ...legend, columns: 1, layout: { ...layout, top } } };
+  }
+
+  // Panels side by side that are wider than the page: fewer in a row, before they become too small to be read.
+  function inFewerColumns(chart, width, room) {
+    return { ...chart, columns: Math.max(1, Math.floor((chart.columns * room) / width)) };
   }
 
   async function draw(place, config) {
@@ -88,16 +93,26 @@
     const room = holder.clientWidth;
     let factor = 1;
     let look = config;
-    for (let attempt = 0; attempt < 5; attempt += 1) {
+    let chart = charts[place];
+    let before = null; // the attempt before, of the same parts: what is beside the plots keeps its width
+    for (let attempt = 0; attempt < 7; attempt += 1) {
       views.get(place)?.finalize();
-      views.set(place, await embedded(holder, shrunk(charts[place], factor, equal), look, choice));
+      views.set(place, await embedded(holder, shrunk(chart, factor, equal), look, choice));
       const width = holder.querySelector("svg").width.baseVal.value;
       if (width <= room || room === 0) break;
-      if (look === config && !legendsFit(holder, room)) {
-        look = withStackedLegends(config);
+      if (chart === charts[place] && chart.columns > 1) {
+        chart = inFewerColumns(chart, width, room);
+        before = null;
         continue;
       }
-      factor *= (room / width) * 0.99;
+      if (look === config && !legendsFit(holder, room)) {
+        look = withStackedLegends(config);
+        before = null;
+        continue;
+      }
+      const growth = before && before.width > width ? (before.width - width) / (before.factor - factor) : width / factor;
+      before = { factor, width };
+      factor = Math.max(factor - (width - 0.99 * room) / growth, 0.05 * factor);
     }
     choose(place, kept);
     figures[place].querySelector(".tools").hidden = false;
@@ -134,12 +149,16 @@
   darkScreen.addEventListener("change", onScreen);
   // Paper has no switches: it shows the first choice of each.
   let left = [];
+  const folded = [];
   addEventListener("beforeprint", () => {
+    folded.push(...document.querySelectorAll("details:not([open])"));
+    for (const part of folded) part.open = true;
     left = charts.map((_, place) => chosen(place));
     charts.forEach((_, place) => choose(place, switches(place).map(({ name, value }) => [name, value])));
     if (darkScreen.matches) drawAll(light);
   });
   addEventListener("afterprint", () => {
+    for (const part of folded.splice(0)) part.open = false;
     left.forEach((values, place) => choose(place, values));
     if (darkScreen.matches) onScreen();
   });

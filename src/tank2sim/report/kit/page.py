@@ -38,13 +38,36 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class KeyFigure:
-    """A key figure, shown on a card at the top: `value` in `unit`; `note` is a few words under it."""
+    """A key figure, shown on a card at the top: `value` in `unit`; `note` is a few words under it.
+
+    With a `limit` (largest value allowed, in `unit`), a bar shows the size of the value next to it.
+    """
 
     label: str
     value: float | str
     unit: str = ""
     verdict: Verdict = Verdict.NONE
     note: str = ""
+    limit: float | None = None
+
+    @property
+    def reach_percent(self) -> float:
+        """Length of the bar, % of its room."""
+        return self._percent(self.value)
+
+    @property
+    def limit_percent(self) -> float:
+        """Place of the limit, % of the room of the bar."""
+        return self._percent(self.limit)
+
+    def _percent(self, value: float | str | None) -> float:
+        sizes = [abs(size) for size in (self.value, self.limit) if isinstance(size, float | int)]
+        largest = max(sizes, default=0.0)
+        return round(100 * abs(value) / (_ROOM * largest), 1) if isinstance(value, float | int) and largest else 0.0
+
+
+_ROOM = 1.15
+"""Room of the bar of a key figure, over the larger of figure and limit. Project choice: both ends are seen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +81,12 @@ class Column:
 
 _SHORT = 24
 """Characters of text in a table that are not broken into lines."""
+
+_LONG = 10
+"""Rows of a table from which on it is folded. Project choice: half a screen."""
+
+_NOTES_SHOWN = 2
+"""Notices of a section that are not folded. Project choice."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +109,15 @@ Cell = float | int | bool | str | Verdict | Link | None
 class PageTable:
     """A table. Cells are numbers in the unit of their column, text, verdicts, truth values or None (nothing known).
 
+    Parameters
+    ----------
+    caption : str
+    columns : sequence of Column
+    rows : sequence of sequences
+    folded : bool, optional
+        Whether only the caption is seen until the reader opens the table; by default a long table is. On paper all
+        are open.
+
     Raises
     ------
     ValueError
@@ -89,6 +127,7 @@ class PageTable:
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
+    folded: bool | None = None
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -124,10 +163,7 @@ class PageSection:
 
 def notices_section(notices: Sequence[str]) -> list[PageSection]:
     """Return the section with the notices of a result, empty without any."""
-    table = PageTable(
-        caption="What the reader should know.", columns=[Column(title="")], rows=[[notice] for notice in notices]
-    )
-    return [PageSection(heading="Notices", tables=[table])] if notices else []
+    return [PageSection(heading="Notices", notes=notices)] if notices else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +179,9 @@ class Page:
 def render_page(page: Page) -> str:
     """The page as one HTML file, about 1 MB and its data. It opens without a network and can be printed."""
     counter = _Counter()
-    sections = [_section(section, counter) for section in page.sections]
+    marks = marked(_messages(page))
+    sections = [_section(section, counter, marks) for section in page.sections]
+    sections = [section for section in sections if _has_content(section)]
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
@@ -152,7 +190,8 @@ def render_page(page: Page) -> str:
     environment.filters["paragraphs"] = _paragraphs
     return environment.get_template("kit/page.html.j2").render(
         page=page,
-        marks=marked(_messages(page)),
+        marks=marks,
+        notes_shown=_NOTES_SHOWN,
         cards_across=_cards_across(len(page.figures)),
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
@@ -162,6 +201,11 @@ def render_page(page: Page) -> str:
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
+
+
+def _has_content(section: dict[str, Any]) -> bool:
+    """Whether anything is left in a section whose notices are at the top of the page."""
+    return bool(section["notes"] or section["tables"] or section["charts"] or section["content"].text)
 
 
 def _messages(page: Page) -> Iterable[str]:
@@ -192,9 +236,11 @@ class _Counter:
         return self.tables
 
 
-def _section(section: PageSection, counter: _Counter) -> dict[str, Any]:
+def _section(section: PageSection, counter: _Counter, marks: Sequence[str]) -> dict[str, Any]:
+    """The parts of a section; notices that mark the whole page are at its top, and not repeated."""
     return {
         "content": section,
+        "notes": [note for note in section.notes if note not in marks],
         "tables": [_table(table, counter.next_table()) for table in section.tables],
         "charts": [_chart(illustration, counter.next_chart()) for illustration in section.charts],
     }
@@ -205,6 +251,7 @@ def _table(table: PageTable, number: int) -> dict[str, Any]:
     return {
         "number": number,
         "caption": table.caption,
+        "folded": len(table.rows) > _LONG if table.folded is None else table.folded,
         "columns": columns,
         "rows": [[column["cells"][place] for column in columns] for place in range(len(table.rows))],
     }

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import altair as alt
-
 from tank2sim.dynamics.model import Model
-from tank2sim.report.kit.charts import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.report.kit.charts import History, Signal, TrackData
 from tank2sim.simulation.thruster_manoeuvres import thruster_commands
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -42,14 +40,6 @@ def track_data(label: str, run: Trajectory) -> TrackData:
 def history_of(label: str, run: Trajectory, names: Iterable[str]) -> History:
     """Named signals of a run over time."""
     return History(label=label, time_s=run.t, values={name: run[name] for name in names})
-
-
-def run_chart(label: str, run: Trajectory) -> alt.VConcatChart:
-    """Track and time histories of one run, one under the other."""
-    track = track_chart([track_data(label, run)], title=label)
-    track.usermeta = alt.Undefined  # only a chart by itself may carry it
-    signals = shown_signals(run.model)
-    return alt.vconcat(track, history_chart([history_of(label, run, signals)], signals_of(run.model, signals)))
 
 
 def signals_of(model: Model, titles: Mapping[str, str]) -> list[Signal]:

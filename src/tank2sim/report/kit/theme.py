@@ -27,6 +27,9 @@ STROKE = "M-1.7,0L1.7,0"
 CROSS = "M-.8,-.8L.8,.8M-.8,.8L.8,-.8"
 """A cross of two diagonals, as an SVG path; Vega's own is a filled plus."""
 
+BAND_OPACITY = 0.16
+"""Opacity of a shaded band. Project choice: lines and the grid are seen through it."""
+
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', 'Liberation Sans', Arial, sans-serif"
 
 
@@ -66,8 +69,8 @@ DARK_TONE = Tone(
 def vega_config(tone: Tone) -> Config:
     """The Vega-Lite configuration of a tone; charts themselves say nothing of fonts and colours.
 
-    Marks name a style (``limit``, ``reference``, ``region``, ``start``, ``stem``) where they show something that
-    is not a series.
+    Marks name a style (``limit``, ``reference``, ``band``, ``hull``, ...) where they show something that is not a
+    series.
     """
     return {
         "background": tone.paper,
@@ -87,6 +90,7 @@ def vega_config(tone: Tone) -> Config:
         "axis": {"domain": False, "gridColor": tone.grid, "tickColor": tone.line, "tickSize": 4, "labelPadding": 4}
         | {"labelColor": tone.muted, "labelFontSize": 11.5, "labelFlush": False}
         | {"titleColor": tone.ink, "titleFontSize": 12, "titleFontWeight": 500, "titlePadding": 8},
+        "axisQuantitative": {"labelOverlap": True, "labelSeparation": 6},
         "header": {"labelColor": tone.ink, "labelFontSize": 12, "labelFontWeight": 600, "title": None},
         "legend": {"orient": "top", "title": None, "labelColor": tone.ink, "titleColor": tone.ink, "labelFontSize": 12}
         | {
@@ -112,6 +116,14 @@ def _styles(tone: Tone) -> Config:
         "region": {"color": tone.limit, "opacity": 0.08},
         "start": {"color": tone.ink, "size": 80, "filled": True, "opacity": 1},
         "stem": {"strokeWidth": 1.2, "opacity": 0.5},
+        "dimension": {"color": tone.ink, "strokeWidth": 1, "strokeDash": [4, 3], "opacity": 1},
+        "overshoot": {"color": tone.limit, "strokeWidth": 2.5, "opacity": 1},
+        "interval": {"color": tone.palette[1], "strokeWidth": 8, "opacity": 0.45},
+        "band": {"fill": tone.palette[0], "fillOpacity": BAND_OPACITY, "strokeWidth": 0},
+        "uncertainty": {"fill": tone.palette[0], "fillOpacity": 0.25, "stroke": tone.palette[0], "strokeWidth": 1},
+        "hull": {"fill": tone.muted, "fillOpacity": 0.35, "stroke": tone.muted, "strokeWidth": 0.75},
+        "words": {"fill": tone.ink, "fontSize": 12, "fontWeight": 600},
+        "rim": {"fill": tone.paper, "stroke": tone.paper, "strokeWidth": 4, "fontSize": 12, "fontWeight": 600},
     }
 
 

@@ -54,11 +54,12 @@ def log_page(found: Json) -> Page:
         KeyFigure(label="Trials", value=len(files)),
         KeyFigure(label="Faults", value=faults, verdict=Verdict.CAUTION if faults else Verdict.PASSED),
     ]
-    sections = [*notices_section(found["notices"]), *_map(found), *_time_line(found)]
+    sections = [*_map(found), *_time_line(found)]
     sections.append(PageSection(heading="Stretches", tables=[_stretch_table(stretches)]))
     sections.append(PageSection(heading="Channels", tables=[_channel_table(channels)]))
     sections += _verdicts(found.get("identified"))
     sections.append(PageSection(heading="Logs", tables=[_log_table(found["logs"])]))
+    sections += notices_section(found["notices"])
     names = ", ".join(PurePath(str(entry["file"])).name for entry in found["logs"])
     subtitle = f"Voyage from {found['begins_utc']}" if found["begins_utc"] else "Voyage without a date"
     return Page(title=f"Log: {names}", subtitle=subtitle, figures=figures, sections=sections)

@@ -10,19 +10,19 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.report.kit.chart_parts import shown_unit
 from tank2sim.report.kit.json_values import Json, titled, words
 from tank2sim.report.kit.motion_charts import (
     History,
+    HistoryBand,
     Signal,
-    SpiralData,
     TimeMark,
     TrackData,
     history_chart,
-    spiral_chart,
     track_chart,
 )
+from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import Column, Illustration, PageSection, PageTable
-from tank2sim.simulation.bands import small_edge_first
 from tank2sim.units import to_si
 
 _Columns = Mapping[str, Sequence[float | None]]
@@ -58,6 +58,7 @@ _UNITS = {
     "A": "A",
 }
 _TRACK = ("x_m", "y_m")
+_ORDER, _ANGLE = "delta_order", "delta"
 
 _MOST_RECORDS = 12
 """Records drawn in one page, a quarter of a MB each (project choice)."""
@@ -102,21 +103,36 @@ def motions(
     return drawn
 
 
-def simulated(result: Json) -> list[PageSection]:
-    """Track and histories of a simulated manoeuvre, with the bands of an ensemble where there was one."""
-    runs: dict[str, _Columns] = {"simulated": result["histories"]}
-    runs |= _bands(result.get("ensemble") or {})
-    text = "Nine of ten members of the ensemble lie between the 5 and the 95 % quantile." if len(runs) > 1 else ""
-    return [PageSection(heading="Motion", text=text, charts=[*_spiral(result), *motions(result["manoeuvre"], runs)])]
+def varying_histories(columns: _Columns, ensemble: Mapping[str, Json]) -> Illustration | None:
+    """The signals of a run that change, over time, with the bands of an ensemble; those that do not in the caption."""
+    table = _by_stem(_in_si(columns))
+    signals = [signal for signal in _signals({"run": columns}) if not (signal.name == _ORDER and _ANGLE in table)]
+    constant = [signal for signal in signals if np.nanmax(table[signal.name]) == np.nanmin(table[signal.name])]
+    shown = [signal for signal in signals if signal not in constant]
+    if not shown:
+        return None
+    bands = [
+        _band(name, band, ensemble["t_s"])
+        for name, band in (ensemble.get("histories") or {}).items()
+        if name not in _TRACK
+    ]
+    run = History(label="simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=bands)
+    held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
+    said = ["Shaded: nine of ten ships at each time."] if bands else []
+    said += [f"Constant: {held}."] if held else []
+    chart = history_chart([run], shown, title="Time histories", height_px=110)
+    return Illustration(chart=chart, caption=" ".join(said))
 
 
-def _spiral(result: Json) -> list[Illustration]:
-    """Of a spiral, the steady yaw rate against the rudder."""
-    rudder, rate = (result["figures"].get(name) for name in ("rudder_deg", "rate_degps"))
-    if not (isinstance(rudder, list) and isinstance(rate, list)):
-        return []
-    spiral = SpiralData(label=result["manoeuvre"], rudder_rad=np.radians(rudder), yaw_rate_radps=np.radians(rate))
-    return [Illustration(chart=spiral_chart([spiral], title=f"Steady yaw rate: {result['manoeuvre']}"))]
+def _band(name: str, band: Mapping[str, Sequence[float | None]], time_s: Sequence[float]) -> HistoryBand:
+    edges = _in_si({f"{edge}_{name}": band[edge] for edge in ("p5", "p95")})
+    low, high = edges.values()
+    return HistoryBand(signal=_stem(name), time_s=time_s, low=low, high=high)
+
+
+def _held(signal: Signal, value: float) -> str:
+    unit, factor = shown_unit(signal.unit, signal.display_unit)
+    return f"{format_number(factor * value)} {unit}".strip()
 
 
 def audit_sections(result: Json) -> list[PageSection]:
@@ -172,22 +188,6 @@ def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> li
         for begin, end in finding.get("places_s") or ():
             marks += [TimeMark(signal=name, begin_s=begin, end_s=end, text=str(finding["what"])) for name in at]
     return marks
-
-
-def _bands(ensemble: Mapping[str, Json]) -> dict[str, _Columns]:
-    """The quantiles of an ensemble as runs; its track is that of the median and of the band across its course."""
-    if not (isinstance(ensemble.get("histories"), Mapping) and isinstance(ensemble.get("t_s"), list)):
-        return {}
-    track: Mapping[str, Json] = ensemble.get("track") or {}
-    runs: dict[str, _Columns] = {}
-    lines = [np.array(track.get(side) or [], dtype=float).reshape(-1, 2) for side in ("low_m", "middle_m", "high_m")]
-    small, large = small_edge_first(*lines)
-    for label, key, points in ((LOW, "p5", small), (MIDDLE, "p50", lines[1]), (HIGH, "p95", large)):
-        columns = {name: band[key] for name, band in ensemble["histories"].items() if name not in _TRACK}
-        if len(points):
-            columns |= {"x_m": points[:, 0].tolist(), "y_m": points[:, 1].tolist()}
-        runs[label] = {"t_s": ensemble["t_s"], **columns}
-    return runs
 
 
 def _in_si(columns: _Columns) -> dict[str, Array]:

@@ -21,7 +21,8 @@ from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
 from tank2sim.report.logs.page import log_page
-from tank2sim.report.results.motions import audit_sections, from_the_bridge, simulated
+from tank2sim.report.manoeuvre.page import manoeuvre_page
+from tank2sim.report.results.motions import audit_sections, from_the_bridge
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
@@ -51,18 +52,6 @@ class _Page:
 _WAY = ("ahead_m", "starboard_m")
 
 _SECTIONS: Mapping[str, _Sections] = {
-    "Simulated manoeuvre": _Sections(
-        simulated,
-        {"histories": dict, "figures": dict, "manoeuvre": str},
-        (
-            "histories",
-            "figures.rate_degps",
-            "figures.rudder_deg",
-            "ensemble.t_s",
-            "ensemble.histories",
-            "ensemble.track",
-        ),
-    ),
     "Audit of trials": _Sections(
         audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")
     ),
@@ -116,6 +105,7 @@ _PAGES: Mapping[str, _Page] = {
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
     ),
+    "Simulated manoeuvre": _Page(manoeuvre_page, {"ship": str, "histories": dict, "figures": dict, "manoeuvre": str}),
     "Validation": _Page(
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}

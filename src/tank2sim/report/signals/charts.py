@@ -9,7 +9,6 @@ import numpy as np
 
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_line, thin_points
-from tank2sim.report.captive.charts import BAND_OPACITY
 from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
@@ -27,6 +26,7 @@ from tank2sim.report.kit.chart_parts import (
     with_unit,
 )
 from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.theme import BAND_OPACITY
 
 _SIZE_PX = (720, 300)
 _LEAST_DECIBEL = -120.0

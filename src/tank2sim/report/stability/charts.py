@@ -18,12 +18,14 @@ from tank2sim.report.kit.chart_parts import (
     axis_above,
     data,
     pan_zoom,
+    plain,
     records,
     series_look,
     vector,
 )
 from tank2sim.report.kit.chart_parts import stacked as stacked_panels
 from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.numbers import format_number
 
 STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
 BECH = ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")
@@ -217,14 +219,55 @@ def criterion_by_speed_chart(speed: Json, *, title: str = "") -> alt.LayerChart:
     return chart.properties(title=title, description="Stability criterion over speed.")
 
 
+def _short(criterion: str) -> str:
+    """A criterion without the words that a narrow chart has no room for."""
+    return criterion.partition(", 10 deg")[0].replace(" zigzag,", "").replace(", full astern,", ":")
+
+
+_TWO_LINES = "split(datum.label, '|')"
+"""Labels of an axis in two lines, divided at a bar."""
+
+
+def criteria_chart(criteria: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+    """Figures of ``imo`` of the JSON as bars, in per cent of what is allowed; pale beyond the range of the card."""
+    rows: list[ChartRecord] = [
+        {
+            "name": f"{_short(criterion['name'])}|{format_number(criterion['found'], 3)} of "
+            f"{format_number(criterion['allowed'], 3)} {criterion['unit']}",
+            "percent": plain(100 * criterion["found"] / criterion["allowed"]),
+            "beyond": bool(criterion["beyond_card"]),
+        }
+        for criterion in criteria
+        if criterion["found"] is not None
+    ]
+    longest = max([*(row["percent"] for row in rows), 100.0])
+    x = alt.X("percent:Q", title="per cent of the limit", scale=alt.Scale(domain=[0, 1.05 * longest], nice=False))
+    y = alt.Y(
+        "name:N",
+        sort=[row["name"] for row in rows],
+        title=None,
+        axis=alt.Axis(labelExpr=_TWO_LINES, labelLineHeight=14),
+    )
+    base = alt.Chart(data(rows)).encode(y=y)
+    opacity = alt.condition("datum.beyond", alt.value(0.3), alt.value(0.85))
+    bars = base.mark_bar(height=16).encode(x=x, opacity=opacity, tooltip=["name:N"])
+    limit = alt.Chart(data([{"percent": 100.0}])).mark_rule(style="limit", strokeWidth=2).encode(x="percent:Q")
+    return alt.layer(bars, limit).properties(
+        title=title,
+        width=480,
+        height=alt.Step(36),
+        description="; ".join(str(row["name"]).replace("|", " ") for row in rows),
+    )
+
+
 def trim_chart(trim: Json, *, title: str = "") -> alt.LayerChart:
-    """C' over trim after Inoue et al., and the two readings of paper 2 as levels around it; from ``trim``."""
+    """C' over trim after Inoue et al., with the two readings of Krezelewski and Misiag; from ``trim``."""
     inoue = trim["inoue_1981"]
     per_cent, criteria = 100 * vector(inoue["trim_by_stern_over_length"]), vector(inoue["C_prime"])
     base = float(criteria[len(criteria) // 2])
-    series = {"Inoue et al. 1981": criteria}
+    series = {"Inoue et al.": criteria}
     for name, reading in trim["paper_7_5_percent"].items():
-        series[f"paper 2, read as {name}: ±7.5 % for 1 %"] = base + per_cent * (reading["more"] - reading["less"]) / 2
+        series[f"7.5 % of {name}"] = base + per_cent * (reading["more"] - reading["less"]) / 2
     rows = [row for label, values in series.items() for row in records(label, {"x": per_cent, "y": 1e5 * values})]
     across = "trim by the stern (% of length)"
     chart = _curves(rows, series_look(list(series)), across=across, up="C′ · 10⁵", marks=[_level(0.0)], height=220)

@@ -22,6 +22,7 @@ from tank2sim.report.stability.charts import (
     BECH,
     NORRBIN,
     characteristic_chart,
+    criteria_chart,
     criterion_by_speed_chart,
     influence_chart,
     steering_bode,
@@ -40,9 +41,9 @@ _CRITERION = (
     "part."
 )
 _TRIM = (
-    "A card holds for one trim; this is an estimate. Paper 2 (Krezelewski and Misiag) says that 1 % of trim changes "
-    "one of Y_r and N_r by 7.5 %; its print does not show which, nor which way and 1 % of what: both readings are "
-    "drawn, as growing with trim by the stern over length. The chart also shows the corrections of Inoue, Hirano and "
+    "A card holds for one trim; this is an estimate. Krezelewski and Misiag say that 1 % of trim changes one of Y_r "
+    "and N_r by 7.5 %; the print does not show which, nor which way and 1 % of what: both readings are drawn, as "
+    "growing with trim by the stern over length. The chart also shows the corrections of Inoue, Hirano and "
     "Kijima (1981) to Y_v, Y_r, N_v and N_r. All act on the hydrodynamic part, without the inertia."
 )
 _RESPONSE = (
@@ -71,17 +72,20 @@ _IMO = (
 )
 
 
+_BARS = "Bars: the worse of both sides, over the limit (red). Pale: beyond the range of the card, and no verdict."
+
+
 def stability_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim stability``."""
-    sections = [_straight_line(found), _margin_influences(found), _response(found["responses"])]
+    sections = [imo_section(found["imo"])]
     if found["steady_turning"]:
         sections.append(_turning(found["steady_turning"], found["spirals"]))
-    if found["characteristic"]:
-        sections.append(_characteristic(found["characteristic"]))
-    sections.append(PageSection(heading="IMO criteria", text=_IMO, tables=[_imo(found["imo"])]))
-    sections += notices_section(found["notices"])
     if found.get("ensemble"):
         sections.append(stability_section(found["ensemble"], found["imo"]))
+    sections += [_straight_line(found), _margin_influences(found), _response(found["responses"])]
+    if found["characteristic"]:
+        sections.append(_characteristic(found["characteristic"]))
+    sections += notices_section(found["notices"])
     subtitle = f"Stability and manoeuvrability, {found['operating_point']['speed_mps']:.4g} m/s"
     return Page(title=found["ship"], subtitle=subtitle, figures=_figures(found), sections=sections)
 
@@ -98,10 +102,10 @@ def _figures(found: Json) -> list[KeyFigure]:
             label="Straight course",
             value="stable" if straight["stable"] else "unstable",
             verdict=Verdict.PASSED if straight["stable"] else Verdict.CAUTION,
-            note=f"C′ = {straight['C_prime']:.4g}",
+            note=f"C′ = {format_number(straight['C_prime'], 3)}",
         ),
         _margin_figure(straight, found["margins"]),
-        KeyFigure(label="Nomoto K′", value=prime["K_prime"], note=f"T′ = {prime['T_prime']:.3g}"),
+        KeyFigure(label="Nomoto K′", value=prime["K_prime"], note=f"T′ = {format_number(prime['T_prime'], 3)}"),
         KeyFigure(
             label="IMO criteria met", value=f"{met.count(True)} of {len(met)}", verdict=verdict, note=", ".join(notes)
         ),
@@ -116,7 +120,7 @@ def _margin_figure(straight: Json, margins: Json) -> KeyFigure:
     if not straight["C_prime_decides"]:
         note = f"a mode grows at {straight['growth_per_s']:.3g} 1/s that C′ does not show"
         return KeyFigure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
-    note = f"levers {margins['lever_margin_lengths']:.3g} L apart"
+    note = f"levers {format_number(margins['lever_margin_lengths'], 3)} L apart"
     return KeyFigure(label="Margin", value=margins["margin_percent"], unit="%", note=note)
 
 
@@ -261,13 +265,25 @@ def imo_verdict(criterion: Mapping[str, Json]) -> Cell:
     return "open" if criterion["passed"] is None else _VERDICTS[criterion["passed"]]
 
 
+def imo_section(criteria: Sequence[Mapping[str, Json]]) -> PageSection:
+    """Return the criteria of IMO MSC.137(76), from ``imo`` of the JSON: bars, table, and what is to be said of each."""
+    charts = []
+    if any(criterion["found"] is not None for criterion in criteria):
+        charts.append(Illustration(chart=criteria_chart(criteria, title="IMO MSC.137(76)"), caption=_BARS))
+    remarks: dict[str, list[str]] = {}
+    for criterion in criteria:
+        if criterion["remark"]:
+            remarks.setdefault(criterion["remark"], []).append(criterion["name"])
+    notes = [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
+    return PageSection(heading="IMO criteria", text=_IMO, tables=[_imo(criteria)], charts=charts, notes=notes)
+
+
 def _imo(criteria: Sequence[Mapping[str, Json]]) -> PageTable:
     rows: list[list[Cell]] = [
         [
             *(criterion[key] for key in ("name", "found", "allowed", "unit")),
             imo_verdict(criterion),
-            *(None if criterion["beyond_card"] else criterion[key] for key in ("margin", "margin_percent")),
-            criterion["remark"],
+            None if criterion["beyond_card"] else criterion["margin_percent"],
         ]
         for criterion in criteria
     ]
@@ -277,8 +293,6 @@ def _imo(criteria: Sequence[Mapping[str, Json]]) -> PageTable:
         Column(title="allowed"),
         Column(title="unit"),
         Column(title="verdict"),
-        Column(title="margin", digits=3),
         Column(title="margin", unit="%", digits=3),
-        Column(title="remark"),
     ]
     return PageTable(caption="IMO resolution MSC.137(76), 5.3.1 to 5.3.4.", columns=columns, rows=rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from tank2sim.report.kit.page import (
     notices_section,
 )
 from tank2sim.report.results.motions import motions
-from tank2sim.report.stability.page import imo_verdict
+from tank2sim.report.stability.page import imo_section
 from tank2sim.report.validation.charts import COMPARISON_ERRORS, comparison_error_chart
 from tank2sim.units import in_words
 
@@ -61,12 +62,13 @@ def validation_page(found: Json) -> Page:
         subtitle="Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03",
         figures=_figures(found),
         sections=[
+            _comparison(found["figures"], found["verdict"]),
+            *([_standards(found["imo"])] if found["imo"] else []),
+            *([_replays(found["replays"])] if found["replays"] else []),
+            *([_method(found["figures"])] if found["figures"] else []),
+            _verification(found["verification"]),
             _documentation(found["documentation"]),
             _coefficients(found["coefficients"]),
-            _verification(found["verification"]),
-            _comparison(found["figures"], found["verdict"]),
-            *([_replays(found["replays"])] if found["replays"] else []),
-            _standards(found["imo"]),
             _causes(found["propulsion"]),
             *notices_section(found["notices"]),
         ],
@@ -181,13 +183,19 @@ def _comparison(figures: Sequence[Json], verdict: str) -> PageSection:
         Column(title="level", unit="%", digits=3),
         Column(title="verdict"),
     ]
+    table = PageTable(caption="Errors and their uncertainty.", columns=columns, rows=rows, folded=True)
+    chart = Illustration(chart=comparison_error_chart(figures, numbers), caption=COMPARISON_ERRORS)
+    text = f"{verdict[:1].upper()}{verdict[1:]}."
+    return PageSection(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
+
+
+def _method(figures: Sequence[Json]) -> PageSection:
+    """How the verdicts come about."""
     shares = (100 * figure["numerical"] / abs(figure["measured"]) for figure in figures if figure["measured"])
     numerical = f"u_num is {format_number(max(shares, default=0.0), 2)} % of D at most."
     level = f"The level is U_val in per cent of D; required here: {figures[0]['required_percent']:g} %."
     text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
-    table = PageTable(caption=f"{verdict[:1].upper()}{verdict[1:]}.", columns=columns, rows=rows)
-    chart = Illustration(chart=comparison_error_chart(figures), caption=COMPARISON_ERRORS)
-    return PageSection(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
+    return PageSection(heading="Method", text=text)
 
 
 def _text(value: float | None, digits: int = 4) -> str | None:
@@ -225,18 +233,8 @@ def _replays(replays: Sequence[Json]) -> PageSection:
 
 
 def _standards(criteria: Sequence[Json]) -> PageSection:
-    rows: list[list[Cell]] = [
-        [
-            *(criterion[key] for key in ("name", "found", "allowed", "unit")),
-            imo_verdict(criterion),
-            criterion["remark"],
-        ]
-        for criterion in criteria
-    ]
-    columns = [Column(title=title) for title in ("criterion", "found", "allowed", "unit", "verdict", "remark")]
-    table = PageTable(caption="IMO MSC.137(76), the worse of starboard and port.", columns=columns, rows=rows)
     text = "Figures of the model next to the standards; they hold as far as the figures above are validated."
-    return PageSection(heading="Standard manoeuvres", text=text, tables=[table])
+    return replace(imo_section(criteria), heading="Standard manoeuvres", text=text)
 
 
 _CAUSES = (

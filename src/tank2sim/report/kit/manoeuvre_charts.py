@@ -1,0 +1,547 @@
+"""The chart of each standard manoeuvre, with its figures drawn where they are read off.
+
+Distances are those of the manoeuvre: ahead along the course at the order, and to starboard of it. An ensemble is a
+shaded band of the motion, and a bar from the 5 to the 95 % quantile of each figure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import altair as alt
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tank2sim.arrays import Array
+from tank2sim.records.thinning import thin_line
+from tank2sim.report.kit.chart_parts import (
+    LINE_SAMPLES,
+    NUMBER,
+    ChartRecord,
+    axis_above,
+    data,
+    equal_frame,
+    every,
+    pan_zoom,
+    plain,
+    records,
+    series_look,
+    stacked,
+    vector,
+)
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.numbers import format_number
+
+MOST_HULLS = 14
+"""Outlines of the ship along a track at most: more would hide it. Project choice."""
+
+HULL_SPACING = 1.2
+"""Least distance between two outlines, ship lengths: they do not touch. Project choice."""
+
+_STEPS_S = (1, 2, 5, 10, 15, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600)
+"""Times between two outlines that a reader can count in."""
+
+_FULL_TURN = 360.0
+_ROUND = 3
+"""Significant digits of the figures on a chart; the tables have more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Motion of a ship in a manoeuvre, from the order on: arrays (n,), turns and offsets positive to starboard.
+
+    Parameters
+    ----------
+    time_s, ahead_m, starboard_m : array
+        Distances along and across the course at the order.
+    heading_deg, rudder_deg, rate_degps : array
+        Heading from that course, rudder angle and yaw rate.
+    speed_mps : array
+        Through the water.
+    revolutions_rpm : array, optional
+    length_m, beam_m : float, optional
+        Of the ship, for its outlines.
+    """
+
+    time_s: Array
+    ahead_m: Array
+    starboard_m: Array
+    heading_deg: Array
+    rudder_deg: Array
+    rate_degps: Array
+    speed_mps: Array
+    revolutions_rpm: Array | None = None
+    length_m: float | None = None
+    beam_m: float | None = None
+
+    def until(self, time_s: float) -> Motion:
+        """The motion up to a time, in s."""
+        kept = self.time_s <= time_s
+        values: dict[str, Any] = {name: all_of[kept] for name, all_of in vars(self).items() if np.ndim(all_of)}
+        return replace(self, **values)
+
+    def place(self, time_s: float) -> tuple[float, float]:
+        """Distance to starboard and ahead at a time, m."""
+        return (
+            float(np.interp(time_s, self.time_s, self.starboard_m)),
+            float(np.interp(time_s, self.time_s, self.ahead_m)),
+        )
+
+    @property
+    def way_m(self) -> Array:
+        """Distance along the track, m."""
+        return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(self.ahead_m), np.diff(self.starboard_m)))])
+
+
+def motion_of(columns: Mapping[str, Json], length_m: float | None = None, beam_m: float | None = None) -> Motion:
+    """Return the motion from columns of the trial format: ``t_s``, ``x_m``, ``y_m``, ``psi_deg``, ``u_mps``, ...
+
+    Raises
+    ------
+    KeyError
+        A column is missing.
+    """
+    way = along_course(columns, np.column_stack([vector(columns["x_m"]), vector(columns["y_m"])]))
+    psi = vector(columns["psi_deg"])
+    rudder = columns.get("delta_deg", columns.get("delta_order_deg"))
+    revolutions = columns.get("n_rpm")
+    return Motion(
+        time_s=vector(columns["t_s"]),
+        ahead_m=way[:, 0],
+        starboard_m=way[:, 1],
+        heading_deg=psi - psi[0],
+        rudder_deg=np.full(len(psi), np.nan) if rudder is None else vector(rudder),
+        rate_degps=vector(columns["r_degps"]),
+        speed_mps=np.hypot(vector(columns["u_mps"]), vector(columns.get("v_mps", 0.0))),
+        revolutions_rpm=None if revolutions is None else vector(revolutions),
+        length_m=length_m,
+        beam_m=beam_m,
+    )
+
+
+def along_course(columns: Mapping[str, Json], points_m: Array) -> Array:
+    """Return points (n, 2), north and east in m, as distances ahead and to starboard of the begin of a motion."""
+    begin = np.array([columns["x_m"][0], columns["y_m"][0]], dtype=float)
+    course = math.radians(float(columns["psi_deg"][0] or 0.0))
+    north, east = (points_m.reshape(-1, 2) - begin).T
+    cos, sin = math.cos(course), math.sin(course)
+    return np.column_stack([north * cos + east * sin, east * cos - north * sin])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dimension:
+    """A figure drawn on a track: a line from `begin` to `end`, each (to starboard, ahead) in m, with its words.
+
+    `low` and `high` are the ends of a bar on the same line, of the 5 and 95 % quantiles over an ensemble. The words are
+    at `place`, by default the middle of the line, and lie to the side of it that `align` says.
+    """
+
+    text: str
+    begin: tuple[float, float]
+    end: tuple[float, float]
+    low: tuple[float, float] | None = None
+    high: tuple[float, float] | None = None
+    place: tuple[float, float] | None = None
+    align: Literal["left", "center", "right"] = "center"
+
+
+Quantiles = Mapping[str, Mapping[str, float | None]]
+"""Figure by name to its quantiles ``p5``, ``p50``, ``p95``."""
+
+
+def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: Quantiles) -> list[Dimension]:
+    """Return advance, transfer and tactical diameter of a turning circle, as far as the run shows them."""
+    side = math.copysign(1.0, float(motion.heading_deg[-1]))
+    advance, transfer = figures.get("advance_m"), figures.get("transfer_m")
+    tactical, half = figures.get("tactical_diameter_m"), figures.get("time_180_s")
+    found: list[Dimension] = []
+    if advance is not None and transfer is not None:
+        across = side * transfer
+        low, high = _ends(bands.get("advance_m"), lambda size: (across, size))
+        found.append(
+            Dimension(
+                text=_sized("advance", advance, motion.length_m),
+                begin=(across, 0.0),
+                end=(across, advance),
+                low=low,
+                high=high,
+                place=(across, 0.12 * advance),
+            )
+        )
+        low, high = _ends(bands.get("transfer_m"), lambda size: (side * size, advance))
+        found.append(
+            Dimension(
+                text=_sized("transfer", transfer, motion.length_m),
+                begin=(0.0, advance),
+                end=(across, advance),
+                low=low,
+                high=high,
+                place=(0.0, advance),
+                align="left" if side > 0 else "right",
+            )
+        )
+    if tactical is not None and half is not None:
+        ahead = motion.place(half)[1]
+        low, high = _ends(bands.get("tactical_diameter_m"), lambda size: (side * size, ahead))
+        found.append(
+            Dimension(
+                text=_sized("tactical diameter", tactical, motion.length_m),
+                begin=(0.0, ahead),
+                end=(side * tactical, ahead),
+                low=low,
+                high=high,
+            )
+        )
+    return found
+
+
+def turn_chart(
+    motion: Motion,
+    figures: Mapping[str, float | None],
+    *,
+    bands: Quantiles | None = None,
+    edges_m: tuple[Array, Array] | None = None,
+    title: str = "",
+) -> alt.LayerChart:
+    """A turning circle with advance, transfer and tactical diameter, and the ship at equal times.
+
+    Parameters
+    ----------
+    motion : Motion
+    figures : mapping
+        ``advance_m``, ``transfer_m``, ``tactical_diameter_m``, ``time_180_s``.
+    bands : mapping, optional
+        Quantiles of the figures over an ensemble.
+    edges_m : pair of arrays (n, 2), optional
+        Edges of the band of the track: distance ahead and to starboard, m.
+    title : str
+    """
+    turned = np.abs(motion.heading_deg) <= _FULL_TURN
+    dimensions = turn_dimensions(motion, figures, bands or {})
+    shown = motion.until(float(motion.time_s[turned][-1]))
+    return way_chart(motion, dimensions, shown, edges_m=edges_m, title=title)
+
+
+def way_chart(
+    motion: Motion,
+    dimensions: Sequence[Dimension],
+    hulls_until: Motion | None = None,
+    *,
+    edges_m: tuple[Array, Array] | None = None,
+    title: str = "",
+) -> alt.LayerChart:
+    """The track of a manoeuvre, both axes in one scale, with figures on it and the ship at equal times.
+
+    Parameters
+    ----------
+    motion : Motion
+    dimensions : sequence of Dimension
+    hulls_until : Motion, optional
+        The part of the motion with outlines of the ship; by default all of it.
+    edges_m, title
+        As of :func:`turn_chart`.
+    """
+    polygon = _polygon(edges_m) if edges_m is not None else np.empty((0, 2))
+    step, outlines = hull_rows(hulls_until or motion)
+    ends = [point for dimension in dimensions for point in (dimension.begin, dimension.end)]
+    across: list[ArrayLike] = [
+        motion.starboard_m,
+        polygon[:, 1],
+        [row["y"] for row in outlines],
+        [point[0] for point in ends],
+    ]
+    up: list[ArrayLike] = [motion.ahead_m, polygon[:, 0], [row["x"] for row in outlines], [point[1] for point in ends]]
+    frame = equal_frame(
+        np.concatenate([vector(part) for part in across]),
+        np.concatenate([vector(part) for part in up]),
+        width_px=640,
+        height_px=540,
+    )
+    position = frame.axes(across=("y:Q", "to starboard (m)"), up=("x:Q", "ahead (m)"))
+    kept = thin_line([motion.ahead_m, motion.starboard_m], LINE_SAMPLES)
+    rows = records("track", {"x": motion.ahead_m[kept], "y": motion.starboard_m[kept], "t": motion.time_s[kept]})
+    tooltip = [
+        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
+        alt.Tooltip("x:Q", title="ahead (m)", format=NUMBER),
+        alt.Tooltip("y:Q", title="to starboard (m)", format=NUMBER),
+    ]
+    line = alt.Chart(data(rows)).mark_line(clip=True).encode(**position, color=_ONE, order="i:Q")
+    hover = alt.Chart(data(every(rows, 90))).mark_point(opacity=0, filled=True, size=110, clip=True)
+    layers = [line.properties(name="plot")]
+    if len(polygon):
+        corners = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
+        band = alt.Chart(data(corners)).mark_line(style="band", interpolate="linear-closed", strokeWidth=0, clip=True)
+        layers.append(band.encode(**position, order="i:Q"))
+    if outlines:
+        hull = alt.Chart(data(outlines)).mark_line(style="hull", interpolate="linear-closed", clip=True)
+        layers.append(hull.encode(**position, order="i:Q", detail="hull:N"))
+    layers += [*_dimension_layers(dimensions, position), hover.encode(**position, tooltip=tooltip)]
+    described = "; ".join(dimension.text for dimension in dimensions)
+    outlined = f" The ship every {step:g} s." if outlines else ""
+    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
+        title=alt.Title(title, subtitle=outlined.strip()) if title else "",
+        width=frame.width_px,
+        height=frame.height_px,
+        description=f"Track of the manoeuvre, the first course up the page. {described}.{outlined}",
+        usermeta={"equal_scales": True},
+    )
+
+
+def zigzag_chart(
+    motion: Motion,
+    figures: Mapping[str, Sequence[float]],
+    heading_deg: float,
+    *,
+    bands: Quantiles | None = None,
+    edges_deg: tuple[Array, Array, Array] | None = None,
+    title: str = "",
+) -> alt.LayerChart:
+    """Heading and rudder of a zigzag over time, each overshoot marked from the heading of the order to the peak.
+
+    Parameters
+    ----------
+    motion : Motion
+    figures : mapping
+        ``overshoots_deg``, ``execute_times_s`` and ``overshoot_times_s``, each a list.
+    heading_deg : float
+        Heading at which the rudder is reversed, positive.
+    bands : mapping, optional
+        Quantiles over an ensemble, of ``overshoot_1_deg``, ...
+    edges_deg : three arrays (n,), optional
+        Times (s), and the edges of the band of the heading (deg).
+    title : str
+    """
+    look = series_look(["heading", "rudder"])
+    rows: list[ChartRecord] = []
+    for label, values in (("heading", motion.heading_deg), ("rudder", motion.rudder_deg)):
+        kept = thin_line([values], LINE_SAMPLES)
+        rows += records(label, {"t": motion.time_s[kept], "v": values[kept]})
+    x = alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False))
+    y = alt.Y("v:Q", title="heading and rudder, + to starboard (deg)", scale=alt.Scale(zero=True))
+    tooltip = [
+        alt.Tooltip("run:N", title=""),
+        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
+        alt.Tooltip("v:Q", title="angle (deg)", format=NUMBER),
+    ]
+    base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour)
+    lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
+    targets = alt.Chart(data([{"v": heading_deg}, {"v": -heading_deg}])).mark_rule(style="dimension").encode(y="v:Q")
+    peaks = overshoot_marks(motion, figures, heading_deg, bands or {})
+    layers = [lines, targets]
+    if edges_deg is not None:
+        columns = dict(zip(("t", "low", "high"), (vector(part) for part in edges_deg), strict=True))
+        area = alt.Chart(data(records("heading", columns))).mark_area(style="band", clip=True)
+        layers.append(area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q"))
+    if peaks:
+        marked = alt.Chart(data(peaks)).encode(x="t:Q")
+        intervals = [peak for peak in peaks if "low" in peak]
+        if intervals:
+            interval = alt.Chart(data(intervals)).mark_rule(style="interval", clip=True)
+            layers.append(interval.encode(x="t:Q", y="low:Q", y2="high:Q"))
+        layers.append(marked.mark_rule(style="overshoot", clip=True).encode(y="from:Q", y2="v:Q"))
+        for up in (True, False):
+            words = [peak for peak in peaks if (peak["v"] > 0) is up]
+            layers += _written(words, {"x": alt.X("t:Q"), "y": alt.Y("v:Q")}, dy=-9 if up else 11)
+    layers.append(base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip))
+    sizes = ", ".join(str(peak["text"]) for peak in peaks)
+    return alt.layer(*layers, params=[pan_zoom("x", views=["plot"])]).properties(
+        title=title,
+        width=680,
+        height=340,
+        description=f"Heading and rudder over time. Overshoots: {sizes or 'none'}.",
+    )
+
+
+def overshoot_marks(
+    motion: Motion, figures: Mapping[str, Sequence[float]], heading_deg: float, bands: Quantiles
+) -> list[ChartRecord]:
+    """Return a mark for each overshoot: from the heading of the order to the peak of the heading, with its size."""
+    marks: list[ChartRecord] = []
+    lists = [figures.get(name) or [] for name in ("overshoots_deg", "execute_times_s", "overshoot_times_s")]
+    for number, (overshoot, execute, later) in enumerate(zip(*lists, strict=False), start=1):
+        at = execute + later
+        side = math.copysign(1.0, float(np.interp(at, motion.time_s, motion.heading_deg)))
+        mark = {"t": plain(at), "from": side * heading_deg, "v": plain(side * (heading_deg + overshoot))}
+        band = bands.get(f"overshoot_{number}_deg") or {}
+        low, high = band.get("p5"), band.get("p95")
+        if low is not None and high is not None:
+            mark |= {"low": plain(side * (heading_deg + low)), "high": plain(side * (heading_deg + high))}
+        marks.append(mark | {"text": f"{format_number(overshoot, _ROUND)}°"})
+    return marks
+
+
+def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: str = "") -> alt.LayerChart:
+    """Yaw rate of pull-outs over the time from the order of the neutral rudder; both sides of a stable ship meet.
+
+    Parameters
+    ----------
+    sides : mapping
+        Label to motion, of the pull-out from each side.
+    neutral_deg : float
+        The neutral rudder.
+    title : str
+    """
+    look = series_look(list(sides))
+    rows: list[ChartRecord] = []
+    for label, motion in sides.items():
+        since = motion.time_s - pull_out_time(motion, neutral_deg)
+        kept = thin_line([motion.rate_degps], LINE_SAMPLES)
+        rows += records(label, {"t": since[kept], "v": motion.rate_degps[kept]})
+    longest = max(row["t"] for row in rows)
+    x = alt.X(
+        "t:Q",
+        title=f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
+        scale=alt.Scale(nice=False, domain=[-0.1 * longest, longest]),
+    )
+    y = alt.Y("v:Q", title="yaw rate, + to starboard (deg/s)", scale=alt.Scale(zero=True))
+    tooltip = [
+        alt.Tooltip("run:N", title=""),
+        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
+        alt.Tooltip("v:Q", title="yaw rate (deg/s)", format=NUMBER),
+    ]
+    base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour)
+    zero = alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
+    order = alt.Chart(data([{"t": 0.0}])).mark_rule(style="dimension").encode(x="t:Q")
+    lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
+    hover = base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip)
+    return alt.layer(lines, zero, order, hover, params=[pan_zoom("x", views=["plot"])]).properties(
+        title=title,
+        width=680,
+        height=320,
+        description=f"Yaw rate after the rudder is put to neutral, of {', '.join(sides)}.",
+    )
+
+
+def pull_out_time(motion: Motion, neutral_deg: float) -> float:
+    """Return the time at which the rudder begins to move from its turn to the neutral angle, s."""
+    away = np.abs(motion.rudder_deg - neutral_deg)
+    held = np.flatnonzero(away >= (1 - 1e-6) * away.max())
+    return float(motion.time_s[held[-1]])
+
+
+def stop_speed_chart(motion: Motion, *, title: str = "") -> alt.VConcatChart:
+    """Speed, and revolutions where they change, over the distance along the track of a stop."""
+    panels = {"speed (m/s)": motion.speed_mps}
+    if motion.revolutions_rpm is not None and np.ptp(motion.revolutions_rpm) > 0:
+        panels["revolutions (rpm)"] = motion.revolutions_rpm
+    drawn: list[alt.LayerChart] = []
+    for title_of_axis, values in panels.items():
+        last = title_of_axis == list(panels)[-1]
+        kept = thin_line([values, motion.way_m], LINE_SAMPLES)
+        rows = records("run", {"s": motion.way_m[kept], "v": values[kept], "t": motion.time_s[kept]})
+        axis = alt.Axis(title="distance along the track (m)" if last else None, labels=last, ticks=last)
+        base = alt.Chart(data(rows)).encode(
+            x=alt.X("s:Q", scale=alt.Scale(nice=False), axis=axis),
+            y=alt.Y("v:Q", axis=axis_above(title_of_axis), scale=alt.Scale(zero=True)),
+        )
+        tooltip = [
+            alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
+            alt.Tooltip("s:Q", title="distance (m)", format=NUMBER),
+            alt.Tooltip("v:Q", title=title_of_axis, format=NUMBER),
+        ]
+        line = base.mark_line(clip=True).encode(color=_ONE, order="i:Q")
+        hover = base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip)
+        drawn.append(alt.layer(line, hover).properties(width=640, height=200 if not drawn else 110))
+    return stacked(drawn, title=title, description="Speed over the distance along the track of the stop.")
+
+
+def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list[Dimension]:
+    """Return head reach and side reach of a stop."""
+    head, side = figures.get("head_reach_m"), figures.get("side_reach_m")
+    if head is None or side is None:
+        return []
+    away: Literal["left", "right"] = "right" if side < 0 else "left"
+    return [
+        Dimension(text=_sized("head reach", head, motion.length_m), begin=(0.0, 0.0), end=(0.0, head), align=away),
+        Dimension(text=f"{_sized('side reach', abs(side), motion.length_m)}", begin=(0.0, head), end=(side, head)),
+    ]
+
+
+def hull_outline(length_m: float, beam_m: float) -> tuple[Array, Array]:
+    """Return the outline of a ship about its midship point: distances to starboard and ahead of it, m."""
+    half, bow, shoulder = beam_m / 2, length_m / 2, 0.3 * length_m
+    return np.array([0.0, half, half, -half, -half]), np.array([bow, shoulder, -bow, -bow, shoulder])
+
+
+def hull_rows(motion: Motion) -> tuple[float, list[ChartRecord]]:
+    """Return the time between two outlines of the ship (s), and their corners; none without its dimensions."""
+    length_m, beam_m = motion.length_m, motion.beam_m
+    if not (length_m and beam_m) or len(motion.time_s) < 2:
+        return 0.0, []
+    duration, way = float(motion.time_s[-1]), float(motion.way_m[-1])
+    least = max(duration / MOST_HULLS, HULL_SPACING * length_m * duration / way if way > 0 else duration)
+    step = float(next((size for size in _STEPS_S if size >= least), _STEPS_S[-1] * math.ceil(least / _STEPS_S[-1])))
+    across, up = hull_outline(length_m, beam_m)
+    rows: list[ChartRecord] = []
+    for number, time in enumerate(np.arange(0.0, duration + 1e-9, step)):
+        starboard, ahead = motion.place(float(time))
+        heading = math.radians(float(np.interp(time, motion.time_s, motion.heading_deg)))
+        cos, sin = math.cos(heading), math.sin(heading)
+        corners = {"x": ahead + up * cos - across * sin, "y": starboard + up * sin + across * cos}
+        rows += [row | {"hull": number, "t": plain(float(time))} for row in records("ship", corners)]
+    return step, rows
+
+
+# One series takes the first colour of the palette, which is another on a dark screen.
+_ONE = alt.Color("run:N", legend=None)
+
+
+def _sized(name: str, size_m: float, length_m: float | None) -> str:
+    lengths = f" ({format_number(size_m / length_m, _ROUND)} L)" if length_m else ""
+    return f"{name} {format_number(size_m, _ROUND)} m{lengths}"
+
+
+def _ends(
+    band: Mapping[str, float | None] | None, point: Callable[[float], tuple[float, float]]
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    low, high = (band or {}).get("p5"), (band or {}).get("p95")
+    if low is None or high is None:
+        return None, None
+    return point(low), point(high)
+
+
+def _polygon(edges: tuple[Array, Array]) -> Array:
+    low, high = (np.asarray(edge, dtype=float).reshape(-1, 2) for edge in edges)
+    known = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
+    return np.concatenate([low[known], high[known][::-1]])
+
+
+def _dimension_layers(dimensions: Sequence[Dimension], position: Mapping[str, object]) -> list[alt.Chart]:
+    lines, bars = [], []
+    words: dict[str, list[ChartRecord]] = {}
+    for dimension in dimensions:
+        (y, x), (y2, x2) = dimension.begin, dimension.end
+        lines.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2), "text": dimension.text})
+        if dimension.low and dimension.high:
+            (y, x), (y2, x2) = dimension.low, dimension.high
+            bars.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2)})
+        middle = dimension.place or tuple((a + b) / 2 for a, b in zip(dimension.begin, dimension.end, strict=True))
+        words.setdefault(dimension.align, []).append(
+            {"y": plain(middle[0]), "x": plain(middle[1]), "text": dimension.text}
+        )
+    layers = []
+    if bars:
+        layers.append(_rules(bars, "interval", position))
+    if lines:
+        layers.append(_rules(lines, "dimension", position))
+        for align, rows in words.items():
+            layers += _written(rows, position, dy=-8, align=align)
+    return layers
+
+
+def _rules(rows: Sequence[ChartRecord], style: str, position: Mapping[str, object]) -> alt.Chart:
+    return alt.Chart(data(rows)).mark_rule(style=style, clip=True).encode(**position, x2="y2:Q", y2="x2:Q")
+
+
+def _written(
+    rows: Sequence[ChartRecord], position: Mapping[str, object], dy: float, align: str = "center"
+) -> list[alt.Chart]:
+    """Words on a chart, over a rim in the colour of the paper that keeps them legible."""
+    if not rows:
+        return []
+    base = alt.Chart(data(rows)).encode(**position, text="text:N")
+    aside = {"left": 6, "right": -6}.get(align, 0)
+    return [base.mark_text(style=style, dy=dy, dx=aside, align=align) for style in ("rim", "words")]
