@@ -6,9 +6,10 @@ distance is that of a wall with the same mean nearness over the draught; the bar
 the two tests with drift, the hull's force is added by the regressions of Clarke, Gedling and Hine (1983) and the depth
 factors of Kijima et al. (1990).
 
-The two coefficients of a propeller at work are the medians over the five tests with one; each such test is also
-calculated with the medians of the other four (``held out``), and the squat with its two shares fitted without the test.
-Those of a stopped propeller are fitted to three tests, and no test is left to check them.
+The form of the equations was chosen with all tests in sight. The two coefficients of a propeller at work are the
+medians over the five tests with one; each such test is also calculated with the medians of the other four (``held
+out``), and the squat with its two shares fitted without the test. Those of a stopped propeller are fitted to three
+tests, and no test is left to check them.
 
     python benchmarks/bank.py
 """
@@ -58,7 +59,7 @@ class ComparedTest:
 
 @dataclass(frozen=True)
 class Bank:
-    """Bank in the tank: its toe and where its platform begins (m from the centre line), run per rise, height (m)."""
+    """Bank in the tank: its toe (m from the centre line), run per rise, height (m; None: above the water)."""
 
     toe: float
     slope: float

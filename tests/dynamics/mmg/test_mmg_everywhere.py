@@ -19,6 +19,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.improve_card import add_effects_to_card
+from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
 SIZES = {"start_s": 1.0, "reversal_s": 4.0, "time_constant_s": 2.0, "depth_m": 1.5, "port_distance_m": 3.0}
@@ -188,3 +189,10 @@ def test_hull_and_rudder_are_scaled_to_turn_through_two_points(tmp_path: Path) -
     assert isinstance(card, MmgCard)
     assert card.rudder.f_alpha == pytest.approx(2.6, rel=2e-3)
     assert card.derivatives["Nv"] == pytest.approx(-0.137 * 0.46 / 7, rel=2e-3)
+
+
+def test_identification_leaves_the_torque_alone_of_which_motion_shows_nothing() -> None:
+    curve = "[propeller]\nq_0 = 0.03\nq_1 = -0.02\nq_2 = -0.01\n"
+    text = TEXT.replace("[propeller]\n", curve, 1) + "\n[uncertainty]\nq_0 = 0.001\neta_R = 0.02\neps = 0.05\n"
+    free = free_parameters(ship_of(text).card)
+    assert "mmg.eps" in free and not {"mmg.q_0", "mmg.eta_R"} & set(free)

@@ -16,9 +16,9 @@ STEP_FACTORS = (3, 2)
 5 times its step and wrong by 1e-3 from 6 on: the longest stays at half of that (project choice)."""
 
 STEP_TOLERANCE = 1e-5
-"""Largest relative change of a figure by a longer step: a tenth of the fourth digit after the first, and the sampling
-error of a 5 % quantile (2.1 standard deviations over the root of the number of members) among a million ships with a
-standard deviation of 0.5 % (project choice)."""
+"""Largest relative change of a figure by a longer step: at most a unit of its fifth digit, and the sampling error of a
+5 % quantile (2.1 standard deviations over the root of the number of members) among a million ships with a standard
+deviation of 0.5 % (project choice)."""
 
 TRIED_MEMBERS = 16
 """Members, the first, that are run with both steps: two registers of the widest lanes (project choice)."""

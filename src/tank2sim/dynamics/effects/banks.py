@@ -69,7 +69,7 @@ def _propeller_at_work(model: Model) -> ca.SX:
     if "propeller.speed_actual" not in model:
         return ca.SX(1)
     revolutions = model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
-    speed = ca.fmax(model.symbol("motion.u"), 0) / model.symbol("ship.speed") + _STILL_MPS / model.symbol("ship.speed")
+    speed = (ca.fmax(model.symbol("motion.u"), 0) + _STILL_MPS) / model.symbol("ship.speed")
     return ca.fmin(ca.fmax(revolutions / speed / AT_WORK, 0), 1)
 
 
