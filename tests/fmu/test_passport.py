@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -115,6 +116,39 @@ def test_each_bundled_ship_has_a_passport_that_machines_and_people_can_read(name
     for one in found["coefficients"]:
         assert one["variable"] in page
     assert html.escape(card.ship.source, quote=False).split("'")[0][:40] in page
+
+
+# ---- what rules ask for, and pictures ----
+
+
+def test_rows_of_rules_follow_from_the_model(mariner_card: ManoeuvringCard, mariner: Model) -> None:
+    def shown(model: Model) -> dict[str, str]:
+        made = passport(model, documents_of(mariner_card), {}, Replay())
+        return {row.subject: str(row.shown) for row in made.rules}
+
+    calm = shown(mariner)
+    assert calm["tidal stream, currents"] == calm["effects of weather"] == "not shown"
+    assert calm["simulated manoeuvres"] == calm["potential causes of prediction error"] == "not shown"
+    assert calm["visual scenario as seen from the bridge"] == "not applicable"
+    added = '\n[[effects]]\nname = "current"\nparameters = { speed_mps = 0.4, direction_deg = 120.0 }\n'
+    assert shown(build(parse_card(mariner_card.text + added, "x.toml")))["tidal stream, currents"] == "shown"
+    assert passport(build(read_card("wilinski-zellman")), Documents(), {}, Replay()).rules == ()
+
+
+def test_the_page_has_the_turn_to_scale_and_the_zigzag(
+    mariner_fmu: Fmu, mariner: Model, reported: dict[str, Any]
+) -> None:
+    page = entry(mariner_fmu(2), PASSPORT_PAGE)
+    assert page.count("<svg") == 3
+    track = re.search(r'<polyline points="([^"]*)"', page)
+    assert track is not None
+    points = np.array([[float(each) for each in pair.split(",")] for pair in track[1].split()])
+    run = simulate(mariner, parse_manoeuvre("turn:35")).trajectory
+    metres = np.column_stack([run["motion.y"], -run["motion.x"]])  # pixels count downward
+    scale = np.ptp(points, axis=0) / np.ptp(metres, axis=0)
+    assert scale[0] == pytest.approx(scale[1], rel=0.01)
+    assert points[-1] - points[0] == pytest.approx(scale * (metres[-1] - metres[0]), abs=1)
+    assert {row["shown"] for row in reported["rules"]} == {"shown", "not shown", "not applicable"}
 
 
 # ---- what was found of the FMU ----

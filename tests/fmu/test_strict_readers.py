@@ -240,12 +240,12 @@ def test_no_name_breaks_the_passport(text: str, models: dict[str, Model]) -> Non
     strange = replace(models["gain"], name=text, description=text, notices=(text,))
     zigzag = Run(mock.Mock(), {"overshoots_deg": [1.0]}, (text,), CardRangeReading({}, {"x": 0.0}, 0.0, text))
     documents = Documents(source=text, validity=text, origins={"command": ValueOrigin(text, text)})
-    files = passport_files(strange, documents, {"zigzag_20_20": zigzag}, Replay(problem=text))
+    files = passport_files(strange, documents, {"zigzag": zigzag}, Replay(problem=text))
     tags = [one.tag for one in page_of(files).iter()]
     quiet = passport_files(
         replace(strange, name="x", description="x", notices=("x",)),
         Documents(source="x", validity="x", origins={"command": ValueOrigin("x", "x")}),
-        {"zigzag_20_20": zigzag},
+        {"zigzag": zigzag},
         Replay(problem="x"),
     )
     if text:  # without a text a paragraph is left out

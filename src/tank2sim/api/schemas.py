@@ -899,6 +899,9 @@ class SteerKeys(_Keys):
     ship: str
     ghost: str | None
     steerable: bool
+    members: int
+    autopilot: str | None
+    scenario: str | None
     page_kB: Number
     notices: list[str]
 

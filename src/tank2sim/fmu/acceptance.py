@@ -12,6 +12,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.passport import PASSPORT_FILE, PASSPORT_PAGE, Replay, passport
+from tank2sim.fmu.passport_pictures import passport_pictures
 from tank2sim.fmu.platforms import host_platform
 from tank2sim.fmu.process import Drive, drive_apart
 from tank2sim.fmu.reference import reference_errors
@@ -85,6 +86,7 @@ def passport_files(model: Model, documents: Documents, manoeuvres: Mapping[str, 
         "version": version("tank2sim"),
         "file": PASSPORT_FILE,
         "titles": _TITLES,
+        "pictures": passport_pictures(manoeuvres),
         "words": in_words,
         "shown": _shown,
     }

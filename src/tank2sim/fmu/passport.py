@@ -11,8 +11,9 @@ from typing import Any
 
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.fmu.documents import Documents
-from tank2sim.fmu.provenance import ABSENT, ValueOrigin
+from tank2sim.fmu.provenance import ABSENT, STATED_ERROR, ValueOrigin
 from tank2sim.fmu.reference_run import EXTRA
+from tank2sim.fmu.simulator_rules import RuleRow, simulator_rules
 from tank2sim.simulation.run import Run
 
 PASSPORT_FILE = f"{EXTRA}/passport.json"
@@ -76,6 +77,7 @@ class Passport:
     figures: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     card_range: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     replay: Replay = field(default_factory=Replay)
+    rules: tuple[RuleRow, ...] = ()
 
     def as_json(self) -> str:
         """The passport as JSON text, in ASCII; a number that is not finite is null."""
@@ -102,6 +104,11 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
         figures={name: run.figures for name, run in manoeuvres.items()},
         card_range={name: run.reading.as_json() | {"message": run.reading.message} for name, run in manoeuvres.items()},
         replay=replay,
+        rules=simulator_rules(
+            model,
+            manoeuvres={"turn_35", "zigzag_20_20"} <= set(manoeuvres),
+            errors=any(origin.error_from == STATED_ERROR for origin in documents.origins.values()),
+        ),
     )
 
 

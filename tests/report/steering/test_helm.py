@@ -123,7 +123,8 @@ class TestInABrowser:
         click("zigzag"); click("run"); sail(300.4); press("m"); sail(33); press("w"); press("s"); sail(10);
         seen.pose = pose(helm().own); seen.time = helm().time; seen.other = pose(helm().members[7].voyage);
         const track = JSON.stringify(helm().own.samples);
-        click("share"); await new Promise((done) => setTimeout(done, 300)); seen.link = at("link").value;
+        click("share"); sail(20); await new Promise((done) => setTimeout(done, 300)); seen.link = at("link").value;
+        seen.still = helm().time > seen.time + 10; // it is not replayed in the page that made it
         put("approach", "9", "change"); sail(50);
         const hash = location.hash; location.hash = ""; await new Promise((done) => setTimeout(done, 100));
         location.hash = hash; await new Promise((done) => setTimeout(done, 100));
@@ -141,7 +142,7 @@ class TestInABrowser:
         )
         seen, _ = sailed(within(kvlcc2.page()), tmp_path, steps)
         assert "Replayed from the link" in seen["under"]
-        assert seen["same"] and seen["text"]
+        assert seen["same"] and seen["text"] and seen["still"]
         assert (seen["replayed"], seen["until"]) == (seen["pose"], seen["time"])
         assert seen["again"] == seen["other"]
         assert np.hypot(*seen["pose"][:2]) > 1000
@@ -182,8 +183,11 @@ class TestInABrowser:
     def test_members_are_the_ships_of_the_simulation(self, kvlcc2, tmp_path: Path):
         steps = (
             SAIL + "press('ArrowRight', { shiftKey: true }); sail(300); seen.third = pose(helm().members[2].voyage);"
+            "helm().zigzag(0.3, 0.3); helm().own.zigzag = null; press('m');"
+            "seen.left = helm().members.filter((one) => one.voyage.zigzag).length;"
         )
         seen, _ = sailed(within(kvlcc2.page()), tmp_path, steps)
+        assert seen["left"] == 0  # a hand on the rudder ends the zigzag of each, whose own may have ended before
         member = build(read_card("kvlcc2")).with_values(kvlcc2.members[2])
         run = simulate(member, parse_manoeuvre("turn:5"), duration_s=300.0).trajectory
         assert seen["third"][:2] == pytest.approx([run["motion.x"][-1], run["motion.y"][-1]], abs=1e-3)

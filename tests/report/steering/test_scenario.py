@@ -169,7 +169,8 @@ class TestInABrowser:
         seen.points = shown("points");
         seen.shown = [shown("aground"), shown("buoys"), shown("goal"), shown("off")];
         seen.pose = Voyage.POSE.map((name) => helm.own.samples[name].at(-1)); click("save");
-        click("run"); seen.run = at("run").textContent; seen.again = at("said").textContent;"""
+        click("run"); await new Promise((done) => setTimeout(done, 100));
+        seen.run = at("run").textContent; seen.again = at("said").textContent;"""
         harness = page.replace("helm = new Helm(", "window.helm = helm = new Helm(")
         seen, (voyage,) = sailed(harness, tmp_path, steps.replace("FIRST", '"arrived"'))
         x, y, t = voyage["x_m"], voyage["y_m"], voyage["t_s"]

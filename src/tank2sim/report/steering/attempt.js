@@ -19,8 +19,8 @@ class Attempt {
   note(t, code, values) {
     this.#changed();
     const last = this.events.at(-1);
-    const again = last?.t === t && last.code === code && (code === "c" || (code === "o" && last.values[0] === values[0]));
-    if (again) last.values = values;
+    const same = code === "c" || (code === "o" && last?.values[0] === values[0]);
+    if (same && last?.t === t && last.code === code) last.values = values;
     else this.events.push({ t, code, values });
   }
 
@@ -41,7 +41,9 @@ class Attempt {
   // The attempt of a text; throws where it is of another page, or no attempt.
   static parse(text, { id, step, controls, references }) {
     const [page, end, ...rest] = text.split("~");
-    if (page !== id) throw new Error("this link is of another page: of another ship, scenario or version of the program");
+    if (page !== id) {
+      throw new Error("this link is of another page: of another ship, scenario or version of the program");
+    }
     const broken = () => new Error("this link is broken: a part of it is missing");
     const real = (word) => {
       if (word === undefined || word === "" || !Number.isFinite(Number(word))) throw broken();

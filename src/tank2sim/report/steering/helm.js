@@ -50,9 +50,12 @@ class Helm {
 
   // The orders. Each is kept with its time, and returns what it has ended.
   order(name, value) {
-    const ended = name === "rudder.command" ? this.own.release() : null;
-    if (ended) for (const member of this.members) member.try((voyage) => voyage.release());
-    this.#all("o", [name, value], (voyage) => voyage.order(name, value));
+    let ended = null;
+    this.#all("o", [name, value], (voyage) => {
+      const left = name === "rudder.command" ? voyage.release() : null; // a member's zigzag may last longer
+      if (voyage === this.own) ended = left;
+      voyage.order(name, value);
+    });
     return ended;
   }
 
@@ -100,7 +103,8 @@ class Helm {
     const { events, end } = this.replayed;
     const does = {
       o: (name, value) => this.order(name, value), c: (course) => this.steer(course), h: () => this.release(),
-      z: (rudder, heading) => this.zigzag(rudder, heading), f: () => this.follow(), x: (truth) => this.fail(truth === 1),
+      z: (rudder, heading) => this.zigzag(rudder, heading), f: () => this.follow(),
+      x: (truth) => this.fail(truth === 1),
     };
     while (events[0]?.t <= this.time) {
       const { code, values } = events.shift();

@@ -14,13 +14,15 @@
     data.controls.map((one) => [one.name, { ...one, input: find(`set-${one.name}`) }]));
   const rudder = sliders["rudder.command"];
   const engine = sliders["propeller.speed"];
-  const telegraph = engine && new Telegraph(find("telegraph"), data.telegraph, (value) => order(engine, value * engine.factor));
+  const telegraph = engine &&
+    new Telegraph(find("telegraph"), data.telegraph, (value) => order(engine, value * engine.factor));
   let helm = null;
   let sailing = false;
   let last = 0;
   let goal = 0;
   let pointed = false; // the last touch was by a pointer, not by a key
   let paper = false;
+  let sharing = false; // the address is about to change by the page itself
   let predicted = { at: -Infinity, places: [] };
   const held = {}; // inputs set by hand, but rudder and engine, SI
   let approach = {}; // as the page was written, to the last digit, until it is set by hand
@@ -50,7 +52,9 @@
     if (helm.score) showScore(helm.score);
     telegraph?.show(voyage.orders[engine.name]);
     find("autopilot")?.setAttribute("aria-pressed", String(voyage.course !== null));
-    if (voyage.course !== null && document.activeElement !== find("course")) find("course").value = course(voyage.course);
+    if (voyage.course !== null && document.activeElement !== find("course")) {
+      find("course").value = course(voyage.course);
+    }
     for (const mode of ["follow", "whole"]) find(mode).setAttribute("aria-pressed", String(view.mode === mode));
     find("finish").disabled = !voyage.zigzag && voyage.programme.length === 0 && !helm.replayed;
   }
@@ -105,7 +109,6 @@
   }
 
   function start(words) {
-    if (helm.score?.aground) { say(`${judged(helm.score)} Reset to begin again.`); return; }
     sailing = true;
     last = performance.now();
     goal = helm.time;
@@ -118,6 +121,7 @@
   // Sails until `until` (s) or the end of a manoeuvre, for at most `most` ms. Returns what is to be said, or null.
   function sail(until, most) {
     const begun = performance.now();
+    if (helm.score?.aground) return `${judged(helm.score)} Reset to begin again.`;
     try {
       while (helm.time < until - 1e-9 && performance.now() - begun < most) {
         const what = helm.advance();
@@ -262,6 +266,7 @@
       return;
     }
     const link = `${location.href.split("#")[0]}#${text}`;
+    sharing = location.hash.slice(1) !== text;
     location.hash = text;
     find("link").value = link;
     find("link").hidden = false;
@@ -276,10 +281,11 @@
 
   // The attempt in the address, replayed from its start. A link of another page is reported.
   function opened() {
-    const text = decodeURIComponent(location.hash.slice(1));
-    if (!text.includes("~") || text === helm.attempt.text(data)) return;
+    const [text, byPage] = [location.hash.slice(1), sharing];
+    sharing = false;
+    if (byPage || !text.includes("~")) return;
     try {
-      reset(Attempt.parse(text, data));
+      reset(Attempt.parse(decodeURIComponent(text), data));
       start("Replayed from the link.");
     } catch (error) {
       say(`${error.message}.`);

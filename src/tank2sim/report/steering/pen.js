@@ -17,7 +17,8 @@ const ANGLES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180]; // steps of an axis of an
 function ticks(low, high, about, steps) {
   const raw = (high - low) / Math.max(1, about);
   const power = 10 ** Math.floor(Math.log10(raw));
-  const step = (steps ?? ROUND.map((one) => one * power)).find((one) => one >= raw) ?? raw;
+  const choices = steps ?? ROUND.map((one) => one * power);
+  const step = choices.find((one) => one >= raw) ?? choices.at(-1);
   const found = [];
   for (let value = Math.ceil(low / step - 1e-9) * step; value <= high + 1e-9 * step; value += step) found.push(value);
   return found;

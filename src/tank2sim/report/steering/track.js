@@ -56,7 +56,9 @@ class TrackChart {
     pen.clip();
     this.waters?.marks(pen, colour, at, scene.scale);
     if (this.ghost) this.#ghost(pen, colour, scene, own.time);
-    for (const member of members) this.#member(pen, member.aground ? colour.port : colour.member, scene, member.voyage.samples);
+    for (const { aground, voyage } of members) {
+      this.#member(pen, aground ? colour.port : colour.member, scene, voyage.samples);
+    }
     line(pen, x.length, (row) => at(x[row], y[row]), { colour: colour.own, width: 2.4 });
     this.#hulls(pen, colour, scene, samples);
     this.#ahead(pen, colour, scene, ahead);
@@ -95,6 +97,7 @@ class TrackChart {
     const enough = TrackChart.APART * drawn / (this.speed * scene.scale);
     const every = TrackChart.INTERVALS.find((one) => one >= enough) ?? Math.ceil(enough / 3600) * 3600;
     const count = Math.floor((t.at(-1) + 1e-6) / every);
+    const written = []; // places of words, which others keep clear of
     Object.assign(pen, { fillStyle: colour.muted, textAlign: "left", textBaseline: "middle" });
     for (let number = Math.max(0, count - TrackChart.HULLS); number <= count; number += 1) {
       const row = Math.max(0, HistoryChart.place(t, number * every + 1e-6) - 1);
@@ -105,7 +108,10 @@ class TrackChart {
       if (number === 0 || drawn * TrackChart.APART < 34) continue; // no room for its words
       const words = Number.isInteger(minutes) ? `${minutes} min` : `${number * every} s`;
       const back = Math.sin(side) < -0.2 ? pen.measureText(words).width : 0;
-      pen.fillText(words, left + Math.sin(side) * off - back, top - Math.cos(side) * off);
+      const [right, down] = [left + Math.sin(side) * off - back, top - Math.cos(side) * off];
+      if (written.some(([x, y]) => Math.abs(x - right) < 48 && Math.abs(y - down) < 14)) continue;
+      written.push([right, down]);
+      pen.fillText(words, right, down);
     }
   }
 

@@ -32,8 +32,8 @@ class Zigzag {
   }
 }
 
-// Columns of samples, at most `most` rows. When they are full every second row goes, and of what follows fewer are kept;
-// the last row is always that of now.
+// Columns of samples, at most `most` rows. When they are full every second row goes, and of what follows fewer are
+// kept; the last row is always that of now.
 class Record {
   static MOST = 100000; // even, so that the last row stays; the longest zigzag of a bundled ship has fewer
 
@@ -143,7 +143,8 @@ class Voyage {
     this.#obey();
   }
 
-  // On to the next sample, at `until` (s) at the latest. Returns "zigzag", "programme" if that has just ended, else null.
+  // On to the next sample, at `until` (s) at the latest. Returns "zigzag" or "programme" if that has just ended, else
+  // null.
   advance(until = Infinity) {
     const tolerance = 1e-9 * this.step;
     const onGrid = this.time <= this.steps * this.step + tolerance;

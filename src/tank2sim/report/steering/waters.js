@@ -18,8 +18,9 @@ class Waters {
     [this.channel] = of("channel");
     [this.goal] = of("goal");
     for (const one of [...this.depths, ...this.banks]) one.box = Waters.box(one.points);
-    this.corners = [[0, 0], ...(this.channel?.points ?? []), ...(this.goal?.points ?? []),
-      ...this.buoys.map((one) => one.points[0])];
+    // What the whole view shows; banks may reach far inland.
+    const seen = [this.channel, this.goal, ...this.depths, ...this.buoys];
+    this.corners = [[0, 0], ...seen.flatMap((one) => one?.points ?? [])];
   }
 
   static box(points) {

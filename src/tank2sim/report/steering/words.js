@@ -36,11 +36,14 @@ function ended(what, voyage) {
   if (what === "programme") return "The trial's orders have ended.";
   const { overshoots } = voyage.done;
   const figures = overshoots.map((one) => shown(one / DEG, 1)).join(", ");
-  if (overshoots.length < Zigzag.EXECUTES - 1) return `${titled(voyage.done)} was given up: the heading is not reached.`;
+  const whole = overshoots.length === Zigzag.EXECUTES - 1;
+  if (!whole) return `${titled(voyage.done)} was given up: the heading is not reached.`;
   return `${titled(voyage.done)} has ended; overshoots ${figures} deg.`;
 }
 
-const LEFT = { zigzag: "the zigzag is over", programme: "the trial's orders are left", autopilot: "the autopilot is off" };
+const LEFT = {
+  zigzag: "the zigzag is over", programme: "the trial's orders are left", autopilot: "the autopilot is off",
+};
 
 // How an attempt in a scenario has ended.
 function judged({ aground, arrived, points }) {
