@@ -97,7 +97,8 @@ def test_outlines_of_the_ship_have_its_size_lie_on_the_track_and_head_along_it()
         assert (bow + stern) / 2 == pytest.approx(motion.place(time), abs=1e-3)
         heading = np.radians(time)
         assert bow - stern == pytest.approx(LENGTH * np.array([np.sin(heading), np.cos(heading)]), abs=1e-3)
-        assert np.linalg.norm(points[2] - points[3]) == pytest.approx(BEAM, abs=1e-3)
+        across = points[1] - points[4]  # starboard less port shoulder
+        assert across == pytest.approx(BEAM * np.array([np.cos(heading), -np.sin(heading)]), abs=1e-3)
     assert hull_rows(motion_of(columns(*[np.arange(3.0)] * 4)))[1] == []
 
 
