@@ -18,8 +18,7 @@ def test_what_simulate_wrote_becomes_a_page(tmp_path: Path) -> None:
     result = tank2sim("report", "s.json", "-o", "s.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     page = (tmp_path / "s.html").read_text(encoding="utf-8")
-    assert "Simulated manoeuvre: Mariner class" in page and "tactical diameter" in page
-    assert "Track: turn:35" in page and "Histories: turn:35" in page
+    assert "Mariner class: turning circle, 35° of rudder to starboard" in page and "tactical diameter" in page
 
 
 def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from tank2sim.report.kit.manoeuvre_charts import (
     turn_dimensions,
     zigzag_chart,
 )
-from tank2sim.report.kit.page import Verdict
+from tank2sim.report.kit.page import Verdict, render_page
 from tank2sim.report.results.page import result_page
 
 RADIUS, LENGTH, BEAM = 300.0, 100.0, 15.0
@@ -97,7 +97,8 @@ def test_outlines_of_the_ship_have_its_size_lie_on_the_track_and_head_along_it()
         assert (bow + stern) / 2 == pytest.approx(motion.place(time), abs=1e-3)
         heading = np.radians(time)
         assert bow - stern == pytest.approx(LENGTH * np.array([np.sin(heading), np.cos(heading)]), abs=1e-3)
-        assert np.linalg.norm(points[2] - points[3]) == pytest.approx(BEAM, abs=1e-3)
+        across = points[1] - points[4]  # starboard less port shoulder
+        assert across == pytest.approx(BEAM * np.array([np.cos(heading), -np.sin(heading)]), abs=1e-3)
     assert hull_rows(motion_of(columns(*[np.arange(3.0)] * 4)))[1] == []
 
 
@@ -172,3 +173,10 @@ def test_a_figure_outside_the_range_of_the_card_has_no_claim_of_a_limit_met():
     assert (first.verdict, first.limit) == (Verdict.PASSED, pytest.approx(4.5 * 160.93))
     outside = result_page({**result, "outside_card_range": ["advance_m"]}, "r.json").figures[0]
     assert outside.verdict == Verdict.CAUTION
+
+
+def test_the_mark_of_a_stop_beyond_the_card_is_on_its_page():
+    result = t2s.load("mariner-nominal").turn(35, duration_s=10).to_dict()
+    mark = "EXTRAPOLATED beyond what the card was measured in"
+    page = result_page({**result, "notices": [mark]}, "r.json")
+    assert mark in render_page(page).partition("<main")[0]

@@ -129,7 +129,7 @@ class ReductionResult(Result):
         tables = [
             ResultTable(
                 f"{name}: derivatives from {count} runs (prime, rudder to starboard)",
-                ("", "whole campaign", "paper's order", ""),
+                ("", "whole campaign", "test by test", ""),
                 rows,
             )
         ]

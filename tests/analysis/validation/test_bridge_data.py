@@ -11,6 +11,7 @@ from tank2sim.analysis.validation.bridge_data import SHALLOW, bridge_of, steady_
 from tank2sim.analysis.validation.ship_track import quarter
 from tank2sim.analysis.validation.standard_trials import ship_of
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card, revised
+from tank2sim.dynamics.effects.depth import icorels_squat
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Orders, Turn
 from tank2sim.simulation.run import simulate
@@ -128,3 +129,8 @@ def test_squat_is_the_larger_of_two_formulas_worked_by_hand(card) -> None:
     icorels = 2.4 * 0.6 * 160.93 * 23.17 * 7.468 / 160.93**2 * froude**2 / math.sqrt(1 - froude**2)
     assert (first.clearance_m, first.speed_mps) == pytest.approx((0.2 * 7.468, speed), rel=1e-3)
     assert first.squat_m == pytest.approx(max(barrass, icorels), rel=1e-3)
+
+
+def test_squat_by_icorels_is_that_worked_by_hand() -> None:
+    """30 000 m3, 200 m, depth Froude number 0.5: 2.4 * 0.75 * 0.25 / sqrt(0.75)."""
+    assert icorels_squat(30_000.0, 200.0, 0.25) == pytest.approx(0.5196, rel=1e-4)

@@ -47,12 +47,28 @@ def _relative_loss(model: Model, section: ca.SX, depth: ca.SX, gravity: float) -
 
 
 def barrass_squat(block: Any, speed_mps: Any) -> Any:
-    """Return the largest sinkage in open shallow water, m, by Barrass (2004); numbers, or symbols of a model."""
+    """Return the largest sinkage in open shallow water, m, by Barrass (2004).
+
+    Parameters
+    ----------
+    block : float or symbol
+        Block coefficient.
+    speed_mps : float or symbol
+        Speed through the water.
+    """
     return block * (speed_mps / KNOT_MPS) ** 2 / 100
 
 
 def icorels_squat(volume_m3: Any, length_m: Any, square: Any) -> Any:
-    """Return the largest sinkage, m, by ICORELS (1980); `square` is that of the depth Froude number, below 1."""
+    """Return the largest sinkage, m, by ICORELS (1980).
+
+    Parameters
+    ----------
+    volume_m3, length_m : float or symbol
+        Displaced volume and length of the ship.
+    square : float or symbol
+        Square of the depth Froude number, below 1.
+    """
     return 2.4 * volume_m3 / length_m**2 * square / (1 - square) ** 0.5
 
 

@@ -215,7 +215,7 @@ def harmonic_chart(
     count = max(len(vector(run.amplitude)) for run in runs)
     panels = []
     for order in range(1, count + 1):
-        x = _runs_axis("run:N", [run.run for run in runs], named=order == count)
+        x = _runs_axis("run:N", [run.run for run in runs], named=order == count, bars=True)
         rows = [{"run": run.run, "v": _at(run.amplitude, order)} for run in runs]
         fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in runs if run.fitted is not None]
         y = alt.Y("v:Q", axis=axis_above(f"harmonic {order} of {up}", tickCount=4), scale=alt.Scale(zero=True))
@@ -292,7 +292,7 @@ def _bands(lines: Sequence[ChartRecord], x: alt.X, look: SeriesLook) -> list[alt
     if not rows:
         return []
     colour = look.colour.copy()
-    if colour.legend is not None:
+    if colour["legend"] is not None:
         # The legend is shared with the points, and would be as faint as the band.
         colour.legend = alt.Legend(title=None, symbolOpacity=1)
     area = alt.Chart(data(rows)).mark_area(opacity=BAND_OPACITY, clip=True)
@@ -333,13 +333,14 @@ def _loop_layers(
     return layers
 
 
-def _runs_axis(place: str, runs: Sequence[str], *, named: bool) -> alt.X:
+def _runs_axis(place: str, runs: Sequence[str], *, named: bool, bars: bool = False) -> alt.X:
     size = 8 if len(runs) > _CROWDED else 11
     axis = alt.Axis(
         title=None, labels=named, ticks=named, grid=False,
         labelAngle=-90, labelFontSize=size, labelLimit=140, labelOverlap=False,
     )  # fmt: skip
-    return alt.X(place, scale=alt.Scale(domain=list(runs), paddingInner=0.25), axis=axis)
+    apart = {"paddingInner": 0.25} if bars else {}
+    return alt.X(place, scale=alt.Scale(domain=list(runs), **apart), axis=axis)
 
 
 def _at(amplitudes: ArrayLike | None, order: int) -> float | None:

@@ -45,22 +45,18 @@ def reduction_page(found: Json) -> Page:
     sections = [
         PageSection(
             heading="Derivatives",
-            text="One weighted regression over the whole campaign, and next to it the paper's order of tests.",
+            text="One weighted regression over the whole campaign, and next to it the tests one after the other.",
             tables=[_derivatives(derivatives | found.get("heel_derivatives", {}))],
             notes=found["warnings"],
         ),
-        *_budget(found.get("uncertainty_budget")),
-        PageSection(
-            heading="Which terms, and why",
-            text="Terms that the runs excite and that are not in the card.",
-            tables=[_left_out(found["selection"])],
-        ),
+        *_chart_sections(reduction_charts(found)),
         PageSection(
             heading="Leave one run out",
             text="How well each run is predicted from the others: root mean square error, % of the force's range.",
             tables=[_predictions(found["prediction_errors"])],
         ),
-        *_chart_sections(reduction_charts(found)),
+        *_left_out(found["selection"]),
+        *_budget(found.get("uncertainty_budget")),
     ]
     return Page(
         title=found["model"]["name"], subtitle="Captive model tests, reduced", figures=figures, sections=sections
@@ -115,8 +111,9 @@ def _derivatives(derivatives: Json) -> PageTable:
             stepwise = [1e5 * steps["value"], 1e5 * steps["standard_error"], steps["found_in"].replace("_", " ")]
         regression = 1e5 * derivative["value"], 1e5 * derivative["standard_error"]
         rows.append([name, *regression, *stepwise, derivative["origin"]])
-    heads = ("", "regression", "±", "paper's order", "±", "from tests", "origin")
-    return PageTable(caption="Prime system, times 10⁵", columns=[Column(title=head) for head in heads], rows=rows)
+    heads = ("", "regression", "±", "test by test", "±", "from tests", "origin")
+    columns = [Column(title=head) for head in heads]
+    return PageTable(caption="Prime system, times 10⁵", columns=columns, rows=rows, folded=False)
 
 
 def _budget(budget: Json) -> list[PageSection]:
@@ -156,14 +153,19 @@ def _budget(budget: Json) -> list[PageSection]:
     return [PageSection(heading="Uncertainty budget", text=text, tables=tables, notes=notes)]
 
 
-def _left_out(selection: Json) -> PageTable:
+def _left_out(selection: Json) -> list[PageSection]:
     rows: list[list[Cell]] = [
         [choice["name"], choice["reason"], choice["explanation"]]
         for choices in selection.values()
         for choice in choices
         if choice["reason"] in LEFT_OUT
     ]
-    return PageTable(caption="Left out", columns=[Column(title=head) for head in ("term", "reason", "why")], rows=rows)
+    if not rows:
+        return []
+    columns = [Column(title=head) for head in ("term", "reason", "why")]
+    text = "Terms that the runs excite and that are not in the card."
+    table = PageTable(caption="Left out", columns=columns, rows=rows)
+    return [PageSection(heading="Which terms, and why", text=text, tables=[table])]
 
 
 def _predictions(errors: Json) -> PageTable:

@@ -53,9 +53,36 @@ def compare_page(found: Json) -> Page:
     return Page(
         title=found["cards"][0]["ship"],
         subtitle=f"Comparison of cards: {', '.join(labels)}",
-        figures=[_figure(card) for card in found["summary"]],
+        figures=[*_largest(found["trials"], labels), *(_figure(card) for card in found["summary"])],
         sections=sections,
     )
+
+
+def _percents(
+    trials: Sequence[Mapping[str, Json]], labels: Sequence[str]
+) -> list[tuple[str, str, float, float | None]]:
+    """Card, figure, difference from the reference in per cent, and in standard errors, where both cards show it."""
+    return [
+        (label, f"{trial['name'].replace(' deg to', '')}: {in_words(name)[0]}", 100 * apart / abs(row["values"][0]), z)
+        for trial in trials
+        for name, row in trial["figures"].items()
+        for label, apart, z in zip(labels[1:], row["differences"], row["differences_standard_errors"], strict=True)
+        if apart is not None and row["values"][0] and not name.endswith("_lengths")
+    ]
+
+
+def _largest(trials: Sequence[Mapping[str, Json]], labels: Sequence[str]) -> list[KeyFigure]:
+    """The figure of each card that differs most from the reference."""
+    found = _percents(trials, labels)
+    cards = [
+        max((row for row in found if row[0] == label), key=lambda row: abs(row[2]), default=None)
+        for label in labels[1:]
+    ]
+    return [
+        KeyFigure(label=f"{card[0]}: largest difference", value=float(f"{card[2]:.3g}"), unit="%", note=card[1])
+        for card in cards
+        if card
+    ]
 
 
 def _figure(summary: Mapping[str, Json]) -> KeyFigure:
@@ -166,21 +193,9 @@ def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[s
 def _figure_differences(trials: Sequence[Mapping[str, Json]], labels: Sequence[str], assumed: str) -> list[PageSection]:
     """Differences of the figures from those of the reference, all manoeuvres in one chart."""
     rows = [
-        {
-            "run": label,
-            "name": f"{trial['name'].replace(' deg to', '')}: {in_words(name)[0]}",
-            "percent": plain(percent),
-        }
-        | (
-            {}
-            if z is None or not z
-            else {"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))}
-        )
-        for trial in trials
-        for name, row in trial["figures"].items()
-        for label, apart, z in zip(labels[1:], row["differences"], row["differences_standard_errors"], strict=True)
-        if apart is not None and row["values"][0] and not name.endswith("_lengths")
-        for percent in [100 * apart / abs(row["values"][0])]
+        {"run": label, "name": name, "percent": plain(percent)}
+        | ({"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))} if z else {})
+        for label, name, percent, z in _percents(trials, labels)
     ]
     if not rows:
         return []

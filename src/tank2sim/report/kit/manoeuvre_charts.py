@@ -453,10 +453,12 @@ def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list
     head, side = figures.get("head_reach_m"), figures.get("side_reach_m")
     if head is None or side is None:
         return []
-    away: Literal["left", "right"] = "right" if side < 0 else "left"
+    head_words, side_words = (
+        _sized(name, abs(size), motion.length_m) for name, size in (("head reach", head), ("side reach", side))
+    )
     return [
-        Dimension(text=_sized("head reach", head, motion.length_m), begin=(0.0, 0.0), end=(0.0, head), align=away),
-        Dimension(text=f"{_sized('side reach', abs(side), motion.length_m)}", begin=(0.0, head), end=(side, head)),
+        Dimension(text=head_words, begin=(0.0, 0.0), end=(0.0, head), place=(side / 2, head / 2)),
+        Dimension(text=side_words, begin=(0.0, head), end=(side, head)),
     ]
 
 

@@ -5,6 +5,7 @@
   const figures = [...document.querySelectorAll("figure")];
   const darkScreen = matchMedia("(prefers-color-scheme: dark)");
   const views = new Map();
+  const LEAST_SHRINK = 0.75; // share of their width to which panels side by side may be made smaller
   let turn = 0;
 
   const tip = document.createElement("div");
@@ -94,13 +95,13 @@
     let factor = 1;
     let look = config;
     let chart = charts[place];
-    let before = null; // the attempt before, of the same parts: what is beside the plots keeps its width
+    let before = null; // the attempt before, of the same parts: axes and legends keep their width
     for (let attempt = 0; attempt < 7; attempt += 1) {
       views.get(place)?.finalize();
       views.set(place, await embedded(holder, shrunk(chart, factor, equal), look, choice));
       const width = holder.querySelector("svg").width.baseVal.value;
       if (width <= room || room === 0) break;
-      if (chart === charts[place] && chart.columns > 1) {
+      if (chart === charts[place] && chart.columns > 1 && room < LEAST_SHRINK * width) {
         chart = inFewerColumns(chart, width, room);
         before = null;
         continue;

@@ -122,8 +122,8 @@ def _styles(tone: Tone) -> Config:
         "band": {"fill": tone.palette[0], "fillOpacity": BAND_OPACITY, "strokeWidth": 0},
         "uncertainty": {"fill": tone.palette[0], "fillOpacity": 0.25, "stroke": tone.palette[0], "strokeWidth": 1},
         "hull": {"fill": tone.muted, "fillOpacity": 0.35, "stroke": tone.muted, "strokeWidth": 0.75},
-        "words": {"fill": tone.ink, "fontSize": 12, "fontWeight": 600},
-        "rim": {"fill": tone.paper, "stroke": tone.paper, "strokeWidth": 4, "fontSize": 12, "fontWeight": 600},
+        "words": {"color": tone.ink, "fontSize": 12, "fontWeight": 600},
+        "rim": {"color": tone.paper, "stroke": tone.paper, "strokeWidth": 4, "fontSize": 12, "fontWeight": 600},
     }
 
 

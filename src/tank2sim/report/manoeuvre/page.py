@@ -71,7 +71,7 @@ def manoeuvre_page(result: Json) -> Page:
         title=f"{result['ship']}: {_title(result)}",
         subtitle=f"Simulated manoeuvre {result['manoeuvre']}" + (f", {_members(ensemble)}" if ensemble else ""),
         figures=[_key_figure(name, figures[name], result, ensemble) for name in names if name in figures],
-        sections=[section for section in sections if section.charts or section.tables],
+        sections=[section for section in sections if section.charts or section.tables or section.notes],
     )
 
 
