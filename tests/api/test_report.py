@@ -54,7 +54,7 @@ def test_a_schema_that_is_not_known_is_refused(turn: t2s.ManoeuvreResult, schema
 def test_every_command_of_a_type_exists() -> None:
     from tank2sim.cli import COMMANDS
 
-    assert {command for kind in RESULT_TYPES for command in kind.commands.split()} == set(COMMANDS) - {"report"}
+    assert {command for kind in RESULT_TYPES for command in kind.commands.split()} == set(COMMANDS) - {"open", "report"}
 
 
 def test_a_page_never_takes_the_place_of_its_json(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:
