@@ -71,8 +71,7 @@ def test_members_have_the_spread_of_the_covariance():
 def test_a_card_without_covariance_has_no_members_and_says_so():
     result = make_steering_page(t2s.load("mariner"))
     assert result.members == ()
-    assert data_of(result.page())["members"] == []
-    assert "has no covariance" in result.page() and "has no covariance" in result.headline[1]
+    assert "has no covariance" in result.headline[1]
 
 
 class TestInABrowser:
