@@ -16,7 +16,7 @@ from tank2sim.report.steering.members import members_of
 from tank2sim.report.steering.ship import telegraph_of
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
-from tests.report.steering.sailing import data_of, in_browser, sailed
+from tests.report.steering.sailing import in_browser, sailed
 
 SAIL = """
   const sail = (seconds) => {
