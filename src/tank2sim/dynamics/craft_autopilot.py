@@ -23,9 +23,10 @@ import casadi as ca
 from tank2sim.arrays import Array
 from tank2sim.cards.card import CraftCard
 from tank2sim.cards.form import ThrusterSection
+from tank2sim.cards.small_craft import CRAFT_TERMS
 from tank2sim.dynamics.autopilot import heading_error, heading_signals, limit, within
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
-from tank2sim.dynamics.small_craft import revolutions_for
+from tank2sim.dynamics.small_craft import craft_damping, revolutions_for, thrust_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,7 +104,8 @@ def craft_autopilot_model(card: CraftCard, gains: CraftGains, step_s: float) -> 
         "Yaw moment of the thrusters, positive to starboard",
         ca.fmax(low, ca.fmin(high, wanted_N.symbol)),
     )
-    resistance = -_resistance(card, ordered.symbol)
+    known = {name: ca.SX(card.derivatives.get(name, 0.0)) for name in CRAFT_TERMS}
+    resistance = -craft_damping(known, ordered.symbol, ca.SX(0), ca.SX(0))[0]
     wanted_X = _quantity(
         "autopilot.demanded_force",
         "N",
@@ -153,15 +155,13 @@ def craft_autopilot_model(card: CraftCard, gains: CraftGains, step_s: float) -> 
     )
 
 
-def thrust_limits(thruster: ThrusterSection, u: Any) -> tuple[float, Any]:
+def thrust_limits(thruster: ThrusterSection, u: Any) -> tuple[Any, Any]:
     """Least and largest thrust (N) of a fixed thruster at the surge velocity `u` (m/s)."""
-    n, back = thruster.max_radps, thruster.lowest_radps
-    return -thruster.astern_Ns2 * back**2, thruster.ahead_Ns2 * n**2 - thruster.speed_loss_kg * n * u
-
-
-def _resistance(card: CraftCard, u: ca.SX) -> ca.SX:
-    """X (N) of the hull at a steady surge velocity u (m/s)."""
-    return card.derivatives.get("Xu", 0.0) * u + card.derivatives.get("Xuabsu", 0.0) * u * ca.fabs(u)
+    ahead, astern, loss = map(ca.SX, (thruster.ahead_Ns2, thruster.astern_Ns2, thruster.speed_loss_kg))
+    least, most = (
+        thrust_of(ca.SX(n), ca.SX(u), ahead, astern, loss) for n in (thruster.lowest_radps, thruster.max_radps)
+    )
+    return least, most
 
 
 def _left(thrusters: Sequence[ThrusterSection], allocation: Array, X: ca.SX, N: ca.SX, u: ca.SX) -> ca.SX:

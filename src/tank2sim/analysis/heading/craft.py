@@ -174,7 +174,7 @@ def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> Craft
     a = SLOWNESS * w
     damping = -known.get("Nr", 0.0) - known.get("Nrabsu", 0.0) * speed_mps
     drag = -known.get("Xu", 0.0) - 2 * known.get("Xuabsu", 0.0) * speed_mps
-    most = float(gives[0] @ [thrust_limits(thruster, speed_mps)[1] for thruster in card.thrusters])
+    most = float(gives[0] @ [float(thrust_limits(thruster, speed_mps)[1]) for thruster in card.thrusters])
     Ku = max(0.0, min(most / speed_mps, 2 * surge * fastest - drag))
     return CraftGains(
         heading=yaw * (w**2 + 2 * DAMPING * w * a),
@@ -209,7 +209,7 @@ def _largest_moments(card: CraftCard, gives: Array, speed_mps: float) -> tuple[f
 
     The share of the surge force is that of the least squares of the thrusts, as the autopilot shares it out.
     """
-    bounds = [thrust_limits(thruster, speed_mps) for thruster in card.thrusters]
+    bounds = [tuple(map(float, thrust_limits(thruster, speed_mps))) for thruster in card.thrusters]
     if any(high <= 0 for _, high in bounds):
         problem = f"give no thrust ahead at {speed_mps:.4g} m/s"
         raise InputError(card.source, "thrusters", problem, "give a lower speed")
