@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.native.compiler import find_compiler
@@ -60,7 +62,88 @@ class AutopilotFmu:
         )
 
 
-class AutopilotResult(PagedResult):
+class ResultWithAutopilot(PagedResult):
+    """A result whose controller can be written as an FMU.
+
+    Parameters
+    ----------
+    ship : Ship
+        That it steers.
+    fmu : AutopilotFmu, optional
+        Of the controller, if one was made.
+    """
+
+    def __init__(self, ship: Ship, fmu: AutopilotFmu | None) -> None:
+        self.ship, self.fmu = ship, fmu
+        self.notices: tuple[str, ...] = () if find_compiler() else (NO_COMPILER,)
+
+    @property
+    def controller(self) -> tuple[Model, str]:
+        """The model of the controller, and how it was found."""
+        raise NotImplementedError
+
+    def make_fmu(
+        self,
+        path: str | Path,
+        *,
+        fmi: int = 3,
+        verify: bool = False,
+        report: Callable[[str], None] = lambda _: None,
+    ) -> Self:
+        """The result with the FMU of the controller, which is not written yet.
+
+        Parameters
+        ----------
+        path : path
+            Where it goes.
+        fmi : int
+            2 or 3.
+        verify : bool
+            Co-simulate it with the FMU of the ship, and compare with both in one model.
+        report : callable
+            Called with the stage that begins.
+
+        Raises
+        ------
+        InputError
+            No compiler is found.
+        """
+        from tank2sim.fmu.autopilot import make_autopilot_fmu, verify_together  # takes most of a second to import
+
+        autopilot, source = self.controller
+        made = make_autopilot_fmu(autopilot, source, fmi=fmi, report=report)
+        difference = None
+        if verify:
+            report("co-simulating ship and autopilot")
+            difference = verify_together(self.ship.model, autopilot, made)
+        found = copy(self)
+        found.fmu = AutopilotFmu(Path(path), made, difference)
+        return found
+
+    def to_fmu(self, path: str | Path, *, fmi: int = 3, verify: bool = False) -> Self:
+        """Write the FMU of the controller, and return the result with it.
+
+        Parameters
+        ----------
+        path, fmi, verify
+            As of :meth:`make_fmu`.
+
+        Raises
+        ------
+        InputError
+            No compiler is found, or the file cannot be written.
+        """
+        found = self.make_fmu(path, fmi=fmi, verify=verify)
+        write_together(found.files, inputs=[Path(self.ship.card.source)])
+        return found
+
+    @property
+    def files(self) -> dict[Path, str | bytes]:
+        """The FMU by its path, if one was made."""
+        return {self.fmu.path: self.fmu.exported.content} if self.fmu else {}
+
+
+class AutopilotResult(ResultWithAutopilot):
     """A heading controller of a ship: gains, margins at several speeds, course changes, weather, tracks.
 
     Parameters
@@ -75,8 +158,14 @@ class AutopilotResult(PagedResult):
     command = "autopilot"
 
     def __init__(self, ship: Ship, study: AutopilotStudy, fmu: AutopilotFmu | None = None) -> None:
-        self.ship, self.study, self.fmu = ship, study, fmu
-        self.notices = (*study.notices, *(() if find_compiler() else (NO_COMPILER,)))
+        super().__init__(ship, fmu)
+        self.study = study
+        self.notices = (*study.notices, *self.notices)
+
+    @property
+    def controller(self) -> tuple[Model, str]:
+        """As of every result with an FMU: the model of the controller, and how it was found."""
+        return self.study.design.autopilot, self.study.design.source
 
     @property
     def gains(self) -> dict[str, float]:
@@ -116,63 +205,6 @@ class AutopilotResult(PagedResult):
         import pandas as pd
 
         return {name: pd.DataFrame(trial_columns(run)) for name, run in self.study.runs.items()}
-
-    def make_fmu(
-        self,
-        path: str | Path,
-        *,
-        fmi: int = 3,
-        verify: bool = False,
-        report: Callable[[str], None] = lambda _: None,
-    ) -> AutopilotResult:
-        """The result with the FMU of the controller, which is not written yet.
-
-        Parameters
-        ----------
-        path : path
-            Where it goes.
-        fmi : int
-            2 or 3.
-        verify : bool
-            Co-simulate it with the FMU of the ship, and compare with both in one model.
-        report : callable
-            Called with the stage that begins.
-
-        Raises
-        ------
-        InputError
-            No compiler is found.
-        """
-        from tank2sim.fmu.autopilot import make_autopilot_fmu, verify_together  # takes most of a second to import
-
-        made = make_autopilot_fmu(self.study.design.autopilot, self.study.design.source, fmi=fmi, report=report)
-        difference = None
-        if verify:
-            report("co-simulating ship and autopilot")
-            difference = verify_together(self.ship.model, self.study.design.autopilot, made)
-        return AutopilotResult(self.ship, self.study, AutopilotFmu(Path(path), made, difference))
-
-    def to_fmu(self, path: str | Path, *, fmi: int = 3, verify: bool = False) -> AutopilotResult:
-        """Write the FMU of the controller, and return the result with it.
-
-        Parameters
-        ----------
-        path, fmi, verify
-            As of :meth:`make_fmu`.
-
-        Raises
-        ------
-        InputError
-            No compiler is found, or the file cannot be written.
-        """
-        found = self.make_fmu(path, fmi=fmi, verify=verify)
-        write_together(found.files, inputs=[Path(self.ship.card.source)])
-        return found
-
-    @property
-    def files(self) -> dict[Path, str | bytes]:
-        """The FMU by its path, if one was made."""
-        return {self.fmu.path: self.fmu.exported.content} if self.fmu else {}
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.heading.craft import CraftAutopilot, study_craft_autopilot
 from tank2sim.analysis.heading.study import check_course_change
-from tank2sim.api.autopilot import AutopilotFmu
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.autopilot import AutopilotFmu, ResultWithAutopilot
+from tank2sim.api.result import ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.files import write_together
-from tank2sim.native.compiler import find_compiler
-from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.simulation.trial_file import histories, trial_columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-class CraftAutopilotResult(PagedResult):
+class CraftAutopilotResult(ResultWithAutopilot):
     """The autopilot of a craft with fixed thrusters: gains, poles, a change of course and one of speed.
 
     Parameters
@@ -38,8 +35,13 @@ class CraftAutopilotResult(PagedResult):
     command = "autopilot"
 
     def __init__(self, ship: Ship, study: CraftAutopilot, fmu: AutopilotFmu | None = None) -> None:
-        self.ship, self.study, self.fmu = ship, study, fmu
-        self.notices = () if find_compiler() else (NO_COMPILER,)
+        super().__init__(ship, fmu)
+        self.study = study
+
+    @property
+    def controller(self) -> tuple[Model, str]:
+        """As of every result with an FMU: the model of the controller, and how it was found."""
+        return self.study.model, self.study.source
 
     @property
     def gains(self) -> dict[str, float]:
@@ -54,63 +56,6 @@ class CraftAutopilotResult(PagedResult):
         import pandas as pd
 
         return {name: pd.DataFrame(trial_columns(run)) for name, run in self.study.runs.items()}
-
-    def make_fmu(
-        self,
-        path: str | Path,
-        *,
-        fmi: int = 3,
-        verify: bool = False,
-        report: Callable[[str], None] = lambda _: None,
-    ) -> CraftAutopilotResult:
-        """The result with the FMU of the autopilot, which is not written yet.
-
-        Parameters
-        ----------
-        path : path
-            Where it goes.
-        fmi : int
-            2 or 3.
-        verify : bool
-            Co-simulate it with the FMU of the craft, and compare with both in one model.
-        report : callable
-            Called with the stage that begins.
-
-        Raises
-        ------
-        InputError
-            No compiler is found.
-        """
-        from tank2sim.fmu.autopilot import make_autopilot_fmu, verify_together  # takes most of a second to import
-
-        made = make_autopilot_fmu(self.study.model, self.study.source, fmi=fmi, report=report)
-        difference = None
-        if verify:
-            report("co-simulating craft and autopilot")
-            difference = verify_together(self.ship.model, self.study.model, made)
-        return CraftAutopilotResult(self.ship, self.study, AutopilotFmu(Path(path), made, difference))
-
-    def to_fmu(self, path: str | Path, *, fmi: int = 3, verify: bool = False) -> CraftAutopilotResult:
-        """Write the FMU of the autopilot, and return the result with it.
-
-        Parameters
-        ----------
-        path, fmi, verify
-            As of :meth:`make_fmu`.
-
-        Raises
-        ------
-        InputError
-            No compiler is found, or the file cannot be written.
-        """
-        found = self.make_fmu(path, fmi=fmi, verify=verify)
-        write_together(found.files, inputs=[Path(self.ship.card.source)])
-        return found
-
-    @property
-    def files(self) -> dict[Path, str | bytes]:
-        """The FMU by its path, if one was made."""
-        return {self.fmu.path: self.fmu.exported.content} if self.fmu else {}
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
