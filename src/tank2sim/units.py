@@ -63,6 +63,24 @@ def in_words(name: str) -> tuple[str, str]:
     return words.replace("_", " "), unit
 
 
+def rounded_down(value: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above a positive value, except for rounding.
+
+    Examples
+    --------
+    >>> rounded_down(0.043), rounded_up(0.043)
+    (0.02, 0.05)
+    """
+    decade = 10.0 ** math.floor(math.log10(value))
+    return float(max(digit * decade for digit in (1, 2, 5) if digit * decade <= value * (1 + 1e-9)))
+
+
+def rounded_up(value: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is not below a positive value, except for rounding."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return float(next(digit * decade for digit in (1, 2, 5, 10) if digit * decade >= value * (1 - 1e-9)))
+
+
 @dataclass(frozen=True)
 class Unit:
     """A unit as FMI describes it: exponents of the SI base units, and the units it may be shown in.

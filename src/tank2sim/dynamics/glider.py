@@ -23,6 +23,7 @@ from tank2sim.dynamics.glider_forces import (
     momentum,
 )
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+from tank2sim.units import rounded_down
 
 SMALL_INCIDENCE = math.radians(10.0)
 """The coefficients are fits at "small incidence" (paper, before (6)); that this ends at 10 deg is project choice."""
@@ -205,8 +206,7 @@ def _step(card: GliderCard) -> float:
         glider.roll_time_constant_s,
     )
     longest = _STEP_SHARE * min(incidence, *controls)
-    power = 10.0 ** math.floor(math.log10(longest))
-    return max(factor * power for factor in (1, 2, 5) if factor * power <= longest)
+    return rounded_down(longest)
 
 
 def _states(card: GliderCard, inputs: dict[str, Input], parameters: dict[str, Parameter]) -> tuple[State, ...]:

@@ -25,6 +25,7 @@ from tank2sim.dynamics.propulsion import propulsion, revolutions
 from tank2sim.dynamics.rigid_body import Inertia, inertia
 from tank2sim.dynamics.roll import roll_fault, roll_parameters, roll_terms, with_roll
 from tank2sim.dynamics.steering_gear import steering_gear
+from tank2sim.units import rounded_down
 
 OPPOSED = tuple(name for name, _ in OPPOSITE.values())
 """Derivatives that the MMG method writes with the other sign, under a name of their own."""
@@ -198,8 +199,7 @@ def _step(card: ManoeuvringCard) -> float:
     wanted = card.ship.length_m / card.model.speed_mps / _STEPS_PER_LENGTH
     if card.steering_gear and card.steering_gear.time_constant_s:
         wanted = min(wanted, card.steering_gear.time_constant_s / 5)
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return float(max(digit * decade for digit in (1, 2, 5) if digit * decade <= wanted * (1 + 1e-9)))
+    return rounded_down(wanted)
 
 
 def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:

@@ -51,6 +51,7 @@ from tank2sim.dynamics.rigid_body import (
     inertial_forces,
     rigid_body_accelerations,
 )
+from tank2sim.units import rounded_down
 
 _STEPS_PER_LENGTH = 200
 _STEPS_PER_LAG = 5
@@ -125,8 +126,7 @@ def _craft_step(card: CraftCard) -> float:
     lags += [thruster.azimuth_time_constant_s for thruster in card.thrusters]
     wanted = card.ship.length_m / card.model.speed_mps / _STEPS_PER_LENGTH
     wanted = min(wanted, *(lag / _STEPS_PER_LAG for lag in lags if lag), math.inf)
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return float(max(digit * decade for digit in (1, 2, 5) if digit * decade <= wanted * (1 + 1e-9)))
+    return rounded_down(wanted)
 
 
 def _refuse_mass(card: CraftCard) -> None:

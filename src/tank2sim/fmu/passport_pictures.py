@@ -13,6 +13,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.simulation.run import Run
+from tank2sim.units import rounded_up
 
 _POINTS = 300
 """Most points of a line: a picture is hardly wider in pixels (project choice)."""
@@ -139,9 +140,7 @@ def _range(values: Sequence[Array], least: tuple[float, float] | None) -> tuple[
 
 def _ticks(low: float, high: float) -> list[float]:
     """Round values from `low` to `high`, 1, 2 or 5 times a power of ten apart."""
-    raw = (high - low) / _PARTS
-    power = 10.0 ** math.floor(math.log10(raw))
-    step = next(each * power for each in (1, 2, 5, 10) if each * power >= raw * (1 - 1e-9))
+    step = rounded_up((high - low) / _PARTS)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [number * step for number in range(first, last + 1)]
 

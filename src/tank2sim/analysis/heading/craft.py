@@ -26,8 +26,8 @@ HALF_MOMENT_AT_RAD = math.radians(30.0)
 saturate the thrusters)."""
 
 LAG_SHARE = 0.25
-"""The loops are no faster than this over the longest lag of a thruster, so that it takes little of their phase: 14 deg
-(project choice)."""
+"""Largest frequency of the loops times the longest lag of a thruster: the lag then takes 14 deg of their phase (project
+choice)."""
 
 SLOWER_SHARE = 0.5
 """Share of the ordered speed from which a change of speed begins (project choice)."""
@@ -156,7 +156,7 @@ def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> Craft
     Yaw, I r' = d r + N with the added inertia in I and d = Nr + Nrabsu u: poles where (s^2 + 2 z w s + w^2)(s + a) = 0,
     z :data:`.DAMPING`, a :data:`.SLOWNESS` w; w^2 I is half of the largest moment over :data:`HALF_MOMENT_AT_RAD`.
     Surge, m u' = d u + X, d the slope of the resistance: two equal poles, Ku all of the surge force for an error of the
-    speed. Both are no faster than :data:`LAG_SHARE` over the longest lag of the thrusters.
+    speed. Both frequencies are at most :data:`LAG_SHARE` over the longest lag of the thrusters.
 
     Raises
     ------

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from tank2sim.report.autopilot.page import exported_section
@@ -11,6 +9,7 @@ from tank2sim.report.kit.analysis_charts import PolesZeros, pole_zero_chart
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+from tank2sim.units import to_si
 
 _HEADING = Signal(name="psi_deg", title="heading", unit="rad")
 _SPEED = Signal(name="u_mps", title="surge velocity", unit="m/s")
@@ -91,7 +90,9 @@ def _runs(found: Json) -> PageSection:
 
 def _history(name: str, columns: Json) -> History:
     values = {"psi_deg": np.radians(columns["psi_deg"]), "u_mps": np.array(columns["u_mps"])}
-    values |= {key: np.array(column) * math.pi / 30 for key, column in columns.items() if key.startswith("n_")}
+    values |= {
+        key: np.array(column) * to_si("n_rpm", 1.0)[1] for key, column in columns.items() if key.startswith("n_")
+    }
     return History(label=name, time_s=columns["t_s"], values=values)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark
 from tank2sim.records.thinning import thin_line
-from tank2sim.units import KNOT_MPS
+from tank2sim.units import KNOT_MPS, rounded_up
 
 _MARGIN_MM = 5.0
 _POINTS = 400
@@ -217,7 +217,7 @@ def _outline(frame: _Frame, length: float, beam: float) -> str:
 
 def _grid(frame: _Frame) -> tuple[tuple[Line, ...], tuple[Word, ...]]:
     """Lines at a round number of metres over the whole drawing, with their distances along two sides."""
-    step = _round_step(15.0 / frame.scale)
+    step = rounded_up(15.0 / frame.scale)
     lines, words = [], []
     middle = (frame.low[0] + frame.high[0]) / 2, (frame.low[1] + frame.high[1]) / 2
     reach = frame.width / 2 / frame.scale, frame.height / 2 / frame.scale
@@ -233,11 +233,6 @@ def _grid(frame: _Frame) -> tuple[tuple[Line, ...], tuple[Word, ...]]:
             words.append(Word(1.2, y - 0.8, f"{number * step:g}", "start", "grid-word"))
     words.append(Word(frame.width - 1.2, frame.height - 1.2, "m", "end", "grid-word"))
     return tuple(lines), tuple(words)
-
-
-def _round_step(wanted: float) -> float:
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return next(mantissa * decade for mantissa in (1, 2, 5, 10) if mantissa * decade >= wanted * (1 - 1e-9))
 
 
 def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) -> Drawing:

@@ -151,7 +151,7 @@ def _reading(result: Json) -> str:
     if kind == "spiral" and is_number_value(figures.get("loop_width_deg")):
         if figures["loop_width_deg"] > 0:
             return "Within the loop the ship turns to the side that it comes from: it is unstable on a straight course."
-        return "There is no loop: at each rudder angle the ship has one steady turn."
+        return "The curve has no loop: at each rudder angle the ship has one steady turn."
     if kind == "pullout" and result.get("other_side"):
         return (
             "On a ship that is stable on a straight course the yaw rates from both sides decay to one value, which is "

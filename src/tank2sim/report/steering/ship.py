@@ -16,7 +16,7 @@ from tank2sim.fmu.interface import Interface, interface
 from tank2sim.fmu.sources import c_sources
 from tank2sim.native.cross import CompileTarget, cross_compiled, require_cross_compiler
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
-from tank2sim.units import UNITS
+from tank2sim.units import UNITS, from_si
 
 TOKEN = "page"
 """Instantiation token: the page holds one model, and none is mistaken for another."""
@@ -87,7 +87,7 @@ class TelegraphOrder:
     @property
     def rpm(self) -> float:
         """Revolutions, rpm."""
-        return self.value * 30 / math.pi
+        return from_si("n_rpm", self.value)
 
 
 def telegraph_of(model: Model) -> list[TelegraphOrder]:
