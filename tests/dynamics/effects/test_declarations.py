@@ -33,6 +33,8 @@ OTHER_MEANINGS = {
     '"current": None if': "key of the JSON of a log: the current found in it",
     '"wind" if true else': "part of the name of a quantity of a log",
     'quantity.startswith("wind")': "the same",
+    '"bank": "Polygon"': "kind of a feature of a scenario",
+    '"bank": {}': "the same",
 }
 """Lines, by a part of them, in which the name of an effect is another word, and what it is there."""
 
