@@ -21,8 +21,10 @@ def turn() -> t2s.ManoeuvreResult:
 def test_a_result_its_values_and_its_file_give_one_page(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:
     turn.to_json(tmp_path / "turn.json")
     reports = [t2s.make_report(given) for given in (turn, turn.to_dict(), tmp_path / "turn.json")]
-    assert {found.title for found in reports} == {"Simulated manoeuvre: Mariner class"}
-    assert {tuple(found.charts()) for found in reports} == {("Track: turn:35", "Histories: turn:35")}
+    assert {found.title for found in reports} == {"Mariner class: turning circle, 35° of rudder to starboard"}
+    assert {tuple(found.charts()) for found in reports} == {
+        ("Turning circle, 35° of rudder to starboard", "Time histories")
+    }
     assert all(found.to_dict() == turn.to_dict() for found in reports)
     t2s.make_report(tmp_path / "turn.json", tmp_path / "turn.html")
     assert (tmp_path / "turn.html").read_text(encoding="utf-8").startswith("<!doctype html>")

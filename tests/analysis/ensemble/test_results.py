@@ -113,6 +113,9 @@ def test_a_covariance_goes_into_a_file_of_other_conventions_and_back(tmp_path, m
     draws, _ = draws_of(own, 0)
     rows = [draws.names.index(name) for name in names]
     np.testing.assert_allclose((draws.root @ draws.root.T)[np.ix_(rows, rows)], matrix, rtol=1e-9, atol=1e-20)
+    # The root that is symmetric in units of the errors is unique: members depend on no sign of an eigenvector.
+    of_correlations = draws.root / np.sqrt(np.diag(draws.root @ draws.root.T))[:, None]
+    np.testing.assert_allclose(of_correlations, of_correlations.T, atol=1e-12)
 
 
 def test_members_take_their_numbers_together_from_the_samples_of_a_card(tmp_path, mariner_card) -> None:

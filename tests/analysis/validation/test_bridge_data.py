@@ -121,9 +121,9 @@ def test_absurd_revolutions_are_refused() -> None:
 
 
 def test_squat_is_the_larger_of_two_formulas_worked_by_hand(card) -> None:
-    """Mariner, C_B 0.6, 160.93 x 23.17 x 7.468 m: at half of 7.7175 m/s, 20 % of the draught under the keel."""
+    """Mariner, C_B 0.6, 160.93 x 23.17 x 7.468 m: at 75 % of 7.7175 m/s, 20 % of the draught under the keel."""
     first = bridge_of(card).squat[0]
-    speed, depth = 7.7175 / 2, 1.2 * 7.468
+    speed, depth = 0.75 * 7.7175, 1.2 * 7.468
     barrass = 0.6 * (speed / 0.514444) ** 2 / 100
     froude = speed / math.sqrt(9.80665 * depth)
     icorels = 2.4 * 0.6 * 160.93 * 23.17 * 7.468 / 160.93**2 * froude**2 / math.sqrt(1 - froude**2)

@@ -92,7 +92,8 @@ def test_residuals_that_hold_together_widen_the_samples() -> None:
     """Gusts for minutes: the noise model calls them noise of every second, the blocks of time do not."""
     posed, estimate = fitted(force=gusts(201, 0.5, (2e-5, 1e-4, 2e-5), 20.0, seed=3), noise=0.2)
     narrow, wide = (sample_posterior(posed, estimate, draws=60, robust=robust) for robust in (False, True))
-    assert np.all(np.diag(wide.covariance) > 0.8 * np.diag(narrow.covariance))
+    wider = np.diag(wide.covariance) / np.diag(narrow.covariance)
+    assert wider.min() > 0.5 and np.median(wider) > 1.5  # of so few draws, a variance is off by a quarter
     assert np.linalg.det(wide.covariance) > 10 * np.linalg.det(narrow.covariance)
 
 

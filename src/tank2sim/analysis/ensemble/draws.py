@@ -68,8 +68,11 @@ def by_file_name(
 
 
 def _root(covariance: Array) -> Array:
-    """A root of a covariance (k, k), by the eigenvectors of its correlations: numbers differ by orders of magnitude."""
+    """The symmetric root of the correlations times the errors (k, k): numbers differ by orders of magnitude.
+
+    It is unique. Eigenvectors alone have no sign: they, and the members with them, would depend on the processor.
+    """
     errors = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(errors, errors))
-    root: Array = errors[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    root: Array = errors[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
     return np.ascontiguousarray(root)

@@ -34,9 +34,9 @@ DEEP = 20.0
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 """Revolutions over nominal ones of the reported speeds without given telegraph orders: project choice."""
 
-UNDER_KEEL, SQUAT_SPEEDS = (0.2, 0.5), (0.5, 0.75)
-"""Water under the keel over the draught, and speeds over that of the card, of the table of squat: project choice, about
-what a channel has, and speeds that a ship makes in one."""
+UNDER_KEEL, SQUAT_SPEED = (0.2, 0.5), 0.75
+"""Water under the keel over the draught, and speed over that of the card, of the table of squat: project choice, about
+what a channel has, and a speed that a ship makes in one; more rows leave no room on the poster."""
 
 ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
 """Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
@@ -187,7 +187,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
 
 
 def squat_of(card: ManoeuvringCard) -> tuple[Squat, ...]:
-    """Return the larger squat by Barrass and ICORELS at shares of the speed and of the draught under the keel.
+    """Return the larger squat by Barrass and ICORELS at a share of the speed, with shares of the draught below.
 
     Speeds of a depth Froude number above 0.7, for which the formulas are not made, are left out.
     """
@@ -195,15 +195,14 @@ def squat_of(card: ManoeuvringCard) -> tuple[Squat, ...]:
     if ship.draught_m is None or ship.beam_m is None or ship.block_coefficient is None:
         return ()
     volume = ship.block_coefficient * ship.length_m * ship.beam_m * ship.draught_m
+    speed = SQUAT_SPEED * card.model.speed_mps
     found = []
     for under_keel in UNDER_KEEL:
         clearance = under_keel * ship.draught_m
-        for share in SQUAT_SPEEDS:
-            speed = share * card.model.speed_mps
-            square = speed**2 / (gravity * (ship.draught_m + clearance))
-            if square <= LARGEST_DEPTH_FROUDE**2:
-                sizes = barrass_squat(ship.block_coefficient, speed), icorels_squat(volume, ship.length_m, square)
-                found.append(Squat(clearance, speed, max(sizes)))
+        square = speed**2 / (gravity * (ship.draught_m + clearance))
+        if square <= LARGEST_DEPTH_FROUDE**2:
+            sizes = barrass_squat(ship.block_coefficient, speed), icorels_squat(volume, ship.length_m, square)
+            found.append(Squat(clearance, speed, max(sizes)))
     return tuple(found)
 
 

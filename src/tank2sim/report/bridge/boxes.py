@@ -272,7 +272,7 @@ def squat(bridge: Bridge) -> Box:
         Row("", (_number(row.clearance_m, "m", 3), knots(row.speed_mps), _number(row.squat_m, "m", 2)))
         for row in bridge.squat
     )
-    note = "Larger of Barrass (2004) and ICORELS (1980), open shallow water: an estimate." if rows else ""
+    note = "Larger of Barrass and ICORELS." if rows else ""
     return Box("Draught increase by squat, estimated", rows or (Row("", (None,) * 3),) * 2, heads, note)
 
 
