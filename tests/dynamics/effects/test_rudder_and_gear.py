@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -139,33 +141,61 @@ def test_the_rudders_share_of_the_force_is_what_the_forces_hold() -> None:
         np.testing.assert_array_equal(midships[:3], 0.0)
 
 
-def slipstream(at: dict[str, float], loading: float, straightening: float, lever: float) -> np.ndarray:
-    """X, Y, N of the rudder in the slipstream, with the Mariner's Yd, Nd, Xdd (rudder to starboard) and revolutions."""
+def foil(at: dict[str, float], loading: float, straightening: float, lever: float) -> np.ndarray:
+    """X, Y, N of the rudder as a foil in the slipstream, with the Mariner's Yd, Nd, Xdd (rudder to starboard) and
+    revolutions; N and Y also hold the force amidships at the nominal loading."""
     u, v, r, delta = (at[name] for name in ("motion.u", "motion.v", "motion.r", "rudder.angle"))
     speed = np.hypot(u, v)
     inflow = speed + loading * (U0 * at.get("propeller.speed", N0) / N0 - speed)
-    across = straightening * (v + lever * L * r)
-    lift = inflow**2 * np.sin(delta + np.arctan(across / inflow))
-    side = lift * np.cos(delta) - across * speed
-    scale = 0.5 * RHO * L**2
-    drag = -95e-5 * lift * np.sin(delta)
-    return scale * np.array([drag, -278e-5 * side, L * 139e-5 * side])
+    lift = inflow**2 * np.sin(delta + np.arctan(straightening * (v + lever * L * r) / inflow))
+    side = lift * np.cos(delta)
+    return 0.5 * RHO * L**2 * np.array([-95e-5 * lift * np.sin(delta), -278e-5 * side, L * 139e-5 * side])
+
+
+def amidships(at: dict[str, float], straightening: float, lever: float) -> np.ndarray:
+    """To first order the foil's force at delta = 0 and the nominal loading."""
+    u, v, r = (at[name] for name in ("motion.u", "motion.v", "motion.r"))
+    side = straightening * (v + lever * L * r) * np.hypot(u, v)
+    return 0.5 * RHO * L**2 * np.array([0.0, -278e-5 * side, L * 139e-5 * side])
+
+
+LINEAR = "\n".join(
+    line for line in mariner_text().splitlines() if not re.match(r"[YN](?=\w*d)(?!dot|vdot|rdot|d )\w+ =", line)
+)
+"""The Mariner with no rudder terms above first order in Y and N."""
+
+LOADED = [(0.0, 0.0, 0.0), (0.6, 0.5, -0.8), (1.1, 0.2, -2.0)]
 
 
 @pytest.mark.parametrize("at", STATES)
-@pytest.mark.parametrize(("loading", "straightening", "lever"), [(0.0, 0.0, 0.0), (0.6, 0.5, -0.8), (1.1, 0.2, -2.0)])
-def test_the_loaded_rudder_is_a_foil_in_the_propellers_jet(at, loading, straightening, lever) -> None:
-    model = ship({"loaded_rudder": {"loading": loading, "straightening": straightening, "lever": lever}})
+@pytest.mark.parametrize(("loading", "straightening", "lever"), LOADED)
+def test_the_loaded_rudder_of_a_linear_rudder_is_a_foil_in_the_propellers_jet(
+    at, loading, straightening, lever
+) -> None:
+    model = ship({"loaded_rudder": {"loading": loading, "straightening": straightening, "lever": lever}}, LINEAR)
     found = values(model, ["rudder.X", "rudder.Y", "rudder.N"], at)
-    np.testing.assert_allclose(found, slipstream(at, loading, straightening, lever), rtol=1e-9)
+    expected = foil(at, loading, straightening, lever) - amidships(at, straightening, lever)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("at", STATES)
+@pytest.mark.parametrize(("loading", "straightening", "lever"), LOADED)
+def test_the_loaded_rudder_adds_to_a_measured_polynomial_what_the_loading_changes(
+    at, loading, straightening, lever
+) -> None:
+    rudder = ["rudder.X", "rudder.Y", "rudder.N"]
+    model = ship({"loaded_rudder": {"loading": loading, "straightening": straightening, "lever": lever}})
+    change = foil(at, loading, straightening, lever) - foil(at, 0.0, straightening, lever)
+    np.testing.assert_allclose(values(model, rudder, at), values(ship(), rudder, at) + change, rtol=1e-9)
 
 
 def test_the_loaded_rudder_leaves_the_linear_derivatives_of_the_hull_as_measured() -> None:
-    model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8}})
-    amidships = {"motion.u": U0, "motion.v": 1e-4, "motion.r": 1e-6, "rudder.angle": 0.0}
-    side = values(model, ["rudder.Y", "rudder.N"], amidships)
-    hard = values(model, ["rudder.Y", "rudder.N"], {**amidships, "rudder.angle": 0.3})
-    assert np.all(np.abs(side) < 1e-4 * np.abs(hard))
+    for card in (LINEAR, None):
+        model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8}}, card)
+        straight = {"motion.u": U0, "motion.v": 1e-4, "motion.r": 1e-6, "rudder.angle": 0.0}
+        side = values(model, ["rudder.Y", "rudder.N"], straight)
+        hard = values(model, ["rudder.Y", "rudder.N"], {**straight, "rudder.angle": 0.3})
+        assert np.all(np.abs(side) < 1e-4 * np.abs(hard))
 
 
 def test_the_loaded_rudder_stays_finite_at_rest_and_astern() -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales
 from tank2sim.dynamics.model import Model
@@ -13,17 +15,23 @@ LEAST_INFLOW = 0.05
 """The flow over the rudder is never slower than this share of u0: the formula does not hold for a propeller that turns
 astern, and must not divide by zero there (project choice)."""
 
+_HIGHER_ORDER = frozenset(name for name in ALL_TERMS if name[0] in "YN" and known_term(name).d) - {"Yd", "Nd"}
+"""Rudder terms of the polynomial of Y and N above first order."""
+
 
 def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """Rudder forces by angle of attack and inflow speed, in place of all terms of the polynomial that hold the rudder.
+    """Rudder forces by angle of attack and inflow speed.
 
     w = U + k (u0 n/n0 - U) is the inflow speed over its share at u0 and n0; alpha = delta + atan(gamma (v + l L r)/w);
+    the foil's forces are
 
-    Y = 1/2 rho L^2 (w^2 sin(alpha) cos(delta) - gamma (v + l L r) U) Y_d, N likewise with N_d and L,
+    Y = 1/2 rho L^2 w^2 sin(alpha) cos(delta) Y_d, N likewise with N_d and L,
     X = 1/2 rho L^2 w^2 sin(alpha) sin(delta) X_dd.
 
-    What is subtracted is the force at delta = 0 with the propeller at its nominal loading, to first order: that is part
-    of the card's Yv, Nv, Yr, Nr, which were measured with the rudder amidships. After the rudder of the MMG model:
+    Where the card has rudder terms above first order in Y or N, they hold what was measured at the nominal loading, and
+    the foil's forces less those at that loading (w = U) are added to them. Where it has none, the foil replaces the
+    polynomial's rudder, less 1/2 rho L^2 gamma (v + l L r) U Y_d (N likewise): to first order the force at delta = 0 at
+    the nominal loading, which is part of the card's Yv, Nv, Yr, Nr. After the rudder of the MMG model:
     Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52, with its slipstream linear in the loading.
     """
     v, r, delta = (model.symbol(name) for name in ("motion.v", "motion.r", "rudder.effective"))
@@ -34,16 +42,19 @@ def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringC
         driven = u0 * model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
     inflow = ca.fmax(speed + given["loading"] * (driven - speed), LEAST_INFLOW * u0)
     across = given["straightening"] * (v + given["lever"] * length * r)
-    attack = delta + ca.atan2(across, inflow)
     force = scales(model, ca.SX(1)).force
-    lift = inflow**2 * ca.sin(attack)
-    side = lift * ca.cos(delta) - across * speed
+    lift = inflow**2 * ca.sin(delta + ca.atan2(across, inflow))
     slope = {name: model.symbol(f"derivatives.{name}") for name in ("Yd", "Nd")}
     drag = model.symbol("derivatives.Xdd") if "derivatives.Xdd" in model else ca.SX(0)
+    if _HIGHER_ORDER & card.derivatives.keys():
+        kept, of_nominal_loading = 1, speed**2 * ca.sin(delta + ca.atan2(across, speed))
+        along, side = (lift - of_nominal_loading) * ca.sin(delta), (lift - of_nominal_loading) * ca.cos(delta)
+    else:
+        kept, along, side = 0, lift * ca.sin(delta), lift * ca.cos(delta) - across * speed
     return (
-        model.redefine("rudder.X", lambda _: force * lift * ca.sin(delta) * drag)
-        .redefine("rudder.Y", lambda _: force * side * slope["Yd"])
-        .redefine("rudder.N", lambda _: force * length * side * slope["Nd"])
+        model.redefine("rudder.X", lambda given: kept * given + force * along * drag)
+        .redefine("rudder.Y", lambda given: kept * given + force * side * slope["Yd"])
+        .redefine("rudder.N", lambda given: kept * given + force * length * side * slope["Nd"])
     )
 
 
