@@ -263,7 +263,7 @@ class _Trial:
 
     def begin(self, parts: Array, p: Array) -> None:
         """Find the initial state again, in these surroundings."""
-        self._state = self.replayer.fit_initial_state(self._record(parts), self._sigma, p)
+        self._state = self.replayer.fit_initial_state(self._record(parts), self._sigma, p, self._state)
 
     def parts(self, p: Array) -> Array:
         """The parts that fit the compared readings best, from a search over directions and speeds: first over the

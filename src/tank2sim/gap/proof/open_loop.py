@@ -19,7 +19,7 @@ from tank2sim.identification.trials.problem.problem_from_card import driven_mode
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS, prepare
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.rows import Chain, RowFunction
-from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.scheme import step_and_constants
 
 INSTANTS = 40
 """Instants in L/u0 at which simulated and measured are compared (project choice: the fastest motion lasts a tenth of
@@ -100,9 +100,8 @@ _UNSURE_FROM = 0.01
 """Interval between two readings of the order, in L/u0, from which the instants of its steps are estimated (project
 choice: a shorter one moves a ship by less than its sensors show)."""
 
-_FINE = 0.003
-"""Integration step in L/u0, at most, where instants of orders are estimated: an order is given at one of them, for a
-gear at its largest rate takes no notice of the mean of two orders (project choice)."""
+_REACH = 0.02
+"""Change of the instant of an order, as a share of the interval in which it was given, for the derivative in it."""
 
 _STEP_OF_ORDER = math.radians(1.0)
 """Smallest step of an order whose instant is estimated (project choice: the smallest of a helmsman)."""
@@ -144,7 +143,8 @@ class Replayer:
     def __init__(self, card: ManoeuvringCard, driven_by: str, seen: Sequence[str]):
         self.card, self.seen = card, tuple(seen)
         self.model = driven_model(card, driven_by)
-        self._steps = Chain(runge_kutta_step(self.model))
+        step, constants = step_and_constants(self.model)
+        self._steps, self._constants = Chain(step), RowFunction(constants)
         self._shown = shown_by(self.model, seen)
         ordered = driven_by == "order" and _ORDER in self.model.input_names
         self._order = self.model.input_names.index(_ORDER) if ordered else None
@@ -153,20 +153,34 @@ class Replayer:
 
     def states(self, record: InputRecord, start: Array, p: Array) -> Array:
         """States (n, nx) at the instants of a record's inputs; nan once out of bounds."""
-        parts = self._parts(record)
-        fine = np.repeat(record.inputs[:-1], parts, axis=0)
-        if self._order is not None:  # given, on average, half an interval before the first reading that shows it
-            order = record.inputs[:, self._order]
-            if record.instants is None:
-                fine[:, self._order] = np.repeat(order, parts)[parts // 2 :][: len(fine)]
-            else:
-                fine[:, self._order] = _orders_in_steps(order, record.instants, parts)
+        lengths, inputs, places = self._integration_steps(record)
+        (constants,) = self._constants(p[None])
         with np.errstate(all="ignore"):
-            states = self._steps.run(start, fine, p, np.array([record.step_s / parts]))[::parts]
+            states = self._steps.run(start, inputs, p, constants[0], lengths[:, None])[places]
             lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)
         if lost.any():
             states[int(np.argmax(lost)) :] = np.nan
         return states
+
+    def _integration_steps(self, record: InputRecord) -> tuple[Array, Array, NDArray[np.intp]]:
+        """Lengths (k,), s, and inputs (k, nu) of the integration steps, and the places (n,) of the record's rows.
+
+        An order is given, on average, half an interval before the first reading that shows it. Where it matters, a step
+        ends where one is given: a gear at its largest rate takes no notice of the mean of two orders.
+        """
+        parts, count = parts_of(self.model, record.step_s), len(record.inputs) - 1
+        if self._order is None or not self._coarse(record):
+            inputs = np.repeat(record.inputs[:-1], parts, axis=0)
+            if self._order is not None:
+                inputs[:, self._order] = np.repeat(record.inputs[:, self._order], parts)[parts // 2 :][: len(inputs)]
+            return np.full(len(inputs), record.step_s / parts), inputs, np.arange(count + 1) * parts
+        order = record.inputs[:, self._order]
+        shares = np.full(count, record.middle) if record.instants is None else record.instants[1:]
+        given = np.maximum.accumulate(np.clip(np.arange(count) + shares, 0, count))
+        edges = np.sort(np.append(np.arange(count * parts + 1) / parts, given[np.diff(order) != 0]))
+        inputs = record.inputs[np.minimum(edges[:-1].astype(np.intp), count - 1)]
+        inputs[:, self._order] = order[np.searchsorted(given, edges[:-1], side="right")]
+        return np.diff(edges) * record.step_s, inputs, np.searchsorted(edges, np.arange(count + 1))
 
     def motion(self, record: InputRecord, start: Array, p: Array) -> Array:
         """Readings of the sensors (m, ny) at the compared instants of a record."""
@@ -212,13 +226,6 @@ class Replayer:
         """Whether it matters when an order between two readings was given."""
         return record.step_s > _UNSURE_FROM * self._passage_s
 
-    def _parts(self, record: InputRecord) -> int:
-        """Integration steps in a step of a record's inputs."""
-        parts = parts_of(self.model, record.step_s)
-        if self._order is None or not self._coarse(record):
-            return parts
-        return max(parts, math.ceil(record.step_s / (_FINE * self._passage_s)))
-
     def _unsure_steps(self, record: InputRecord) -> NDArray[np.intp]:
         """Rows (m,) at which a step of the order is seen first that was given at an unknown instant before."""
         none: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
@@ -241,7 +248,7 @@ class Replayer:
         guess, spread = _first_state(self, record, sigma, p)
         known, size = ~np.isnan(record.readings), len(start)
         unknown = np.append(guess, np.full(len(rows), middle))
-        reach = np.append(1e-4 * self._nominal, np.full(len(rows), 2.0 / self._parts(record)))
+        reach = np.append(1e-4 * self._nominal, np.full(len(rows), _REACH))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
             last = int(rows[count]) if count < len(rows) else len(record.inputs)
@@ -328,16 +335,16 @@ class Replayer:
         instants[rows] = shares
         return replace(record, instants=instants)
 
-    def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
+    def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None) -> Array:
         """Initial state (nx,) that fits a record best, kept near the state of its first seconds.
 
-        `sigma` (ny,) is the noise of the signals. If with the least squares in noise units the model follows the record
+        `sigma` (ny,) is the noise of the signals; the search begins at `near` (nx,), if given. If with the least squares in noise units the model follows the record
         to within :data:`_NEAR`, the least squares hold. Else the model is wrong, and its heading and
         speed would be biased to correct its track: then a signal weighs less by the size of its own residual beyond the
         noise (the likelihood of a deviation that is not known), of which only one value in L/u0 counts as independent.
         """
-        start, misfit = self._least_squares_start(record, sigma, p, wrong=False)
-        return start if misfit < _NEAR else self._least_squares_start(record, sigma, p, wrong=True)[0]
+        start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
+        return start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
 
     def guess_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
         """Initial state (nx,) from the first seconds, with the rudder that fits the record better."""
@@ -360,7 +367,9 @@ class Replayer:
         amidships[place] = 0.0
         return [guess, amidships]
 
-    def _least_squares_start(self, record: InputRecord, sigma: Array, p: Array, *, wrong: bool) -> tuple[Array, float]:
+    def _least_squares_start(
+        self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None, *, wrong: bool
+    ) -> tuple[Array, float]:
         """Initial state by Gauss-Newton, and its misfit: inf where the motion exceeds all bounds.
 
         Derivatives are differences: an effect need not be smooth.
@@ -373,7 +382,8 @@ class Replayer:
         def residuals(start: Array) -> Array:
             return (self.motion(record, start, p) - record.readings)[known]
 
-        start, residual, before, slopes = guess, residuals(guess), np.zeros(0), np.zeros(0)
+        start = guess if near is None else near
+        residual, before, slopes = residuals(start), np.zeros(0), np.zeros(0)
         for turn in range(_ROUNDS):
             size = np.sqrt(np.bincount(column, residual**2, len(sigma)) / number)
             beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
@@ -414,15 +424,6 @@ def _from(record: InputRecord, row: int) -> InputRecord:
         readings=record.readings[row // record.every :],
         instants=record.instants[row:],
     )
-
-
-def _orders_in_steps(order: Array, instants: Array, parts: int) -> Array:
-    """The order in each of `parts` steps of every interval, (n - 1) * parts: each value of `order` (n,) holds from the
-    step next to the share `instants` (n,) of the interval before its reading on."""
-    given = np.floor((np.arange(1, len(order)) - 1 + instants[1:]) * parts + 0.5).astype(np.intp)
-    given = np.maximum.accumulate(np.clip(given, 0, len(order) * parts))
-    edges = np.concatenate([[0], given, [len(order) * parts]])
-    return np.repeat(order, np.diff(edges))[: (len(order) - 1) * parts]
 
 
 def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:
