@@ -19,7 +19,7 @@ from tank2sim.dynamics.effects import EFFECTS, EffectParameter
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
-from tank2sim.simulation.rows import Chain
+from tank2sim.simulation.rows import ArrayFunction, Chain
 
 CLOCK = "rudder.clock"
 """Parameter of the slopes: delay of the ship's response behind the rudder's record, s."""
@@ -298,15 +298,13 @@ class Hypothesis:
         if not self.unmeasured:
             return np.zeros((*motion.states.shape[:2], 0))
         inputs, p = self.inputs(motion, theta), self.parameters(theta) if p is None else p
-        x = motion.states
-        tracks = []
-        for run in range(len(x)):
-            first = inputs[run, 0].copy()
-            if motion.at_execute[run]:
-                first[self.model.input_names.index("rudder.command")] = 0.0
-            start = self._steady_states(x[run, 0], first, p)
-            tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
-        unmeasured = np.array(tracks)
+        x, first, chain = motion.states, inputs[:, 0].copy(), self._chain(motion.step_s)
+        if motion.at_execute.any():
+            first[motion.at_execute, self._command] = 0.0
+        starts = self._steady_states(x[:, 0], first, p)
+        unmeasured = np.array(
+            [chain.run(starts[run], x[run, :-1], x[run, 1:], inputs[run], p) for run in range(len(x))]
+        )
         delays = {"rudder.command": 0.0} | self._delays(theta)
         for name, delay in delays.items():
             # An order was given, on average, half a sampling interval before the first reading that shows it.
@@ -411,16 +409,16 @@ class Hypothesis:
     def _known_rates(self) -> ca.SX:
         return self._of(MEASURED_STATES)
 
-    def _function(self, name: str, expression: ca.SX) -> ca.Function:
+    def _function(self, name: str, expression: ca.SX) -> ArrayFunction:
         """A matrix, column by column, as a function of measured and unmeasured states, inputs and parameters."""
-        return ca.Function(name, [*self._symbols], [ca.densify(ca.vec(expression))], {"cse": True})
+        return ArrayFunction(ca.Function(name, [*self._symbols], [ca.densify(ca.vec(expression))], {"cse": True}))
 
     @cached_property
-    def _rates(self) -> ca.Function:
+    def _rates(self) -> ArrayFunction:
         return self._function("rates", self._known_rates)
 
     @cached_property
-    def _state_slopes(self) -> ca.Function:
+    def _state_slopes(self) -> ArrayFunction:
         return self._function("state_slopes", ca.jacobian(self._known_rates, self._symbols[0]))
 
     def _shown(self, seen: Sequence[str]) -> ca.SX:
@@ -474,24 +472,27 @@ class Hypothesis:
         )
 
     def _steady_states(self, x: Array, u: Array, p: Array) -> Array:
-        """Steady unmeasured states for a constant motion: their trims where these are known."""
+        """Steady unmeasured states (R, no) of constant motions (R, 6) and inputs: trims where these are known."""
         states = {state.name: state for state in self.model.states}
-        xi = np.array(self._begin(np.zeros(len(self.unmeasured)), x, u, p)).ravel()
+
+        def trimmed(xi: Array) -> Array:
+            return np.array(self._begin(xi.T, x.T, u.T, p)).T
+
+        xi = trimmed(np.zeros((len(x), len(self.unmeasured))))
         moving = np.array([states[name].trim is None and states[name].steady for name in self.unmeasured])
         for _ in range(NEWTON_STEPS if moving.any() else 0):
-            rate, slope = (np.array(value) for value in self._newton(xi, x, u, p))
-            part = np.ix_(moving, moving)
-            xi[moving] -= np.linalg.lstsq(slope[part], rate[moving, 0], rcond=None)[0]
-            xi = np.where(moving, xi, np.array(self._begin(xi, x, u, p)).ravel())
+            rates, slopes = (np.array(value) for value in self._newton(xi.T, x.T, u.T, p))
+            by_run = slopes.reshape(len(moving), len(x), len(moving)).swapaxes(0, 1)[:, moving][:, :, moving]
+            xi[:, moving] -= (np.linalg.pinv(by_run) @ rates.T[:, moving, None])[..., 0]
+            xi = np.where(moving, xi, trimmed(xi))
         return xi
 
 
-def _rowwise(function: ca.Function, *arguments: Array) -> Array:
+def _rowwise(function: ArrayFunction, *arguments: Array) -> Array:
     """A function over arrays (R, n, k), the last argument (k,) held: (R, n, results)."""
     shape = arguments[0].shape[:2]
-    columns = [argument.reshape(shape[0] * shape[1], -1).T for argument in arguments[:-1]]
-    result = np.array(function(*columns, arguments[-1])).T
-    return result.reshape(*shape, -1)
+    rows = [argument.reshape(shape[0] * shape[1], -1) for argument in arguments[:-1]]
+    return function(*rows, arguments[-1])[0].reshape(*shape, -1)
 
 
 def _matrices(values: Array, columns: int) -> Array:

@@ -338,10 +338,11 @@ class Replayer:
     def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None) -> Array:
         """Initial state (nx,) that fits a record best, kept near the state of its first seconds.
 
-        `sigma` (ny,) is the noise of the signals; the search begins at `near` (nx,), if given. If with the least squares in noise units the model follows the record
-        to within :data:`_NEAR`, the least squares hold. Else the model is wrong, and its heading and
-        speed would be biased to correct its track: then a signal weighs less by the size of its own residual beyond the
-        noise (the likelihood of a deviation that is not known), of which only one value in L/u0 counts as independent.
+        `sigma` (ny,) is the noise of the signals; the search begins at `near` (nx,), if given. If with the least
+        squares in noise units the model follows the record to within :data:`_NEAR`, the least squares hold. Else the
+        model is wrong, and its heading and speed would be biased to correct its track: then a signal weighs less by the
+        size of its own residual beyond the noise (the likelihood of a deviation that is not known), of which only one
+        value in L/u0 counts as independent.
         """
         start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
         return start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
