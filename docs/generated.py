@@ -43,6 +43,7 @@ logger = logging.getLogger(__name__)
 FAMILIES = {
     "surroundings": "Surroundings",
     "fields": "Surroundings",
+    "waves": "Surroundings",
     "banks": "Surroundings",
     "depth": "Surroundings",
     "propeller": "Propeller and engine",

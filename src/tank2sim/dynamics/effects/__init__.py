@@ -14,6 +14,7 @@ from tank2sim.dynamics.effects import (
     rudder,
     sensors,
     surroundings,
+    waves,
 )
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, sensor_fault_of
 from tank2sim.dynamics.model import Model
@@ -27,6 +28,7 @@ EFFECTS: Registry[Effect] = Registry(
         fields.CURRENT_FIELD,
         fields.WIND_FIELD,
         surroundings.WAVE_DRIFT,
+        waves.WAVES,
         surroundings.BANK_SUCTION,
         banks.BANK,
         propeller.PROPELLER_SIDE_FORCE,
