@@ -187,9 +187,7 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     return sea.redefine("validity", lambda validity: validity * factor.symbol)
 
 
-_SIGNS = dict(
-    zip(WAVE_MOTIONS, ("forward", "to starboard", "down", "to starboard", "bow up", "to starboard"), strict=True)
-)
+_SENSES = ("forward", "to starboard", "down", "to starboard", "bow up", "to starboard")
 
 
 def _shown(name: str, value: ca.SX) -> Quantity:
