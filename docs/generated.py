@@ -47,6 +47,7 @@ FAMILIES = {
     "banks": "Surroundings",
     "depth": "Surroundings",
     "propeller": "Propeller and engine",
+    "twin_screws": "Propeller and engine",
     "harbour": "Thrusters and tugs",
     "rudder": "Rudder",
     "loaded_rudder": "Rudder",

@@ -14,6 +14,7 @@ from tank2sim.dynamics.effects import (
     rudder,
     sensors,
     surroundings,
+    twin_screws,
     waves,
 )
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, sensor_fault_of
@@ -38,6 +39,7 @@ EFFECTS: Registry[Effect] = Registry(
         propeller.ENGINE_LAG,
         propeller.ENGINE_TELEGRAPH,
         propeller.REVERSED_THRUST,
+        twin_screws.TWIN_ORDERS,
         harbour.BOW_THRUSTER,
         harbour.STERN_THRUSTER,
         harbour.TUG_FORCES,
