@@ -47,6 +47,7 @@ FAMILIES = {
     "banks": "Surroundings",
     "depth": "Surroundings",
     "propeller": "Propeller and engine",
+    "controllable_pitch": "Propeller and engine",
     "twin_screws": "Propeller and engine",
     "harbour": "Thrusters and tugs",
     "rudder": "Rudder",

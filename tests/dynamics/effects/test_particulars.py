@@ -23,7 +23,14 @@ BLOCK = 0.5 * MASS * L**2 / (BEAM * DRAUGHT)
 
 def test_every_effect_that_needs_no_engine_is_on_a_minimal_card() -> None:
     for name in EFFECTS:
-        if name not in ("propeller_walk", "engine_lag", "engine_telegraph", "astern_thrust", "twin_orders"):
+        if name not in (
+            "propeller_walk",
+            "engine_lag",
+            "engine_telegraph",
+            "astern_thrust",
+            "twin_orders",
+            "controllable_pitch",
+        ):
             assert np.all(np.isfinite(forces(ship({name: TYPICAL[name]}, MINIMAL + WAVES), STATES[0])))
     card = card_with(text=MINIMAL)
     assert all(

@@ -2,6 +2,7 @@
 
 from tank2sim.dynamics.effects import (
     banks,
+    controllable_pitch,
     depth,
     derivatives,
     dynamic_effects,
@@ -39,6 +40,7 @@ EFFECTS: Registry[Effect] = Registry(
         propeller.ENGINE_LAG,
         propeller.ENGINE_TELEGRAPH,
         propeller.REVERSED_THRUST,
+        controllable_pitch.CONTROLLABLE_PITCH,
         twin_screws.TWIN_ORDERS,
         harbour.BOW_THRUSTER,
         harbour.STERN_THRUSTER,
