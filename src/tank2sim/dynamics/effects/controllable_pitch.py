@@ -100,15 +100,18 @@ def pitch_thrust(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX, astern: ca.
 
     K_T(J, P/D) = K_0 + (P/D)/0.5 (K_T(J, 0.5) - K_0) from 0 to 0.5,   K_0 = -C_D pi/8 A_E/A_0 J^2
     K_T(J, -P/D) = K_0 - a K_T(0, P/D)
+
+    `area` is A_E/A_0, `blades` Z, `astern` a.
     """
     plate = -PLATE_DRAG * math.pi / 8 * area * J**2
 
     def ahead(J: ca.SX, wanted: ca.SX, flat: ca.SX) -> ca.SX:
         inside = b_series_thrust(J, ca.fmin(ca.fmax(wanted, LEAST_PITCH), LARGEST_PITCH), area, blades)
-        return flat + ca.fmin(wanted / LEAST_PITCH, 1) * (inside - flat)
+        return ca.SX(flat + ca.fmin(wanted / LEAST_PITCH, 1) * (inside - flat))
 
     none = ca.SX(0)
-    return ahead(J, ca.fmax(pitch, 0), plate) - astern * ahead(none, ca.fmax(-pitch, 0), none)
+    total: ca.SX = ahead(J, ca.fmax(pitch, 0), plate) - astern * ahead(none, ca.fmax(-pitch, 0), none)
+    return total
 
 
 def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
