@@ -16,7 +16,8 @@ from tank2sim.dynamics.hull import inside_range, validity_factor
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 
 # Oosterveld and van Oossanen (1975), Further computer-analyzed data of the Wageningen B-screw series, International
-# Shipbuilding Progress 22, 251-262, as Bernitsas, Ray and Kinley (1981), University of Michigan report 237, print them.
+# Shipbuilding Progress 22, 251-262; the numbers are alike in three public transcriptions, one of them of Bernitsas, Ray
+# and Kinley (1981), K_T, K_Q and efficiency curves for the Wageningen B-series propellers. The paper was not at hand.
 # fmt: off
 B_SERIES: Sequence[tuple[float, int, int, int, int]] = (
     (0.00880496, 0, 0, 0, 0),
@@ -70,11 +71,10 @@ PLATE_DRAG = 1.17
 
 ASTERN_OF_CAMBER = 0.7
 """Thrust at rest with a negative pitch over that with the same ahead: blades are then cambered and twisted the wrong
-way. Between 0.6 and 0.8 of ships with such propellers; project choice."""
+way. Project choice, a little below that of a reversed propeller (:data:`tank2sim.cards.form.ASTERN_THRUST`)."""
 
 ADVANCE_SHARE = 0.7
-"""J of the design over P/D where a card states no propeller: a slip of 30 %, as merchant ships have about. Project
-choice."""
+"""J of the design over P/D where a card states no propeller: a slip of 30 %. Project choice."""
 
 _STOPPED = 0.02  # revolutions over the nominal ones below which J is held: the thrust goes with their square
 

@@ -19,8 +19,8 @@ SIDES = {"starboard": (1.0, "_right"), "port": (-1.0, "_left")}
 """Side to the sign of its y, and to the ending of its quantities in the MMG method."""
 
 PROPELLER_PLACE = 0.2
-"""Place of the propellers from the centre line over the beam where it is not stated: of twin-screw ships it is 0.2 to
-0.3, so that the blades stay within the side. Project choice."""
+"""Place of the propellers from the centre line over the beam where it is not stated: the blades stay well within the
+side. Project choice."""
 
 
 def _with_separate_orders(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
