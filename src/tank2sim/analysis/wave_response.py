@@ -30,8 +30,8 @@ FREQUENCIES, LONGEST, SHORTEST = 24, 12.0, 0.125
 """Frequencies of a table, from waves of 12 L to those of L/8 or as short as the mesh can show: project choice."""
 
 ROLL_GYRADIUS, ROLL_DAMPING = 0.375, 0.05
-"""Radius of gyration in roll over the beam, and damping of roll by friction and eddies over the critical one, in addition
-to that by waves, where they are not stated: project choices."""
+"""Radius of gyration in roll over the beam, and damping of roll by friction and eddies over the critical one, in
+addition to that by waves, where they are not stated: project choices."""
 
 _THETA = 361  # directions of the far field, 1 deg: of the waves that a hull of 8 wave lengths sends out
 _BEYOND = 0.2  # the solver interpolates in them, and asks for more than the full circle, rad
