@@ -43,9 +43,12 @@ logger = logging.getLogger(__name__)
 FAMILIES = {
     "surroundings": "Surroundings",
     "fields": "Surroundings",
+    "waves": "Surroundings",
     "banks": "Surroundings",
     "depth": "Surroundings",
     "propeller": "Propeller and engine",
+    "controllable_pitch": "Propeller and engine",
+    "twin_screws": "Propeller and engine",
     "harbour": "Thrusters and tugs",
     "rudder": "Rudder",
     "loaded_rudder": "Rudder",

@@ -7,10 +7,12 @@ import math
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
@@ -140,6 +142,36 @@ manipulator.slave_real_values(names["autopilot"], [pilot], [float(sys.argv[3])])
 run.step(1800)
 print("heading", observer.last_real_values(names["ship"], [ship])[0])
 """
+
+
+def every_input(mariner: Model, made: Path) -> bytes:
+    exported = ExportedFmu(content=made.read_bytes(), fmi=2, model_identifier="x", token="", platforms=())
+    return ship_with_autopilot(mariner, exported, every_input=True)
+
+
+def test_every_input_may_be_a_connector(
+    mariner: Model, mariner_fmu: Callable[[int], Path], tmp_path: Path, run: np.ndarray
+) -> None:
+    package = tmp_path / "open.ssp"
+    package.write_bytes(every_input(mariner, mariner_fmu(2)))
+    description = read_ssd(str(package))  # holds it against the schema of SSP 1.0
+    assert len(description.system.connections) == 3
+    with zipfile.ZipFile(package) as archive:
+        archive.extractall(tmp_path)
+    for part in description.system.elements:
+        variables = fmpy.read_model_description(str(tmp_path / "resources" / f"{part.name}.fmu")).modelVariables
+        shown = {(one.causality, one.name) for one in variables if one.causality in ("input", "output")}
+        assert shown == {(one.kind, one.name) for one in part.connectors}
+        assert ("input", "external.Y") in shown or part.name == "autopilot"
+    if not reason_to_skip("libcosimpy"):
+        command = [sys.executable, "-c", _LIBCOSIM, str(package), str(STEP_S), str(COURSE)]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        heading = float(next(line.split()[1] for line in ended.stdout.splitlines() if line.startswith("heading")))
+        assert heading == pytest.approx(run["ship.motion.psi"][-1], abs=math.radians(0.02))
+
+
+def test_all_connectors_are_those_of_a_package(tmp_path: Path) -> None:
+    refused(tank2sim("export", "mariner", "-o", "m.fmu", "--ssp-inputs", cwd=tmp_path), "there is no SSP package")
 
 
 @pytest.mark.slow

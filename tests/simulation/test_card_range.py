@@ -49,6 +49,13 @@ def test_the_range_is_left_when_a_signal_passes_the_limit_of_the_card(key, limit
     assert validity.min() < 0.999 and np.all(validity[~beyond] == 1.0)
 
 
+def test_an_effect_that_does_not_hold_is_named_where_the_motion_is_in_range() -> None:
+    shallow = {"effects": [{"name": "finite_depth", "parameters": {"depth_m": 8.2}}]}
+    run = turned(shallow)
+    assert run.reading.exit_s == 0.0
+    assert run.reading.how.startswith("under keel clearance")
+
+
 def test_only_figures_settled_after_the_range_is_left_are_marked() -> None:
     whole = turned({})
     speeds = whole.trajectory["motion.speed"][whole.trajectory.t > whole.figures["time_90_s"]]

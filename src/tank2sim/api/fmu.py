@@ -138,6 +138,7 @@ def make_fmu_file(
     fmi: int = 3,
     platforms: str = "host",
     ssp: Path | None = None,
+    ssp_inputs: bool = False,
     sources: bool = True,
     osp: bool = False,
     report: Callable[[str], None] = lambda _: None,
@@ -152,6 +153,8 @@ def make_fmu_file(
         As in :meth:`.Ship.to_fmu`.
     ssp : Path, optional
         Also an SSP package in which a heading autopilot steers the ship.
+    ssp_inputs : bool
+        Every input in that package is a connector: see :func:`tank2sim.fmu.ssp.ship_with_autopilot`.
     osp : bool
         Also the files of :func:`tank2sim.fmu.osp.osp_system`, next to the FMU.
     report : callable
@@ -168,7 +171,7 @@ def make_fmu_file(
     if ssp:
         from tank2sim.fmu.ssp import ship_with_autopilot
 
-        files[ssp] = ship_with_autopilot(model, made, platforms=chosen, report=report)
+        files[ssp] = ship_with_autopilot(model, made, every_input=ssp_inputs, platforms=chosen, report=report)
     if osp:
         files |= {path.parent / name: text for name, text in osp_system(model, path.name).items()}
     return ExportResult(ship, path, made, ssp, files)

@@ -145,6 +145,56 @@ class Ship:
         """
         write_together({Path(path): self.card.text})
 
+    def with_waves(
+        self,
+        mesh: str | Path,
+        *,
+        metacentric_height_m: float | None = None,
+        roll_gyradius_m: float | None = None,
+        roll_damping: float | None = None,
+        frequencies_radps: Sequence[float] | None = None,
+        directions_deg: Sequence[float] | None = None,
+    ) -> Ship:
+        """The ship with ``[waves]`` on its card, its motions and mean drift in waves, which the effect `waves` needs.
+
+        Computed from the mesh of its hull by potential flow, at rest in deep water (the extra ``tank2sim[waves]``). The
+        radius of gyration in pitch is that of the card's yaw inertia.
+
+        Parameters
+        ----------
+        mesh : str or path
+            Hull in m, at the size of the ship: x forward of midships, y to port, z above the waterline, normals into
+            the water (``gdf``, ``stl`` and others).
+        metacentric_height_m : float, optional
+            By default that of the card.
+        roll_gyradius_m : float, optional
+            Radius of gyration in roll; by default 0.375 of the beam.
+        roll_damping : float, optional
+            Damping of roll over the critical one, in addition to that by waves; by default 0.05.
+        frequencies_radps : sequence of float, optional
+            Rising; by default 24, from waves of 12 L to L/8 or as short as the mesh can show.
+        directions_deg : sequence of float, optional
+            From 0 (head waves) to 180 in equal steps; by default every 15.
+
+        Raises
+        ------
+        InputError
+            Capytaine is not installed, the mesh cannot be read or is of another size, or metacentric height or beam is
+            not known.
+        """
+        from tank2sim.analysis.wave_response import card_in_waves, hull_of
+
+        card = self.manoeuvring()
+        stated = {
+            "metacentric_height_m": metacentric_height_m,
+            "roll_gyradius_m": roll_gyradius_m,
+            "roll_damping": roll_damping,
+            "frequencies_radps": frequencies_radps,
+            "directions_deg": directions_deg,
+        }
+        given = {name: value for name, value in stated.items() if value is not None}
+        return Ship(card_in_waves(card, mesh, hull_of(card, given)))
+
     def turn(self, rudder_deg: float = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a turning circle: the rudder is put over at t = 0 and held for 540 deg of heading.
 

@@ -29,6 +29,7 @@ from tank2sim.cards.form import (
     Surge,
     SurgeModel,
     ThrusterSection,
+    WavesSection,
     YawRig,
     YawRigModel,
 )
@@ -151,6 +152,8 @@ class ManoeuvringCard(Card):
         (``effects.0.parameters.direction_deg``).
     roll : Roll, optional
         What makes roll a degree of freedom; its inertia is prime.
+    waves : WavesSection, optional
+        What regular waves do to the ship.
     effects : tuple
         Effects on top of the polynomial, in the order of the file.
     fitted_trials : tuple
@@ -167,6 +170,7 @@ class ManoeuvringCard(Card):
     roll: Roll | None = None
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
+    waves: WavesSection | None = None
     effects: tuple[EffectEntry, ...] = ()
     fitted_trials: tuple[FittedTrial, ...] = ()
 

@@ -10,6 +10,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from tank2sim.cards.wave_table import wave_table
+
 Positive = Annotated[float, Field(gt=0)]
 # Bounds of plausibility, far outside anything that was ever built, towed or steered: a number beyond them is a slip of
 # the pen or of the unit, and the powers of it in the prime system (up to L^5) leave the range of a float.
@@ -540,6 +542,34 @@ class ThrusterSection(CardSection):
         return -(self.max_radps if self.max_astern_radps is None else self.max_astern_radps)
 
 
+class WavesSection(CardSection):
+    """``[waves]``: what regular waves of unit amplitude do to the ship at rest, by frequency and direction.
+
+    Parameters
+    ----------
+    source : str
+        Where the numbers come from.
+    columns : list of str
+        What each number of a row is (:mod:`tank2sim.cards.wave_table`).
+    rows : list of list of float
+        One for each frequency and direction, in any order.
+
+    Raises
+    ------
+    ValueError
+        A column is unknown, or the rows are not a table of all frequencies and directions.
+    """
+
+    source: Text
+    columns: Annotated[list[str], Field(max_length=100)]
+    rows: Annotated[list[Annotated[list[float], Field(max_length=100)]], Field(max_length=10_000)]
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Self:
+        wave_table(self.columns, self.rows)
+        return self
+
+
 class EffectEntry(CardSection):
     """One of ``[[effects]]``: its name, parameters (SI) and their standard errors."""
 
@@ -593,6 +623,7 @@ class ShipCard(CardSection):
     roll: Roll | None = None
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
+    waves: WavesSection | None = None
     effects: list[EffectEntry] = []
     fitted_trials: list[FittedTrial] = []
 

@@ -313,6 +313,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         roll=_prime_roll(form.roll, scales, source),
         steering_gear=form.steering_gear,
         propulsion=_prime_propulsion(form.propulsion, scales),
+        waves=form.waves,
         effects=tuple(form.effects),
         fitted_trials=tuple(form.fitted_trials),
     )

@@ -11,6 +11,7 @@ from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import set_option
 from tank2sim.cli.progress import showing_stages
+from tank2sim.errors import InputError
 from tank2sim.fmu.platforms import PLATFORMS
 
 
@@ -40,6 +41,11 @@ from tank2sim.fmu.platforms import PLATFORMS
     help="Also an SSP package in which a heading autopilot steers the ship.",
 )
 @click.option(
+    "--ssp-inputs",
+    is_flag=True,
+    help="Every input in that package is a connector, also those that nothing is joined to.",
+)
+@click.option(
     "--osp", is_flag=True, help="Also OspSystemStructure.xml and the OSP model description, next to the FMU (FMI 2)."
 )
 @json_option
@@ -51,14 +57,25 @@ def command(
     values: dict[str, object],
     sources: bool,
     ssp: Path | None,
+    ssp_inputs: bool,
     osp: bool,
     json_file: Path | None,
 ) -> None:
     """Write the FMU (Model Exchange and Co-Simulation) of CARD (a file, or the name of a bundled ship)."""
+    if ssp_inputs and ssp is None:
+        raise InputError("--ssp-inputs", "", "there is no SSP package", "give --ssp too")
     ship = load(card, values)
     with showing_stages("making the FMU") as report:
         result = make_fmu_file(
-            ship, output, fmi=int(fmi), platforms=platforms, ssp=ssp, sources=sources, osp=osp, report=report
+            ship,
+            output,
+            fmi=int(fmi),
+            platforms=platforms,
+            ssp=ssp,
+            ssp_inputs=ssp_inputs,
+            sources=sources,
+            osp=osp,
+            report=report,
         )
     write_result(result, [ship.card.source], json_file=json_file, files=result.files)
     show_result(result)

@@ -7,6 +7,7 @@ communication points by the very steps of Co-Simulation.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import math
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.reference import by_scheme
+from tank2sim.fmu.templates import render
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
@@ -28,6 +30,11 @@ EXTRA = "extra/org.tank2sim"
 """Folder of an FMU in which what is the program's own lies (FMI 3.0, 2.5.1: a domain name in reverse)."""
 
 INPUTS_FILE, OUTPUTS_FILE = f"{EXTRA}/reference_in.csv", f"{EXTRA}/reference_out.csv"
+
+LAYERED, LAYERED_VERSION = "extra/org.fmi-standard.fmi-ls-ref", "1.0.0-alpha.1"
+"""Folder and version of the FMI Layered Standard References, which says what files of an FMU are for."""
+
+_EXPERIMENT = "reference.exp"  # in the Experiments Format of the Modelica Association (ma-hs-experiments, a draft)
 
 _ZIGZAG = Zigzag(math.radians(20.0), math.radians(20.0))
 _TURN = Turn(math.radians(35.0))
@@ -60,10 +67,42 @@ class ReferenceRun:
     def files(self) -> dict[str, str]:
         """Name in the FMU to the text of its CSV files; 13 digits, so that what is read back differs by 1e-13."""
         table = np.column_stack([self.run.times, self.outputs])
-        return {
+        tables = {
             INPUTS_FILE: _csv(self.input_names, _with_jumps(self.run)),
             OUTPUTS_FILE: _csv(self.output_names, table),
         }
+        return {**tables, **self._layered_standard(tables[OUTPUTS_FILE])}
+
+    def _layered_standard(self, answer: str) -> dict[str, str]:
+        """The experiment, and the manifest of FMI-LS-REF that names it; `answer` is the text of the outputs."""
+        times = self.run.times
+        experiment = render(
+            "experiments.xml",
+            {
+                "name": self.title,
+                "start": float(times[0]),
+                "stop": float(times[-1]),
+                "step": float(np.median(np.diff(times))),
+                "inputs": f"../../{INPUTS_FILE}",
+                "outputs": f"../../{OUTPUTS_FILE}",
+            },
+        )
+        described = (
+            (_EXPERIMENT, "application/x-ma-hs-experiments", "experiment/smoke-test", "Run to repeat", experiment),
+            (f"../../{OUTPUTS_FILE}", "text/csv", "result", "Outputs of that run, SI", answer),
+        )
+        related = [
+            {
+                "source": source,
+                "type": kind,
+                "role": role,
+                "description": description,
+                "checksum": hashlib.sha3_256(text.encode("utf-8")).hexdigest(),
+            }
+            for source, kind, role, description, text in described
+        ]
+        manifest = render("fmi-ls-manifest.xml", {"version": LAYERED_VERSION, "related": related})
+        return {f"{LAYERED}/{_EXPERIMENT}": experiment, f"{LAYERED}/fmi-ls-manifest.xml": manifest}
 
 
 def reference_run(model: Model) -> tuple[ReferenceRun | None, dict[str, Run]]:

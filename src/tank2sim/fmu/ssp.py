@@ -44,14 +44,16 @@ def ship_with_autopilot(
     ship: Model,
     made: ExportedFmu,
     *,
+    every_input: bool = False,
     platforms: Sequence[Platform] | None = None,
     report: ProgressReport = lambda _: None,
 ) -> bytes:
     """The package: the ship's FMU as it was made, an autopilot for it for the same version of FMI, and their joints.
 
     Inputs are joined to outputs of the same name. The others (``heading.command`` of the autopilot, the revolutions)
-    are not connectors: the system would have to hand them in, which the engines of OSP and ecos do not know; but all
-    engines set variables of a component, and where nothing is set the start values hold.
+    are connectors of their component with `every_input` alone: FMPy sets a connector that nothing is joined to to zero,
+    also the revolutions, where libcosim and SSP 1.0 keep the start values. They are not connectors of the system, which
+    the engines of OSP and ecos do not know; but all engines set variables of a component.
     Platforms and `report` are those of :func:`tank2sim.fmu.export.make_fmu`.
 
     Raises
@@ -64,7 +66,7 @@ def ship_with_autopilot(
     steered = make_fmu(
         autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, report=report
     )
-    parts, joints = _joined({"ship": ship, "autopilot": autopilot})
+    parts, joints = _joined({"ship": ship, "autopilot": autopilot}, every_input)
     lengths = {parameter.name: parameter.start for parameter in ship.parameters}
     values = {
         "name": f"{ship.name} with heading autopilot",
@@ -83,18 +85,19 @@ def ship_with_autopilot(
     return zipped(contents, first="SystemStructure.ssd")
 
 
-def _joined(models: Mapping[str, Model]) -> tuple[list[Part], list[Joint]]:
+def _joined(models: Mapping[str, Model], every_input: bool) -> tuple[list[Part], list[Joint]]:
     """Components and connections: each input that has the name of another's output is joined to it."""
     described = {name: interface(model) for name, model in models.items()}
     parts, joints = [], []
     for name, model in models.items():
         taken = []
-        for variable in described[name].with_causality("input"):
+        inputs = described[name].with_causality("input")
+        for variable in inputs:
             for other, its in described.items():
                 if other != name and variable.name in {output.name for output in its.with_causality("output")}:
                     joints.append(Joint(other, name, variable.name))
                     taken.append(variable)
-        connectors = (*taken, *described[name].with_causality("output"))
+        connectors = (*(inputs if every_input else taken), *described[name].with_causality("output"))
         parts.append(Part(name, model.description, f"{name}.fmu", connectors))
     return parts, joints
 

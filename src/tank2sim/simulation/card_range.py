@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.hull import VALIDITY_FACTOR
 from tank2sim.marks import EXTRAPOLATED
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.trajectory import Trajectory
@@ -41,7 +42,7 @@ class CardRangeReading:
     exit_s : float or None
         Time at which the output ``validity`` first falls below 1; None if it does not.
     how : str
-        The quantities that leave the range, with both ranges; empty if none does.
+        The quantities that leave the range, with both ranges, or else what effects do not hold for.
     """
 
     figures: Numbers
@@ -130,7 +131,14 @@ def _how(run: Trajectory, values: Mapping[str, float]) -> str:
     rate = run["motion.r"] * values["ship.length"] / moving
     drift = np.arcsin(np.clip(run["motion.v"] / moving, -1.0, 1.0))
     rudder = run["rudder.angle"] if "rudder.angle" in run.model else np.zeros_like(rate)
-    return exceeded_range(values, run["motion.speed"], rate, drift, rudder)
+    return exceeded_range(values, run["motion.speed"], rate, drift, rudder) or _fallen_factors(run)
+
+
+def _fallen_factors(run: Trajectory) -> str:
+    """Causes for which effects of the card do not hold, by the names of their factors of ``validity``."""
+    factors = [name for name in run.model.outputs if name.startswith(VALIDITY_FACTOR)]
+    fallen = [name.removeprefix(VALIDITY_FACTOR).replace("_", " ") for name in factors if run[name].min() < INSIDE]
+    return ", ".join(fallen)
 
 
 def exceeded_range(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:

@@ -21,6 +21,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "current_field": {"speed_mps": 0.4, "direction_deg": 30.0},
     "wind_field": {"speed_mps": 10.0, "direction_deg": 40.0},
     "wave_drift": {"height_m": 2.0, "direction_deg": 40.0},
+    "waves": {"height_m": 2.0, "period_s": 8.0, "direction_deg": 40.0},
     "bank_suction": {"Y_prime": 1e-4, "N_prime": -3e-5},
     "bank": {"port_distance_m": 1e4, "starboard_distance_m": 150.0},
     "propeller_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},
@@ -30,6 +31,8 @@ TYPICAL: dict[str, dict[str, float]] = {
     "engine_lag": {"time_constant_s": 15.0},
     "engine_telegraph": {"time_constant_s": 8.0, "start_s": 6.0, "reversal_s": 25.0},
     "astern_thrust": {"factor": 0.6},
+    "controllable_pitch": {"pitch": 0.6, "design_pitch": 0.8},
+    "twin_orders": {"propeller_starboard_rpm": -30.0, "propeller_port_rpm": 20.0},
     "bow_tunnel_thruster": {"command": 0.5},
     "stern_tunnel_thruster": {"command": -0.5},
     "tugs": {"force_1_N": 2e5, "direction_1_deg": 90.0},
@@ -72,6 +75,24 @@ TYPICAL: dict[str, dict[str, float]] = {
 """Each effect with parameters of a usual size, as cards give them."""
 
 
+WAVES = """
+[waves]
+source = "made up"
+columns = [
+  "frequency_radps", "direction_deg", "heave_amplitude", "heave_phase_deg", "roll_amplitude_radpm", "roll_phase_deg",
+  "X_drift_Npm2", "Y_drift_Npm2", "N_drift_Npm",
+]
+rows = [
+  [0.3, 0.0, 0.9, 180.0, 0.0, -90.0, -1e3, 0.0, 0.0],
+  [0.3, 90.0, 1.0, 180.0, 0.01, -90.0, 0.0, -5e3, 0.0],
+  [0.3, 180.0, 0.9, 180.0, 0.0, -90.0, 1e3, 0.0, 0.0],
+  [1.5, 0.0, 0.01, 0.0, 0.0, -90.0, -2e4, 0.0, 0.0],
+  [1.5, 90.0, 0.5, 120.0, 0.02, 150.0, 0.0, -5e5, 2e6],
+  [1.5, 180.0, 0.01, 0.0, 0.0, -90.0, 2e4, 0.0, 0.0],
+]
+"""
+
+
 @functools.cache
 def mariner_text(**replaced: str) -> str:
     """The Mariner's card with every particular that an effect may ask for, and propulsion; lines replaced by key.
@@ -81,7 +102,7 @@ def mariner_text(**replaced: str) -> str:
     replaced = {"valid_speed_mps": "valid_speed_mps = [3.9, 9.3]", **replaced}
     text = Path(read_card("mariner").source).read_text()
     more = f"projected_area_front_m2 = {FRONT}\nprojected_area_side_m2 = {SIDE}\nblock_coefficient = {CB}\ndraught_m ="
-    text = text.replace("draught_m =", more) + "\n[propulsion]\nnominal_rpm = 84.0\nXnn = 77e-5\n"
+    text = text.replace("draught_m =", more) + "\n[propulsion]\nnominal_rpm = 84.0\nXnn = 77e-5\n" + WAVES
     lines = text.splitlines()
     for key, line in replaced.items():
         lines = [line if one.split("=")[0].strip() == key else one for one in lines]

@@ -35,6 +35,8 @@ OTHER_MEANINGS = {
     'quantity.startswith("wind")': "the same",
     '"bank": "Polygon"': "kind of a feature of a scenario",
     '"bank": {}': "the same",
+    'document.pop("waves"': "section of a card",
+    '"water_depth": np.inf': "argument of a solver",
 }
 """Lines, by a part of them, in which the name of an effect is another word, and what it is there."""
 

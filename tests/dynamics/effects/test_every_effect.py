@@ -54,6 +54,8 @@ def test_typical_parameters_change_something(name: str) -> None:
         **state(6.5, 0.5, 0.01, 0.5),
         **{"motion.psi": 0.7, "rudder.command": 0.45, "propeller.speed": -5.0, "motion.phi": 0.02},
     }
+    if name == "controllable_pitch":  # a propeller that turns ahead
+        at["propeller.speed"] = 5.0
     model, bare = ship({name: TYPICAL[name]}), ship()
     names = [*OUTPUTS, "rudder.rate"]
     known = {key: value for key, value in at.items() if key in bare}

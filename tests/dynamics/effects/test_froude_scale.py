@@ -108,6 +108,7 @@ def test_what_never_vanishes_replaces_something_or_needs_depth() -> None:
         "telemotor_lag",
         "engine_lag",
         "engine_telegraph",
+        "controllable_pitch",
         "water_depth",
         "finite_depth",
     }

@@ -2,6 +2,7 @@
 
 from tank2sim.dynamics.effects import (
     banks,
+    controllable_pitch,
     depth,
     derivatives,
     dynamic_effects,
@@ -14,6 +15,8 @@ from tank2sim.dynamics.effects import (
     rudder,
     sensors,
     surroundings,
+    twin_screws,
+    waves,
 )
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, sensor_fault_of
 from tank2sim.dynamics.model import Model
@@ -27,6 +30,7 @@ EFFECTS: Registry[Effect] = Registry(
         fields.CURRENT_FIELD,
         fields.WIND_FIELD,
         surroundings.WAVE_DRIFT,
+        waves.WAVES,
         surroundings.BANK_SUCTION,
         banks.BANK,
         propeller.PROPELLER_SIDE_FORCE,
@@ -36,6 +40,8 @@ EFFECTS: Registry[Effect] = Registry(
         propeller.ENGINE_LAG,
         propeller.ENGINE_TELEGRAPH,
         propeller.REVERSED_THRUST,
+        controllable_pitch.CONTROLLABLE_PITCH,
+        twin_screws.TWIN_ORDERS,
         harbour.BOW_THRUSTER,
         harbour.STERN_THRUSTER,
         harbour.TUG_FORCES,

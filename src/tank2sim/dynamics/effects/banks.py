@@ -80,7 +80,7 @@ def _with_banks(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     A method of calculating the ship-bank interaction forces and moments in restricted water, International
     Shipbuilding Progress 40, 7-23, which has it at the surface and at half the draught; the split by the propeller is
     that of Vantorre, Delefortrie, Eloot and Laforce (2003), Experimental investigation of ship-bank interaction forces,
-    MARSIM. Going astern, both are zero.
+    MARSIM. Both are cited without the papers at hand. Going astern, both forces are zero.
     """
     model, (beam, draught) = with_particulars(model, card, "beam_m", "draught_m")
     u, length = ca.fmax(model.symbol("motion.u"), 0), model.symbol("ship.length")

@@ -200,10 +200,11 @@ def mmg_forces(ship: MmgShip) -> tuple[Quantity, ...]:
     for side in ship.sides:
         quantities, thrust, F_N = _side_quantities(ship, side)
         found += quantities
+        turning, angle = _orders_reached(hull, quantities)
         for torque in (quantity for quantity in quantities if quantity.name.startswith("propeller.torque")):
-            power = power + hull["propeller.speed_actual"] * torque.symbol
+            power = power + turning * torque.symbol
         push = (1 - ship.p["t_P"]) * thrust
-        X, Y, N = rudder_forces_of(ship.p, hull["ship.length"], F_N, hull["rudder.effective"])
+        X, Y, N = rudder_forces_of(ship.p, hull["ship.length"], F_N, angle)
         X_P, N_P = X_P + push, N_P - side.y_P * hull["ship.length"] * push
         X_R, Y_R, N_R = X_R + X, Y_R + Y, N_R + N - side.y_R * hull["ship.length"] * X
     by_rudder = rudder_quantities((X_R, Y_R, N_R))
@@ -220,13 +221,19 @@ def mmg_forces(ship: MmgShip) -> tuple[Quantity, ...]:
     return (*found, *by_rudder, *by_propeller, *force_quantities(forces, "the MMG method's with its inertial terms"))
 
 
+def _orders_reached(hull: Hull, quantities: list[Quantity]) -> tuple[ca.SX, ca.SX]:
+    """Revolutions (rad/s) and rudder angle (rad) of a side: its own where it is one of two, among its `quantities`."""
+    own = {quantity.name.rpartition("_")[0]: quantity.symbol for quantity in quantities}
+    turning = own.get("propeller.speed_actual", hull["propeller.speed_actual"])
+    return turning, own.get("rudder.effective", hull["rudder.effective"])
+
+
 def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, ca.SX]:
     """Quantities of a side, with the symbols of its thrust and normal force (N)."""
     hull, p = ship.hull, ship.p
     density, length, diameter = hull["ship.water_density"], hull["ship.length"], hull["ship.propeller_diameter"]
     r = hull["motion.r"]
     beta_P = ship.drift - p["x_P"] * r * length / hull.speed
-    n = hull["propeller.speed_actual"] / (2 * ca.pi)
 
     speed, mirrored = hull.speed, side.mirror
     v_prime, r_prime, _ = prime_motion(hull, speed)
@@ -242,6 +249,15 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
     def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
         return Quantity(name=f"{name}{side.suffix}", unit=unit, description=description, value=value)
 
+    own: list[Quantity] = []
+    if side.suffix:  # what an effect with separate orders changes
+        turns, angle = "Revolutions of the propeller, positive ahead", "Angle of the rudder, positive to starboard"
+        own = [
+            quantity("propeller.speed_actual", "rad/s", turns, hull["propeller.speed_actual"]),
+            quantity("rudder.effective", "rad", angle, hull["rudder.effective"]),
+        ]
+    turning, delta = _orders_reached(hull, own)
+    n = turning / (2 * ca.pi)
     u_P = quantity(
         "propeller.inflow",
         "m/s",
@@ -275,11 +291,11 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
             p,
             0.5 * density * hull["ship.rudder_area"],
             (u_R.symbol, v_R.symbol),
-            hull["rudder.effective"],
+            delta,
             ship.still,
         ),
     )
-    flow = [u_P, thrust, u_R, v_R, F_N]
+    flow = [*own, u_P, thrust, u_R, v_R, F_N]
     if "q_0" in p:
         value = density * torque_over_density(p, diameter, n, u_P.symbol)
         flow.append(quantity("propeller.torque", "N.m", "Torque that turns the propeller, positive ahead", value))

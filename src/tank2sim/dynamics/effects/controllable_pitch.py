@@ -1,0 +1,250 @@
+"""A propeller whose pitch is ordered: its thrust by the Wageningen B-series."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
+from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State
+
+# Oosterveld and van Oossanen (1975), Further computer-analyzed data of the Wageningen B-screw series, International
+# Shipbuilding Progress 22, 251-262; the numbers are alike in three public transcriptions, one of them of Bernitsas, Ray
+# and Kinley (1981), K_T, K_Q and efficiency curves for the Wageningen B-series propellers. The paper was not at hand.
+# fmt: off
+B_SERIES: Sequence[tuple[float, int, int, int, int]] = (
+    (0.00880496, 0, 0, 0, 0),
+    (-0.204554, 1, 0, 0, 0),
+    (0.166351, 0, 1, 0, 0),
+    (0.158114, 0, 2, 0, 0),
+    (-0.147581, 2, 0, 1, 0),
+    (-0.481497, 1, 1, 1, 0),
+    (0.415437, 0, 2, 1, 0),
+    (0.0144043, 0, 0, 0, 1),
+    (-0.0530054, 2, 0, 0, 1),
+    (0.0143481, 0, 1, 0, 1),
+    (0.0606826, 1, 1, 0, 1),
+    (-0.0125894, 0, 0, 1, 1),
+    (0.0109689, 1, 0, 1, 1),
+    (-0.133698, 0, 3, 0, 0),
+    (0.00638407, 0, 6, 0, 0),
+    (-0.00132718, 2, 6, 0, 0),
+    (0.168496, 3, 0, 1, 0),
+    (-0.0507214, 0, 0, 2, 0),
+    (0.0854559, 2, 0, 2, 0),
+    (-0.0504475, 3, 0, 2, 0),
+    (0.010465, 1, 6, 2, 0),
+    (-0.00648272, 2, 6, 2, 0),
+    (-0.00841728, 0, 3, 0, 1),
+    (0.0168424, 1, 3, 0, 1),
+    (-0.00102296, 3, 3, 0, 1),
+    (-0.0317791, 0, 3, 1, 1),
+    (0.018604, 1, 0, 2, 1),
+    (-0.00410798, 0, 2, 2, 1),
+    (-0.000606848, 0, 0, 0, 2),
+    (-0.0049819, 1, 0, 0, 2),
+    (0.0025983, 2, 0, 0, 2),
+    (-0.000560528, 3, 0, 0, 2),
+    (-0.00163652, 1, 2, 0, 2),
+    (-0.000328787, 1, 6, 0, 2),
+    (0.000116502, 2, 6, 0, 2),
+    (0.000690904, 0, 0, 1, 2),
+    (0.00421749, 0, 3, 1, 2),
+    (0.0000565229, 3, 6, 1, 2),
+    (-0.00146564, 0, 3, 2, 2),
+)
+"""C, s, t, u, v of K_T = sum of C J^s (P/D)^t (A_E/A_0)^u Z^v, at a Reynolds number of 2e6."""
+# fmt: on
+
+LEAST_PITCH, LARGEST_PITCH, LARGEST_J = 0.5, 1.4, 1.6
+"""P/D of the series, and the J beyond which no curve of it goes."""
+
+PLATE_DRAG = 1.17
+"""Drag coefficient of a plate across the stream (Hoerner 1965, Fluid-Dynamic Drag): of blades at zero pitch."""
+
+ASTERN_OF_CAMBER = 0.7
+"""Thrust at rest with a negative pitch over that with the same ahead: blades are then cambered and twisted the wrong
+way. Project choice, a little below that of a reversed propeller (:data:`tank2sim.cards.form.ASTERN_THRUST`)."""
+
+ADVANCE_SHARE = 0.7
+"""J of the design over P/D where a card states no propeller: a slip of 30 %. Project choice."""
+
+_STOPPED = 0.02  # revolutions over the nominal ones below which J is held: the thrust goes with their square
+
+
+def b_series_thrust(J: Any, pitch: Any, area: Any, blades: Any) -> Any:
+    """Return K_T of a propeller of the Wageningen B-series.
+
+    Parameters
+    ----------
+    J, pitch : float or symbol
+        Advance ratio, and P/D of 0.5 to 1.4.
+    area, blades : float or symbol
+        A_E/A_0 of 0.30 to 1.05, and Z of 2 to 7.
+    """
+    total: Any = 0.0
+    for coefficient, s, t, u, v in B_SERIES:
+        total = total + coefficient * J**s * pitch**t * area**u * blades**v
+    return total
+
+
+def pitch_thrust(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX, astern: ca.SX) -> ca.SX:
+    """K_T at any P/D, which beyond that of the series goes linearly to blades at zero pitch, and is mirrored below it.
+
+    K_T(J, P/D) = K_0 + (P/D)/0.5 (K_T(J, 0.5) - K_0) from 0 to 0.5,   K_0 = -C_D pi/8 A_E/A_0 J^2
+    K_T(J, -P/D) = K_0 - a K_T(0, P/D)
+
+    `area` is A_E/A_0, `blades` Z, `astern` a.
+    """
+    plate = -PLATE_DRAG * math.pi / 8 * area * J**2
+
+    def ahead(J: ca.SX, wanted: ca.SX, flat: ca.SX) -> ca.SX:
+        inside = b_series_thrust(J, ca.fmin(ca.fmax(wanted, LEAST_PITCH), LARGEST_PITCH), area, blades)
+        return ca.SX(flat + ca.fmin(wanted / LEAST_PITCH, 1) * (inside - flat))
+
+    none = ca.SX(0)
+    total: ca.SX = ahead(J, ca.fmax(pitch, 0), plate) - astern * ahead(none, ca.fmax(-pitch, 0), none)
+    return total
+
+
+def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    """The pitch follows its order, and the thrust changes by that of the series; the revolutions are as ordered:
+
+        d(P/D)/dt = sat((order - P/D)/T),   T = T_card + rho n^2 D^4 (K_T(J, P/D) - K_T(J, P_0/D))
+
+    for n > 0, J = u_P/(n D), the rate no larger than 2 P_0/D in the time of reversal. P_0 is the pitch at which the
+    card's own thrust is. On an MMG card T enters the race on the rudder too. A polynomial states neither D nor wake:
+    there X gains (n/n_0)^2 of the card's thrust times (K_T(J, P/D) - K_T(J, P_0/D))/K_T(J_0, P_0/D), with
+    J = J_0 (u/u_0)/(n/n_0).
+    """
+    if "propeller.speed_actual" not in model:
+        raise card.fault("propulsion", "is missing", "controllable_pitch needs the revolutions of the propeller")
+    start = Parameter(
+        name="initial.propeller_pitch",
+        unit="1",
+        description="Pitch of the propeller over its diameter at the start",
+        minimum=-LARGEST_PITCH,
+        maximum=LARGEST_PITCH,
+        start=next(one.start for one in model.inputs if one.name == "propeller.pitch"),
+        tunable=False,
+    )
+    pitch = State(
+        name="propeller.pitch_actual",
+        unit="1",
+        description="Pitch of the propeller over its diameter, negative: pushes astern",
+        derivative="propeller.pitch_rate",
+        start=start.symbol,
+        trim=given["pitch"],
+    )
+    limit = 2 * given["design_pitch"] / given["reversal"]
+    rate = Quantity(
+        name=pitch.derivative,
+        unit="1/s",
+        description="Rate of the pitch over the diameter",
+        nominal=0.1,
+        value=ca.fmax(-limit, ca.fmin(limit, (given["pitch"] - pitch.symbol) / given["time_constant"])),
+    )
+    inside = inside_range(LEAST_PITCH - pitch.symbol, LEAST_PITCH)
+    factor = validity_factor("pitch", "the pitch of the propeller, below that of the series", inside)
+    model = model.extend(start, pitch, rate, factor, outputs=[pitch.name, factor.name])
+    model = model.redefine("validity", lambda validity: validity * factor.symbol)
+    model = with_steps_for(model, "controllable_pitch.time_constant")
+
+    def coefficients(J: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """K_T at the pitch, and at that of the design."""
+        held = ca.fmin(ca.fmax(J, 0), LARGEST_J)
+        blades = given["area_ratio"], given["blades"], given["astern"]
+        return pitch_thrust(held, pitch.symbol, *blades), pitch_thrust(held, given["design_pitch"], *blades)
+
+    if isinstance(card, MmgCard):
+        return _without_torque(_on_each_side(model, coefficients))
+    turning = model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
+    designed = given["advance_share"] * given["design_pitch"]
+    by_pitch, own = coefficients(
+        designed * model.symbol("motion.u") / model.symbol("ship.speed") / ca.fmax(turning, _STOPPED)
+    )
+    thrust = scales(model, model.symbol("ship.speed")).force * model.symbol("propulsion.Xnn") * ca.fmax(turning, 0) ** 2
+    return with_forces(model, X=thrust * (by_pitch - own) / coefficients(designed)[1])
+
+
+def _on_each_side(model: Model, coefficients: Callable[[ca.SX], tuple[ca.SX, ca.SX]]) -> Model:
+    """The model with the thrust of each propeller of an MMG ship changed by that of its `coefficients` at J."""
+    diameter, density = model.symbol("ship.propeller_diameter"), model.symbol("ship.water_density")
+    least = _STOPPED * model.symbol("propulsion.nominal_speed") / (2 * math.pi)
+    for name in [quantity.name for quantity in model.quantities if quantity.name.startswith("propeller.thrust")]:
+        suffix = name.removeprefix("propeller.thrust")
+        n = model.symbol(f"propeller.speed_actual{suffix}") / (2 * math.pi)
+        by_pitch, own = coefficients(model.symbol(f"propeller.inflow{suffix}") / (ca.fmax(n, least) * diameter))
+        added = density * ca.fmax(n, 0) ** 2 * diameter**4 * (by_pitch - own)
+        model = model.redefine(name, lambda thrust, added=added: thrust + added)  # type: ignore[misc]
+    unused = "controllable_pitch.advance_share"
+    return replace(model, parameters=tuple(one for one in model.parameters if one.name != unused))
+
+
+def _without_torque(model: Model) -> Model:
+    """The model without outputs of torque and power, which are those of one pitch."""
+    outputs = tuple(name for name in model.outputs if not name.startswith(("propeller.torque", "propeller.power")))
+    if outputs == model.outputs:
+        return model
+    notice = "the card's K_Q is that of one pitch: with controllable_pitch there are no outputs of torque and power"
+    return replace(model, outputs=outputs, notices=(*model.notices, notice))
+
+
+def _pitch(name: str, description: str, lowest: float, **more: Any) -> EffectParameter:
+    return EffectParameter(name, description, lowest, LARGEST_PITCH, **more)
+
+
+CONTROLLABLE_PITCH = Effect(
+    name="controllable_pitch",
+    acts_on="propulsion",
+    description="The pitch of the propeller is ordered, and reverses its thrust while it turns as before.",
+    source="Oosterveld and van Oossanen (1975), Wageningen B-series",
+    parameters=(
+        _pitch(
+            "pitch",
+            "ordered pitch over the diameter, negative: astern",
+            -LARGEST_PITCH,
+            input_name="propeller.pitch",
+            typical=(0.6,),
+        ),
+        _pitch("design_pitch", "pitch over the diameter at which the card's thrust is", LEAST_PITCH, typical=(0.8,)),
+        EffectParameter("blades", "number of blades", 2.0, 7.0, 4.0),
+        EffectParameter("area_ratio", "expanded area of the blades over the disc", 0.3, 1.05, 0.55),
+        EffectParameter(
+            "astern", "thrust at rest with a negative pitch over that with the same ahead", 0.0, 1.0, ASTERN_OF_CAMBER
+        ),
+        EffectParameter(
+            "reversal_s",
+            "least time in which the pitch goes from design_pitch to as much astern, by default 0.7 L/u0",
+            0.1,
+            600.0,
+            # 15 s where L/u0 is 20 s (project choice)
+            lambda card: 0.7 * card.ship.length_m / card.model.speed_mps,
+        ),
+        EffectParameter(
+            "time_constant_s",
+            "time constant of the pitch, by default a twentieth of L/u0",
+            0.01,
+            60.0,
+            lambda card: 0.05 * card.ship.length_m / card.model.speed_mps,
+        ),
+        EffectParameter(
+            "advance_share",
+            "J at u0 and nominal revolutions over design_pitch (of an MMG card its own)",
+            0.3,
+            0.9,
+            ADVANCE_SHARE,
+        ),
+    ),
+    equations=_with_pitch,
+    sought=False,
+    states_behind={"propeller.pitch_actual": "propeller.pitch"},
+    terminal="Propulsion: ordered and actual revolutions and pitch",
+)

@@ -1,0 +1,103 @@
+"""A propeller with controllable pitch: published curves, thrust by hand, and a ship that is stopped by its pitch."""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tank2sim.bundled import bundled_cards
+from tank2sim.cards import parse_card
+from tank2sim.dynamics import build
+from tank2sim.dynamics.effects.controllable_pitch import b_series_thrust, pitch_thrust
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.running import Running
+
+from .ships import N0, RHO, U0, L, added_forces, mariner_text, ship, state, values
+
+PITCH = {"pitch": 0.8, "design_pitch": 0.8}
+
+
+def at_pitch(J: float, pitch: float, astern: float = 0.7) -> float:
+    x = ca.SX.sym("x", 2)
+    thrust = pitch_thrust(x[0], x[1], ca.SX(0.55), ca.SX(4), ca.SX(astern))
+    return float(ca.Function("thrust", [x], [thrust])([J, pitch]))
+
+
+def test_the_series_is_near_the_open_water_curve_of_a_tankers_propeller() -> None:
+    """KP458 of the KVLCC2, P/D 0.721, A_E/A_0 0.431, Z 4: K_T of Yasukawa and Yoshimura (2015), of another series."""
+    for J in (0.0, 0.2, 0.4, 0.6):
+        assert b_series_thrust(J, 0.721, 0.431, 4) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.02)
+
+
+def test_thrust_has_no_step_over_the_pitch_and_falls_with_it() -> None:
+    for J in (0.0, 0.3, 0.7):
+        pitches = np.linspace(-1.4, 1.4, 281)
+        thrust = np.array([at_pitch(J, pitch) for pitch in pitches])
+        assert np.all(np.diff(thrust) > 0) and np.max(np.diff(thrust)) < 0.01
+    assert at_pitch(0.0, 0.0) == 0.0
+    assert at_pitch(0.0, -0.9) == pytest.approx(-0.7 * at_pitch(0.0, 0.9))
+    # blades at zero pitch are plates across the stream: T = 1/2 rho u^2 1.17 A_E, A_E = 0.55 pi/4 D^2
+    assert at_pitch(0.6, 0.0) == pytest.approx(-0.5 * 0.6**2 * 1.17 * 0.55 * math.pi / 4)
+    assert at_pitch(0.5, 0.9) == pytest.approx(b_series_thrust(0.5, 0.9, 0.55, 4))
+
+
+def test_a_polynomial_gains_the_difference_of_the_thrusts_and_nothing_at_its_design_pitch() -> None:
+    for u, pitch, share in ((5.0, 1.1, 1.0), (3.0, -0.6, 0.8), (0.0, 0.3, 0.5)):
+        at = {**state(u, 0.0, 0.0), "propeller.pitch_actual": pitch, "propeller.speed": share * N0}
+        J_0 = 0.7 * 0.8
+        J = J_0 * (u / U0) / share
+        change = (at_pitch(J, pitch) - at_pitch(J, 0.8)) / at_pitch(J_0, 0.8)
+        expected = 0.5 * RHO * L**2 * U0**2 * 77e-5 * share**2 * change
+        np.testing.assert_allclose(
+            added_forces("controllable_pitch", PITCH, at), [expected, 0, 0], rtol=1e-9, atol=1e-3
+        )
+    designed = {**state(6.0, 0.3, 0.002), "propeller.pitch_actual": 0.8}
+    np.testing.assert_array_equal(added_forces("controllable_pitch", PITCH, designed), 0.0)
+
+
+def test_a_negative_pitch_stops_the_ship_with_the_propeller_turning_ahead() -> None:
+    model = ship({"controllable_pitch": PITCH})
+    running = Running(Integrator(model), {"propeller.speed": N0, "propeller.pitch": -0.8}, {})
+    running.run(3.0)
+    swift = 2 * 0.8 / (0.7 * L / U0)
+    assert running.state("propeller.pitch_actual") == pytest.approx(0.8 - 3.0 * swift, abs=0.01)
+    running.run(900.0)
+    assert running.state("motion.u") < 0.0
+    assert running.state("propeller.pitch_actual") == pytest.approx(-0.8, abs=1e-6)
+
+
+def test_on_an_mmg_card_the_thrust_and_the_race_on_the_rudder_change() -> None:
+    text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
+    added = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
+    model, bare = (build(parse_card(one, "ship.toml")) for one in (text + added, text))
+    u, n, D = 0.9, 10.0, 0.216
+    at = {"motion.u": u, "propeller.speed": 2 * math.pi * n}
+    J = 0.6 * u / (n * D)
+    names = ["propeller.thrust", "rudder.inflow"]
+    for pitch in (0.72, 1.0, 0.5):
+        found, without = values(model, names, {**at, "propeller.pitch_actual": pitch}), values(bare, names, at)
+        change = 1000.0 * n**2 * D**4 * (at_pitch(J, pitch) - at_pitch(J, 0.72))
+        assert found[0] - without[0] == pytest.approx(change, rel=1e-9, abs=1e-9)
+        assert np.sign(found[1] - without[1]) == np.sign(pitch - 0.72)
+    assert not [name for name in model.outputs if name.startswith(("propeller.torque", "propeller.power"))]
+
+
+def test_validity_falls_below_the_pitches_of_the_series() -> None:
+    model = ship({"controllable_pitch": PITCH})
+    factors = [
+        values(model, ["validity_by.pitch"], {**state(6.0, 0.0, 0.0), "propeller.pitch_actual": pitch})[0]
+        for pitch in (0.8, 0.5, 0.25, 0.0, -0.6)
+    ]
+    assert factors == pytest.approx([1.0, 1.0, 0.5, 0.0, 0.0])
+
+
+def test_a_ship_without_engine_and_an_order_in_degrees_are_refused() -> None:
+    with pytest.raises(InputError, match=r"propulsion: is missing"):
+        ship({"controllable_pitch": PITCH}, mariner_text().split("[propulsion]")[0])
+    with pytest.raises(InputError) as caught:
+        ship({"controllable_pitch": PITCH}).input_values({"propeller.pitch": 20.0})
+    assert caught.value.place == "propeller.pitch"

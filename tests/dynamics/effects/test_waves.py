@@ -1,0 +1,242 @@
+"""Irregular waves: the sea against its spectrum, drift against an integral, motions against the surface's slope."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from tank2sim.cards.wave_table import DRIFT_COLUMNS, motion_columns
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+
+from .ships import FORCES, G, forces, mariner_text, ship, state, values
+
+SEA = {"height_m": 2.0, "period_s": 8.0, "direction_deg": 40.0}
+FREQUENCIES = np.linspace(0.25, 2.0, 36)
+DIRECTIONS = np.arange(0.0, 181.0, 15.0)
+REST = state(0.0, 0.0, 0.0)
+
+Answer = Callable[[float, float], complex]
+
+
+def table(
+    motions: Mapping[str, Answer] = {}, drift: Mapping[str, Answer] = {}, at: Sequence[float] = FREQUENCIES
+) -> str:
+    """A card's text with what these functions of frequency (rad/s) and direction (rad) give in ``[waves]``."""
+    columns = ["frequency_radps", "direction_deg", *(name for one in motions for name in motion_columns(one))]
+    columns += [DRIFT_COLUMNS[force] for force in drift]
+    rows = []
+    for frequency in at:
+        for direction in DIRECTIONS:
+            given = [complex(one(frequency, np.radians(direction))) for one in motions.values()]
+            row = [frequency, direction, *(part for one in given for part in (abs(one), np.degrees(np.angle(one))))]
+            rows.append(
+                [float(value) for value in (*row, *(one(frequency, np.radians(direction)) for one in drift.values()))]
+            )
+    card = mariner_text().split("[waves]")[0]
+    return f'{card}[waves]\nsource = "made up"\ncolumns = {columns}\nrows = {rows}\n'
+
+
+def long_wave(frequency: float) -> float:
+    return frequency**2 / G
+
+
+FLAT = {
+    "heave": lambda w, b: -1.0,
+    "roll": lambda w, b: -1j * long_wave(w) * np.sin(b),
+    "pitch": lambda w, b: 1j * long_wave(w) * np.cos(b),
+}
+"""A float that follows the surface, by the signs of the manual: heave down, roll to starboard, pitch bow up."""
+
+
+def sea_ship(text: str, **more: float) -> Model:
+    return ship({"waves": {**SEA, **more}}, text)
+
+
+def bretschneider(w: float) -> float:
+    """ITTC 7.5-02-07-01.1, with A and B of the significant height and T_1 = 0.772 T_p."""
+    height, mean = SEA["height_m"], 0.772 * SEA["period_s"]
+    return 173 * height**2 / mean**4 / w**5 * np.exp(-691 / mean**4 / w**4)
+
+
+def jonswap(w: float, peakedness: float) -> float:
+    """DNV-RP-C205, 3.5.5.1."""
+    peak = 2 * np.pi / SEA["period_s"]
+    width = 0.07 if w <= peak else 0.09
+    pierson = 5 / 16 * SEA["height_m"] ** 2 * peak**4 * w**-5 * np.exp(-5 / 4 * (w / peak) ** -4)
+    sharper = peakedness ** np.exp(-0.5 * ((w - peak) / (width * peak)) ** 2)
+    return float((1 - 0.287 * np.log(peakedness)) * pierson * sharper)
+
+
+@pytest.mark.parametrize("peakedness", [1.0, 3.3, 5.0])
+def test_the_sea_has_the_significant_height_and_the_spectrum_ordered(peakedness: float) -> None:
+    """A drift coefficient of one makes X twice the variance, near 2 Hs^2/16; that of w^2, twice the second moment."""
+    ends = FREQUENCIES[[0, -1]]
+    model = sea_ship(table(drift={"X": lambda w, b: 1.0}), peakedness=peakedness)
+    variance = quad(lambda w: jonswap(w, peakedness), *ends, points=[2 * np.pi / SEA["period_s"]], limit=200)[0]
+    assert values(model, ["waves.X"], REST)[0] == pytest.approx(2 * variance, rel=0.01)
+    assert variance == pytest.approx(SEA["height_m"] ** 2 / 16, rel=0.05)
+    if peakedness == 1.0:
+        moment = 2 * quad(lambda w: w**2 * bretschneider(w), *ends)[0]
+        curved = sea_ship(table(drift={"X": lambda w, b: w**2}))
+        assert values(curved, ["waves.X"], REST)[0] == pytest.approx(moment, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("u", "v", "psi_deg"), [(6.0, 0.0, 40.0), (6.0, 0.0, 220.0), (5.0, -1.0, 90.0), (0.0, 0.0, 0.0)]
+)
+def test_drift_is_that_at_the_frequency_of_encounter_and_the_relative_direction(
+    u: float, v: float, psi_deg: float
+) -> None:
+    model = sea_ship(
+        table(
+            drift={
+                "X": lambda w, b: -300.0 * w * np.cos(b),
+                "Y": lambda w, b: -900.0 * w * np.sin(b),
+                "N": lambda w, b: 7e3 * w * np.sin(2 * b),
+            }
+        )
+    )
+    beta = np.radians(SEA["direction_deg"] - psi_deg)
+    toward = u * np.cos(beta) + v * np.sin(beta)
+
+    def integrand(w: float) -> float:
+        met = abs(w + w**2 / G * toward)
+        return min(met, FREQUENCIES[-1]) * bretschneider(w)
+
+    integral = 2 * quad(integrand, FREQUENCIES[0], FREQUENCIES[-1], limit=200)[0]
+    expected = integral * np.array([-300 * np.cos(beta), -900 * np.sin(beta), 7e3 * np.sin(2 * beta)])
+    found = values(model, ["waves.X", "waves.Y", "waves.N"], {**state(u, v, 0.0), "motion.psi": np.radians(psi_deg)})
+    np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-6)
+
+
+def test_the_drift_is_what_the_effect_adds_to_the_forces_and_the_phase_of_the_waves_is_not() -> None:
+    text = table(
+        FLAT, {"X": lambda w, b: -1e4, "Y": lambda w, b: -1e5 * np.sin(b), "N": lambda w, b: 1e6 * np.sin(2 * b)}
+    )
+    model = sea_ship(text)
+    bare = ship({}, text)
+    at = state(6.0, 0.3, 0.004)
+    added = forces(model, at) - forces(bare, at)
+    np.testing.assert_allclose(added, values(model, ["waves.X", "waves.Y", "waves.N"], at), rtol=1e-9, atol=1e-6)
+    later = {**at, "waves.clock": 100.0}
+    np.testing.assert_array_equal(forces(model, later), forces(model, at))
+    assert values(model, ["waves.heave"], later) != values(model, ["waves.heave"], at)
+
+
+def test_a_float_follows_the_surface_and_its_slope() -> None:
+    """Its heave is the surface, its roll and pitch the slope of the surface across and along, by finite differences."""
+    model = sea_ship(table(FLAT))
+    psi, step = 0.9, 0.01
+    for clock in (0.0, 33.0):
+        at = {**REST, "motion.x": 500.0, "motion.y": -300.0, "motion.psi": psi, "waves.clock": clock}
+
+        def surface(forward: float, starboard: float, at: Mapping[str, float] = at) -> float:
+            north = forward * np.cos(psi) - starboard * np.sin(psi)
+            east = forward * np.sin(psi) + starboard * np.cos(psi)
+            moved = {**at, "motion.x": at["motion.x"] + north, "motion.y": at["motion.y"] + east}
+            return float(values(model, ["waves.elevation"], moved)[0])
+
+        heave, roll, pitch = values(model, ["waves.heave", "waves.roll", "waves.pitch"], at)
+        assert heave == pytest.approx(-surface(0, 0), rel=1e-9)
+        assert pitch == pytest.approx((surface(step, 0) - surface(-step, 0)) / (2 * step), rel=0.02, abs=1e-5)
+        assert roll == pytest.approx(-(surface(0, step) - surface(0, -step)) / (2 * step), rel=0.02, abs=1e-5)
+
+
+def test_a_ship_meets_head_waves_oftener_and_following_ones_more_seldom() -> None:
+    """Nearly regular waves repeat after the period of encounter 2 pi/(w + w^2 U cos(beta)/g)."""
+    w, u = 0.605, 6.0
+    model = sea_ship(table({"heave": lambda w, b: 1.0}, at=[0.6045, 0.6055]), direction_deg=0.0, period_s=2 * np.pi / w)
+    for course in (1.0, -1.0):
+        period = 2 * np.pi / (w + course * w**2 * u / G)
+        times = np.linspace(0.0, 2 * period, 9)
+        series = [
+            values(model, ["waves.elevation"], {**REST, "waves.clock": t, "motion.x": course * u * t})[0] for t in times
+        ]
+        size = np.max(np.abs(series))
+        np.testing.assert_allclose(series[4:], series[:5], atol=0.03 * size)
+        assert np.abs(series[2] + series[0]) < 0.03 * size < 0.3 * np.abs(series[0] - series[2])
+
+
+def test_seas_of_one_seed_are_alike_and_those_of_another_are_not() -> None:
+    model = sea_ship(table(FLAT))
+    first, again, other = (
+        values(model, ["waves.elevation"], {**REST, "waves.clock": 7.0, "waves.seed": seed})[0] for seed in (3, 3, 4)
+    )
+    assert first == again != other
+    series = np.array(
+        [
+            values(model, ["waves.elevation"], {**REST, "waves.clock": 0.0, "waves.seed": seed})[0]
+            for seed in range(1, 301)
+        ]
+    )
+    assert 4 * np.std(series) == pytest.approx(SEA["height_m"], rel=0.1)
+    assert abs(np.mean(series)) < 4 * np.std(series) / np.sqrt(300)
+
+
+def test_waves_from_port_do_the_same_mirrored() -> None:
+    text = table(
+        FLAT, {"X": lambda w, b: -1e4, "Y": lambda w, b: -1e5 * np.sin(b), "N": lambda w, b: 1e6 * np.sin(2 * b)}
+    )
+    names = ["waves.X", "waves.Y", "waves.N", "waves.heave", "waves.roll", "waves.pitch"]
+    starboard, port = (
+        values(sea_ship(text, direction_deg=side * 70.0), names, {**REST, "waves.clock": 5.0}) for side in (1, -1)
+    )
+    np.testing.assert_allclose(port, starboard * [1, -1, -1, 1, -1, 1], rtol=1e-9)
+
+
+def test_the_pose_is_that_of_the_manoeuvre_with_the_motions_on_top() -> None:
+    text = table({"surge": lambda w, b: 1j * np.cos(b), "sway": lambda w, b: 0.5j * np.sin(b), **FLAT})
+    at = {**state(5.0, 0.0, 0.0), "motion.x": 30.0, "motion.y": 40.0, "motion.psi": 0.6, "waves.clock": 3.0}
+    model = sea_ship(text)
+    surge, sway, heave, roll = values(model, ["waves.surge", "waves.sway", "waves.heave", "waves.roll"], at)
+    x, y, z, phi, psi = values(model, ["pose.x", "pose.y", "pose.z", "pose.phi", "pose.psi"], at)
+    north, east = surge * np.cos(0.6) - sway * np.sin(0.6), surge * np.sin(0.6) + sway * np.cos(0.6)
+    np.testing.assert_allclose([x, y, z, phi, psi], [30 + north, 40 + east, heave, roll, 0.6], rtol=1e-12)
+
+
+def test_a_sea_outside_the_frequencies_of_the_table_takes_the_validity() -> None:
+    model = sea_ship(table(FLAT))
+    inside, outside, calm = (
+        values(
+            model,
+            ["validity_by.waves", "validity"],
+            {**state(7.0, 0.0, 0.0), "waves.period": period, "waves.height": h},
+        )
+        for period, h in ((8.0, 2.0), (1.5, 2.0), (1.5, 0.0))
+    )
+    np.testing.assert_array_equal([inside[0], calm[0]], 1.0)
+    assert outside[0] == outside[1] == 0.0
+
+
+def test_a_card_without_a_table_is_refused_in_one_line() -> None:
+    with pytest.raises(InputError, match=r"waves: is missing; .*\[waves\]"):
+        sea_ship(mariner_text().split("[waves]")[0])
+
+
+FAULTS = {
+    "an unknown column": ("heave_amplitude", "bounce_amplitude"),
+    "a missing row": ("[0.25, 0.0,", "#"),
+    "a row of another length": ("[0.25, 0.0,", "[0.25, 0.0, 1.0,"),
+    "a rolling ship in head waves": ("[0.25, 0.0, 1.0, 180.0, 0.0,", "[0.25, 0.0, 1.0, 180.0, 9.0,"),
+    "uneven directions": (" 15.0,", " 20.0,"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_table_that_is_none_is_refused(fault: str) -> None:
+    old, new = FAULTS[fault]
+    text = table(FLAT).replace("], [", "],\n[")
+    assert old in text
+    with pytest.raises(InputError, match="waves"):
+        sea_ship(text.replace(old, new))
+
+
+def test_calm_water_changes_nothing() -> None:
+    text = table(FLAT, {"X": lambda w, b: -1e4})
+    at = state(6.0, 0.3, 0.004)
+    calm = {**at, "waves.height": 0.0}
+    np.testing.assert_array_equal(values(sea_ship(text), FORCES, calm), forces(ship({}, text), at))
