@@ -17,6 +17,8 @@ from tank2sim.api.schemas import KEYS
 from tank2sim.report.results.result_types import kind_of
 from tests.made_results import OWN_DOCUMENTS, RESULTS, marked
 
+PAGES = [name for name in RESULTS if name.split()[0] not in OWN_DOCUMENTS]
+
 
 def commands(kind: type[Result] = Result) -> set[str]:
     return {kind.command} if "command" in vars(kind) else set().union(*map(commands, kind.__subclasses__()))
@@ -49,7 +51,7 @@ def test_results_follow_their_schemas_and_no_others(result, name) -> None:
     assert command in kind_of(without, "r.json").commands.split()
 
 
-@pytest.mark.parametrize("name", [name for name in RESULTS if name.split()[0] not in OWN_DOCUMENTS], scope="module")
+@pytest.mark.parametrize("name", marked(PAGES), scope="module")
 def test_the_command_and_report_give_the_same_page(made, name: str, tmp_path: Path) -> None:
     found = made(name)
     found.to_json(tmp_path / "result.json")

@@ -83,11 +83,10 @@ def faulty(kind, change, shrunk=None, **options):
 def test_a_wrong_column_is_named_and_corrected(kind, name):
     change, column, truth = FAULTS[name]
     record = faulty(kind, change, SHRUNK.get(name))
-    (finding,) = audit_trial(record)
+    right, (finding,) = audit_and_repair(record)
     assert (finding.column, finding.kind) == (column, "fault")
+    assert finding.safe and finding.repair is not None
     assert truth in finding.likely_truth
-    right, applied = repair_trial(record)
-    assert [one.column for one in applied] == [column]
     assert any(truth in notice for notice in right.notices) or "rudder" in name
     for signal in ("u_mps", "v_mps", "r_radps", "delta_rad", "x_m", "y_m"):
         expected = MOTIONS[kind][signal]
@@ -134,15 +133,13 @@ LESSER = {
 def test_lesser_faults_are_noted_with_their_size_and_left_as_they_are(name):
     change, expected, truth = LESSER[name]
     record = faulty("zigzag", change)
-    (finding,) = audit_trial(record)
+    right, (finding,) = audit_and_repair(record)
     assert (finding.kind, finding.safe) == ("note", False)
     assert truth in finding.likely_truth
     error = max(value for key, value in finding.evidence.items() if key.startswith("standard_error"))
     for key, value in expected.items():
         tolerance = {"direction_deg": 8.0, "delay_s": 0.2}.get(key, 5 * error)
         assert finding.evidence[key] == pytest.approx(value, abs=tolerance)
-    right, applied = repair_trial(record)
-    assert not applied
     assert right is record
     if finding.repair is not None and name in ("log", "compass", "gyro"):
         assert not audit_trial(finding.repair(record))
@@ -282,10 +279,10 @@ def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
     assert files, "the folder holds no record"
     for file in files:
         record = read_trial_file(file)
-        (finding,) = [one for one in audit_trial(record) if one.kind == "fault"]
+        right, findings = audit_and_repair(record)
+        (finding,) = [one for one in findings if one.kind == "fault"]
         assert finding.column == "u_mps, v_mps", file
         assert "earth-fixed" in finding.likely_truth
-        right, _ = repair_trial(record)
         assert any("turned to body axes" in notice for notice in right.notices)
         assert np.nanmedian(right.signals["u_mps"]) > 0.5
         # a ship in a turn drifts outward: v against r
@@ -375,8 +372,8 @@ def test_faults_that_depend_on_each_other_are_repaired_one_after_the_other(kind,
     shrink = {of: abs(np.median(changed[of][true[of] != 0] / true[of][true[of] != 0])) for of in changed}
     noise = {of: value * shrink.get(of, 1.0) for of, value in NOISE.items()}
     record = trial({**true, **changed}, noise=noise)
-    assert [one.column for one in audit_trial(record)] == columns
-    right, _ = repair_trial(record)
+    right, findings = audit_and_repair(record)
+    assert [one.column for one in findings] == columns
     for signal in ("delta_rad", "r_radps", "psi_rad", "u_mps", "v_mps", "x_m", "y_m"):
         # half a knot's third digit of the speed, six times the noise of the rest
         np.testing.assert_allclose(right.signals[signal], true[signal], atol=6 * NOISE.get(signal, 0.0) + 1e-9)
@@ -398,10 +395,9 @@ UNKNOWN = {
 def test_a_factor_of_no_unit_is_a_fault_and_left_alone(kind, name):
     change, column = UNKNOWN[name]
     record = trial({**MOTIONS[kind], **change(MOTIONS[kind])})
-    (finding,) = audit_trial(record)
-    assert (finding.column, finding.kind, finding.open) == (column, "fault", True)
-    right, applied = repair_trial(record)
-    assert not applied and right is record
+    right, (finding,) = audit_and_repair(record)
+    assert (finding.column, finding.kind, finding.open, finding.safe) == (column, "fault", True, False)
+    assert right is record
 
 
 def test_without_a_rate_of_turn_half_the_speed_is_not_knots():
@@ -433,9 +429,9 @@ def test_many_spikes_are_left_out_though_some_lie_close_together(name, count):
     rng = np.random.default_rng(3)
     struck = np.sort(rng.choice(np.arange(5, 3995, 4), count, replace=False))
     record.signals[name][struck] += np.deg2rad(40) * rng.choice([-1, 1], count)
-    (finding,) = audit_trial(record)
+    right, (finding,) = audit_and_repair(record)
     assert finding.evidence["spikes"] == count
-    assert np.flatnonzero(np.isnan(repair_trial(record)[0].signals[name])).tolist() == struck.tolist()
+    assert np.flatnonzero(np.isnan(right.signals[name])).tolist() == struck.tolist()
 
 
 @pytest.mark.parametrize(("row", "value"), [(0, -1.7e9), (2000, 1.7e9), (4000, 1.7e9), (4000, 1e15)])
@@ -443,9 +439,8 @@ def test_a_stray_time_is_named_and_its_row_left_out(row, value):
     record = trial(MOTIONS["zigzag"])
     times = record.time_s.copy()
     times[row] = value
-    findings = audit_trial(replace(record, time_s=times))
+    right, findings = audit_and_repair(replace(record, time_s=times))
     assert findings[0].columns == ("t_s",) and findings[0].evidence["first_row"] == row + 1
-    right, _ = repair_trial(replace(record, time_s=times))
     np.testing.assert_array_equal(right.time_s, np.delete(record.time_s, row))
 
 

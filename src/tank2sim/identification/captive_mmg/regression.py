@@ -17,9 +17,9 @@ covariance is the inverse of the normal matrix, and the outer products of what e
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -333,6 +333,7 @@ class _Regression:
         curves = channels + np.repeat(np.arange(columns - 1), points)
         return np.concatenate([np.repeat(np.arange(channels), count), curves])
 
+    @cached_property
     def curve_slopes(self) -> Array:
         """Of the open-water points by the coefficients, (points of K_T and K_Q, k)."""
         blocks = []
@@ -342,25 +343,32 @@ class _Regression:
         return np.vstack(blocks)
 
     @cached_property
-    def _computed(self) -> ca.Function:
-        form = self.tests.form
+    def _computed(self) -> Callable[[bytes], tuple[Array, Array]]:
+        """Readings and their slopes by the coefficients; the last are kept, for both are asked for one by one."""
+        form, count = self.tests.form, len(self.tests.names)
         assert form.model.draught_m is not None
         ratio = form.model.draught_m / form.model.length_m
         units = np.array([ratio if _variable(name).startswith("derivatives") else 1.0 for name in self.names])
-        return computed_readings(self.model, self.names, units, self.tests.channels).map(len(self.tests.names))
+        function = computed_readings(self.model, self.names, units, self.tests.channels).map(count)
+
+        @lru_cache(maxsize=1)
+        def computed(theta: bytes) -> tuple[Array, Array]:
+            forces, jacobian = function(self.tests.motion.T, np.tile(np.frombuffer(theta)[:, None], count))
+            return np.array(forces), np.array(jacobian)
+
+        return computed
 
     def misfit(self, theta: Array) -> Array:
         """Measured less computed, (equations,), N, N m and K_T."""
-        forces, _ = self._computed(self.tests.motion.T, np.tile(theta[:, None], len(self.tests.names)))
-        curve = self.tests.open_water[:, 1:].T.ravel() - self.curve_slopes() @ theta
-        return np.concatenate([(self.tests.readings.T - np.array(forces)).ravel(), curve])
+        forces, _ = self._computed(theta.tobytes())
+        curve = self.tests.open_water[:, 1:].T.ravel() - self.curve_slopes @ theta
+        return np.concatenate([(self.tests.readings.T - forces).ravel(), curve])
 
     def slopes(self, theta: Array) -> Array:
         """Of the misfit, (equations, k)."""
-        count = len(self.tests.names)
-        _, jacobian = self._computed(self.tests.motion.T, np.tile(theta[:, None], count))
-        by_condition = np.array(jacobian).reshape(len(self.tests.channels), count, len(self.names))
-        return -np.vstack([*by_condition, self.curve_slopes()])
+        _, jacobian = self._computed(theta.tobytes())
+        by_condition = jacobian.reshape(len(self.tests.channels), len(self.tests.names), len(self.names))
+        return -np.vstack([*by_condition, self.curve_slopes])
 
     def start(self) -> Array:
         """Means of ordinary ships, no hull but its resistance."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
@@ -72,9 +73,12 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
 def _moves(rudder: Array, rate: Array) -> list[_Move]:
     """Movements out of a rest, each with a window as long before as after it, up to the next."""
     starts: list[tuple[int, int, int]] = []
+    width = 5 * REACH_ROWS
+    whole = np.median(sliding_window_view(rudder, width), axis=1) if len(rudder) >= width else rudder[:0]
     steady_row, row = 0, 1
     while row < len(rudder):
-        middle = float(np.median(rudder[max(steady_row, row - 5 * REACH_ROWS) : row]))
+        begin = max(steady_row, row - width)
+        middle = float(whole[begin] if row - begin == width else np.median(rudder[begin:row]))
         if abs(rudder[row] - middle) <= STEADY:
             row += 1
             continue

@@ -183,7 +183,8 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
     if np.linalg.matrix_rank(design) < design.shape[1]:
         return None
     lags = 4 * (len(wanted) // int(np.count_nonzero(whole)))
-    result = models.OLS(wanted, design).fit()
+    # No figure used here depends on a constant among the regressors, and looking for one takes two decompositions.
+    result = models.OLS(wanted, design, hasconst=False).fit()
     robust = result.get_robustcov_results(cov_type="HAC", maxlags=lags, use_correction=True)
     residual = float(np.sqrt(np.mean(np.asarray(result.resid) ** 2)))
     errors = np.maximum(np.asarray(result.bse), np.asarray(robust.bse))

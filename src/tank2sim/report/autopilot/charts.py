@@ -15,6 +15,7 @@ from tank2sim.report.kit.analysis_charts import FrequencyResponse
 from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
+    Chart,
     data,
     every,
     pan_zoom,
@@ -61,17 +62,17 @@ def nyquist_chart(
     turn = np.linspace(0, 2 * math.pi, 121)
     circle = records("", {"re": -1 + np.cos(turn) / sensitivity_peak, "im": np.sin(turn) / sensitivity_peak})
     zero = [
-        alt.Chart(data([{key: 0.0}])).mark_rule(style="reference", clip=True).encode(**{axis: scale})
+        Chart(data([{key: 0.0}])).mark_rule(style="reference", clip=True).encode(**{axis: scale})
         for key, axis, scale in (("re", "x", x), ("im", "y", y))
     ]
-    lines = alt.Chart(data(rows), name="plot").mark_line(clip=True)
-    unseen = alt.Chart(data(every(rows, 300))).mark_point(opacity=0, filled=True, size=110, clip=True)
-    critical = alt.Chart(data([{"re": -1.0, "im": 0.0}])).mark_point(
+    lines = Chart(data(rows), name="plot").mark_line(clip=True)
+    unseen = Chart(data(every(rows, 300))).mark_point(opacity=0, filled=True, size=110, clip=True)
+    critical = Chart(data([{"re": -1.0, "im": 0.0}])).mark_point(
         style="limit", shape=CROSS, size=90, strokeWidth=2, clip=True
     )
     layers = [
         *zero,
-        alt.Chart(data(circle)).mark_line(style="limit", clip=True, strokeWidth=1.2).encode(x=x, y=y, order="i:Q"),
+        Chart(data(circle)).mark_line(style="limit", clip=True, strokeWidth=1.2).encode(x=x, y=y, order="i:Q"),
         lines.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q"),
         unseen.encode(x=x, y=y, tooltip=_NYQUIST_TOOLTIP),
         critical.encode(x=x, y=y),
@@ -106,9 +107,9 @@ def sensitivity_chart(
         alt.Tooltip("w:Q", title="frequency (rad/s)", format=NUMBER),
         alt.Tooltip("v:Q", title="magnitude (dB)", format=NUMBER),
     ]
-    zero = alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
-    lines = alt.Chart(data(rows), name="plot").mark_line(clip=True)
-    unseen = alt.Chart(data(every(rows, 300))).mark_point(opacity=0, filled=True, size=110, clip=True)
+    zero = Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
+    lines = Chart(data(rows), name="plot").mark_line(clip=True)
+    unseen = Chart(data(every(rows, 300))).mark_point(opacity=0, filled=True, size=110, clip=True)
     layers = [
         zero,
         lines.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q"),
@@ -143,8 +144,8 @@ def cross_track_chart(
         rows += records(run.label, {"t": time[kept], "v": error[kept]})
     x = alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False))
     y = alt.Y("v:Q", title="cross-track error (m)")
-    zero = alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
-    lines = alt.Chart(data(rows), name="plot").mark_line(clip=True)
+    zero = Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
+    lines = Chart(data(rows), name="plot").mark_line(clip=True)
     layers = [zero, lines.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q")]
     return alt.layer(*layers, params=[pan_zoom("x", views=["plot"])]).properties(
         title=title,

@@ -14,6 +14,7 @@ from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
     POINT_SAMPLES,
+    Chart,
     ChartRecord,
     Position,
     SeriesLook,
@@ -138,10 +139,10 @@ def force_chart(
     low, high = extent(np.array([row["v"] for row in (*points, *lines)], dtype=float))
     # A line at zero far from the values would squeeze them into an edge of the chart.
     zero = [{"v": 0.0}] if low <= 0 <= high else []
-    layers = [alt.Chart(data(zero)).mark_rule(style="reference", clip=True).encode(y="v:Q")] if zero else []
+    layers = [Chart(data(zero)).mark_rule(style="reference", clip=True).encode(y="v:Q")] if zero else []
     layers += _bands(lines, x, look)
     if lines:
-        line = alt.Chart(data(lines)).mark_line(clip=True)
+        line = Chart(data(lines)).mark_line(clip=True)
         layers.append(line.encode(x=x, y=y, color=look.colour, order="i:Q"))
     layers += _intervals(points, x, look)
     tooltip = [
@@ -149,7 +150,7 @@ def force_chart(
         alt.Tooltip("x:Q", title=name, format=NUMBER),
         alt.Tooltip("v:Q", title=up, format=NUMBER),
     ]
-    mark = alt.Chart(data(points), name="plot").mark_point(clip=True)
+    mark = Chart(data(points), name="plot").mark_point(clip=True)
     layers.append(mark.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
     labels = ", ".join(run.label for run in series)
     return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
@@ -220,10 +221,10 @@ def harmonic_chart(
         fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in runs if run.fitted is not None]
         y = alt.Y("v:Q", axis=axis_above(f"harmonic {order} of {up}", tickCount=4), scale=alt.Scale(zero=True))
         tooltip = [alt.Tooltip("run:N", title="run"), alt.Tooltip("v:Q", title=up, format=NUMBER)]
-        bars = alt.Chart(data(rows)).mark_bar(opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
+        bars = Chart(data(rows)).mark_bar(opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
         layers = [bars]
         if fits:
-            layers.append(alt.Chart(data(fits)).mark_tick(style="limit", thickness=2).encode(x=x, y=y))
+            layers.append(Chart(data(fits)).mark_tick(style="limit", thickness=2).encode(x=x, y=y))
         panels.append(alt.layer(*layers).properties(width=width_px, height=height_px))
     subtitle = "Bars: measured. Red strokes: fit." if any(run.fitted is not None for run in runs) else ""
     return alt.vconcat(*panels, spacing=14).properties(
@@ -266,8 +267,8 @@ def residual_chart(
         ]
         tooltip = [alt.Tooltip("name:N", title="run"), alt.Tooltip("v:Q", title="residual", format=NUMBER)]
         limits = [{"v": -_USUAL_LIMIT}, {"v": 0.0}, {"v": _USUAL_LIMIT}]
-        rules = alt.Chart(data(limits)).mark_rule(style="reference", strokeDash=[2, 3]).encode(y="v:Q")
-        points = alt.Chart(data(rows)).mark_point()
+        rules = Chart(data(limits)).mark_rule(style="reference", strokeDash=[2, 3]).encode(y="v:Q")
+        points = Chart(data(rows)).mark_point()
         marks = points.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
         panels.append(alt.layer(rules, marks).properties(width=width_px, height=height_px))
     chart = alt.vconcat(*panels, spacing=14).resolve_scale(color="shared", shape="shared")
@@ -295,7 +296,7 @@ def _bands(lines: Sequence[ChartRecord], x: alt.X, look: SeriesLook) -> list[alt
     if colour["legend"] is not None:
         # The legend is shared with the points, and would be as faint as the band.
         colour.legend = alt.Legend(title=None, symbolOpacity=1)
-    area = alt.Chart(data(rows)).mark_area(opacity=BAND_OPACITY, clip=True)
+    area = Chart(data(rows)).mark_area(opacity=BAND_OPACITY, clip=True)
     return [area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q", color=colour)]
 
 
@@ -303,7 +304,7 @@ def _intervals(points: Sequence[ChartRecord], x: alt.X, look: SeriesLook) -> lis
     rows = [row for row in points if "low" in row]
     if not rows:
         return []
-    rule = alt.Chart(data(rows)).mark_rule(style="stem", clip=True)
+    rule = Chart(data(rows)).mark_rule(style="stem", clip=True)
     return [rule.encode(x=x, y=alt.Y("low:Q"), y2="high:Q", color=look.colour)]
 
 
@@ -325,10 +326,10 @@ def _loop_layers(
         raise ValueError(f"no loop has the force {force}")
     layers = []
     if points:
-        mark = alt.Chart(data(points)).mark_point(clip=True, size=14)
+        mark = Chart(data(points)).mark_point(clip=True, size=14)
         layers.append(mark.encode(**position, color=look.colour, shape=look.shape))
     if lines:
-        mark = alt.Chart(data(lines)).mark_line(clip=True)
+        mark = Chart(data(lines)).mark_line(clip=True)
         layers.append(mark.encode(**position, color=look.colour, order="i:Q"))
     return layers
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, data
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, data
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 
@@ -114,8 +114,8 @@ def computed_chart(name: str, readings: Mapping[str, Json], *, size_px: int = 30
     y = alt.Y("c:Q", title=f"{name} computed ({unit})")
     tooltip = [alt.Tooltip("m:Q", title="measured", format=NUMBER), alt.Tooltip("c:Q", title="computed", format=NUMBER)]
     ends = [min(readings["measured"]), max(readings["measured"])]
-    line = alt.Chart(data([{"m": end, "c": end} for end in ends])).mark_line(opacity=0.5).encode(x=x, y=y)
-    dots = alt.Chart(data(points)).mark_circle(size=36, opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
+    line = Chart(data([{"m": end, "c": end} for end in ends])).mark_line(opacity=0.5).encode(x=x, y=y)
+    dots = Chart(data(points)).mark_circle(size=36, opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
     return alt.layer(line, dots).properties(
         title=_CHANNELS[name].capitalize(),
         width=size_px,

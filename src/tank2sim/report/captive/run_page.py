@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    Chart,
     axis_above,
     data,
     records,
@@ -149,18 +150,18 @@ def cycle_chart(series: Sequence[CycleSeries], *, title: str = "", height_px: in
             spread = np.nan_to_num(_numbers(cycle["deviation"]))
             points += records(each.label, {"x": phase, "v": mean, "low": mean - spread, "high": mean + spread})
             lines += records(each.label, {"x": phase, "v": fit})
-        area = alt.Chart(data(points)).mark_area(opacity=BAND_OPACITY, clip=True)
+        area = Chart(data(points)).mark_area(opacity=BAND_OPACITY, clip=True)
         colour = look.colour.copy()
         if len(series) > 1:
             colour.legend = alt.Legend(title=None, symbolOpacity=1)  # it is shared, and would be as faint as the band
         band = area.encode(x=x, y=alt.Y("low:Q", axis=axis_above(up)), y2="high:Q", color=colour)
-        line = alt.Chart(data(lines)).mark_line(clip=True).encode(x=x, y=y, color=look.colour, order="i:Q")
+        line = Chart(data(lines)).mark_line(clip=True).encode(x=x, y=y, color=look.colour, order="i:Q")
         tooltip = [
             alt.Tooltip("run:N", title="run"),
             alt.Tooltip("x:Q", title="phase (deg)", format=NUMBER),
             alt.Tooltip("v:Q", title=up, format=NUMBER),
         ]
-        mark = alt.Chart(data(points)).mark_point(clip=True, size=14)
+        mark = Chart(data(points)).mark_point(clip=True, size=14)
         dots = mark.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
         panels.append(alt.layer(band, line, dots).properties(width=640, height=height_px))
     return stacked(panels, title=title, description=f"Forces over the phase of the motion of {', '.join(labels)}.")

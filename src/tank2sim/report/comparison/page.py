@@ -8,7 +8,7 @@ import altair as alt
 
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
 from tank2sim.marks import assumed_words
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import TrackData, track_chart
 from tank2sim.report.kit.numbers import format_number
@@ -164,7 +164,7 @@ def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[s
     look = series_look(labels[1:], as_points=labels[1:])
     y = alt.Y("name:N", sort=names, title=None)
     points = (
-        alt.Chart(data(rows))
+        Chart(data(rows))
         .mark_point(filled=True, size=60)
         .encode(
             x=alt.X("z:Q", title="difference (standard errors)"),
@@ -179,7 +179,7 @@ def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[s
         )
     )
     limits = (
-        alt.Chart(data([{"z": -BEYOND_STANDARD_ERRORS}, {"z": BEYOND_STANDARD_ERRORS}]))
+        Chart(data([{"z": -BEYOND_STANDARD_ERRORS}, {"z": BEYOND_STANDARD_ERRORS}]))
         .mark_rule(style="limit")
         .encode(x="z:Q")
     )
@@ -213,12 +213,12 @@ def _percent_chart(rows: Sequence[ChartRecord], labels: Sequence[str], assumed: 
     names = list(dict.fromkeys(str(row["name"]) for row in rows))
     look = series_look(labels[1:], as_points=labels[1:])
     y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=180))
-    base = alt.Chart(data(rows)).encode(y=y, color=look.colour)
+    base = Chart(data(rows)).encode(y=y, color=look.colour)
     tooltip = ["run:N", "name:N", alt.Tooltip("percent:Q", title="difference (%)", format=NUMBER)]
     x = alt.X("percent:Q", title=f"difference from {labels[0]} (%)")
     points = base.mark_point(filled=True, size=60).encode(x=x, shape=look.shape, tooltip=tooltip)
     bars = base.mark_rule(strokeWidth=2, opacity=0.6).encode(x="low:Q", x2="high:Q")
-    zero = alt.Chart(data([{"percent": 0.0}])).mark_rule(style="reference").encode(x="percent:Q")
+    zero = Chart(data([{"percent": 0.0}])).mark_rule(style="reference").encode(x="percent:Q")
     chart: alt.LayerChart = alt.layer(zero, bars, points).properties(
         title=f"Figures against the reference{assumed}",
         width=440,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
 
 _WIDTH = 320
@@ -48,7 +48,7 @@ def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> alt
     scale = alt.Scale(domain=[0, most], range=[0, 500])  # from no area for no runs: the legend has only numbers of runs
     size = alt.Size("runs:Q", scale=scale, legend=alt.Legend(title="runs", values=counts, format="d"))
     return (
-        alt.Chart(data(rows))
+        Chart(data(rows))
         .mark_point(filled=True, opacity=0.7)
         .encode(
             x=alt.X("x:Q", title=across, scale=alt.Scale(zero=False, padding=20)),
@@ -79,7 +79,7 @@ def certainty_charts(found: Json, across: str, unit: str) -> list[alt.TopLevelMi
             if y is not None
         ]
         look = series_look([DESIGN, USUAL])
-        base = alt.Chart(data(rows)).encode(
+        base = Chart(data(rows)).encode(
             x=alt.X("x:Q", title=f"time ({unit})", scale=alt.Scale(zero=False)),
             y=alt.Y("y:Q", title="standard error", scale=alt.Scale(zero=True)),
         )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    Chart,
     ChartRecord,
     SeriesLook,
     axis_above,
@@ -120,9 +121,9 @@ def _panel(rows: list[ChartRecord], look: SeriesLook, x: alt.X, y: alt.Axis, *, 
         alt.Tooltip("high:Q", title="95 %", format=NUMBER),
     ]
     banded = [row for row in rows if row["low"] is not None]
-    area = alt.Chart(data(banded)).mark_area(opacity=BAND_OPACITY, clip=True)
-    line = alt.Chart(data(rows)).mark_line(clip=True)
-    unseen = alt.Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
+    area = Chart(data(banded)).mark_area(opacity=BAND_OPACITY, clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
+    unseen = Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
     layers = [
         line.encode(x=x, y=up, color=look.colour, strokeDash=look.dash, detail="part:N", order="i:Q"),
         area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q", color=look.colour, detail="band:N"),

@@ -15,7 +15,7 @@ from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
 from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.charts import SETS, small
 from tank2sim.report.gap.text import as_percent, or_nan, trial_name
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, extent, plain, series_look, with_unit
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, extent, plain, series_look, with_unit
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
 from tank2sim.units import in_words
@@ -85,8 +85,8 @@ def lacking_chart(lacking: Json, *, title: str = "") -> alt.HConcatChart:
         alt.Tooltip("s:Q", title=across, format=NUMBER),
         alt.Tooltip("f:Q", title=up, format=NUMBER),
     ]
-    cloud = alt.Chart(data(cloud_rows)).mark_point(style="reference", size=12, opacity=0.45, clip=True)
-    zero = alt.Chart(data([{"f": 0.0}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(y="f:Q")
+    cloud = Chart(data(cloud_rows)).mark_point(style="reference", size=12, opacity=0.45, clip=True)
+    zero = Chart(data([{"f": 0.0}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(y="f:Q")
     layers = [zero, cloud.encode(x=x, y=y, tooltip=tooltip), *_means(mean_rows, across, up)]
     main = alt.layer(*layers).properties(width=400, height=280)
     shares = alt.hconcat(main, _explained(lacking), spacing=24)
@@ -108,7 +108,7 @@ def when_chart(lacking: Json, *, title: str = "") -> alt.LayerChart:
     largest = float(np.quantile(np.abs([row["f"] or 0.0 for row in rows]), 0.98)) or 1.0 if rows else 1.0
     up = with_unit(f"missing {what.words}", what.unit)
     scale = alt.Scale(domain=[-largest, 0, largest], range=list(DIVERGING), type="linear", clamp=True)
-    base = alt.Chart(data(rows)).encode(
+    base = Chart(data(rows)).encode(
         x=alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False)),
         x2="to:Q",
         y=alt.Y("trial:N", sort=names, axis=alt.Axis(title=None, labelLimit=220)),
@@ -136,8 +136,8 @@ def _means(rows: Sequence[ChartRecord], across: str, up: str) -> list[alt.Chart]
     ]
     drawn = [row | {"run": "mean of a bin"} for row in rows]
     colour = alt.Color("run:N", legend=None)
-    bars = alt.Chart(data([row for row in drawn if row["low"] is not None])).mark_rule(strokeWidth=1.6, clip=True)
-    marks = alt.Chart(data(drawn))
+    bars = Chart(data([row for row in drawn if row["low"] is not None])).mark_rule(strokeWidth=1.6, clip=True)
+    marks = Chart(data(drawn))
     return [
         marks.mark_line(strokeWidth=1.4, clip=True).encode(x="s:Q", y="f:Q", color=colour),
         bars.encode(x="s:Q", y="low:Q", y2="high:Q", color=colour),
@@ -169,7 +169,7 @@ def _bars(
     ticks = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
     x = x.axis(**({"values": ticks} if kind == "symlog" else {"tickCount": 4}))
     y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelExpr=_LINES, labelLimit=200, ticks=False))
-    base = alt.Chart(data(rows)).encode(x=x, y=y)
+    base = Chart(data(rows)).encode(x=x, y=y)
     bars = base.mark_bar(height=11, opacity=0.75, clip=True)
     texts = base.mark_text(align="left", dx=5, fontSize=10.5, style="reference").encode(text="text:N")
     return alt.layer(bars, texts).properties(
@@ -270,14 +270,14 @@ def _agreement_panel(found: Json, name: str, trials: Json, *, named: bool) -> al
         alt.Tooltip("name:N", title="trial"),
         *(alt.Tooltip(f"{key}:Q", format=NUMBER) for key in ("v", "low", "high")),
     ]
-    base = alt.Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
+    base = Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
     layers = [
         base.mark_rule(strokeWidth=1.6, clip=True).encode(x=alt.X("low:Q", scale=scale), x2="high:Q"),
         base.mark_point(size=36, clip=True).encode(x=x, shape=look.shape),
     ]
     if middle is not None:
         span = {"low": plain(middle - band), "high": plain(middle + band), "v": plain(middle)}
-        estimated = alt.Chart(data([span]))
+        estimated = Chart(data([span]))
         shade = estimated.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
         layers = [shade, estimated.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
     title = small(f"{effect.replace('_', ' ')}: {words}")

@@ -26,6 +26,7 @@ from tank2sim.report.identification.charts import (
 from tank2sim.report.kit.before_after import before_after_switch, misfit_maps, switch
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    Chart,
     ChartRecord,
     SeriesLook,
     axis_above,
@@ -184,9 +185,9 @@ def _place_panels(replay: Json, place: Json, sigma: float) -> alt.VConcatChart:
     below = _over_time(
         residuals, times, with_unit("simulated − measured", name.unit), look, labelled=True, included=(-band, band)
     )
-    noise = alt.Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
+    noise = Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
     begin, end = or_nan(place["t_start_s"]), or_nan(place["t_end_s"])
-    spans = alt.Chart(data([{"from": plain(begin), "to": plain(end)}])).mark_rect(style="region", clip=True)
+    spans = Chart(data([{"from": plain(begin), "to": plain(end)}])).mark_rect(style="region", clip=True)
     when = spans.encode(x="from:Q", x2="to:Q")
     behind = [when] if (begin, end) != times else []
     return alt.vconcat(
@@ -216,11 +217,11 @@ def _over_time(
         alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
         alt.Tooltip("v:Q", title=up, format=NUMBER),
     ]
-    lines = alt.Chart(data([row for row in rows if row["run"] != MEASURED])).mark_line(clip=True, strokeWidth=1.5)
+    lines = Chart(data([row for row in rows if row["run"] != MEASURED])).mark_line(clip=True, strokeWidth=1.5)
     lines = lines.transform_filter(before_after_switch(MODEL_SERIES))
     drawn = [lines.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q", tooltip=tooltip)]
     if points := [row for row in rows if row["run"] == MEASURED]:
-        marks = alt.Chart(data(points)).mark_point(clip=True, size=14, strokeWidth=1)
+        marks = Chart(data(points)).mark_point(clip=True, size=14, strokeWidth=1)
         drawn.insert(0, marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
     return drawn
 

@@ -12,7 +12,7 @@ import altair as alt
 from tank2sim.gap.fleet.summary import REPORT_FILE, FleetSummary, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
-from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, data, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Link, Page, PageSection, PageTable, Verdict
 
@@ -117,7 +117,7 @@ def _misfit_chart(found: list[ShipSummary]) -> alt.LayerChart | None:
     look = series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER])
     y = alt.Y("ship:N", sort=[ship.folder for ship in found], title=None)
     points = (
-        alt.Chart(data(rows))
+        Chart(data(rows))
         .mark_point(filled=True, size=70)
         .encode(
             x=alt.X("misfit:Q", title="misfit (standard deviations of the noise)", scale=alt.Scale(type="log")),
@@ -131,7 +131,7 @@ def _misfit_chart(found: list[ShipSummary]) -> alt.LayerChart | None:
             ],
         )
     )
-    noise = alt.Chart(data([{"misfit": 1.0}])).mark_rule(style="limit").encode(x="misfit:Q")
+    noise = Chart(data([{"misfit": 1.0}])).mark_rule(style="limit").encode(x="misfit:Q")
     chart: alt.LayerChart = alt.layer(noise, points).properties(
         title="Misfit before and after",
         width=620,

@@ -16,6 +16,7 @@ from tank2sim.report.kit.chart_parts import (
     HOVER_SAMPLES,
     LINE_SAMPLES,
     NUMBER,
+    Chart,
     ChartRecord,
     data,
     equal_frame,
@@ -110,8 +111,8 @@ def polar_chart(polar: Json, marked: Mapping[str, Mapping[str, Json]], *, title:
         alt.Tooltip("angle:Q", title="path angle (deg)", format=NUMBER),
     ]
     rows = records("polar", {"x": across, "y": down, "angle": angle})
-    line = alt.Chart(data(rows)).mark_line(clip=True).encode(x=x, y=y, order="i:Q").properties(name="plot")
-    hover = alt.Chart(data(every(rows, HOVER_SAMPLES))).mark_point(opacity=0, filled=True, size=110)
+    line = Chart(data(rows)).mark_line(clip=True).encode(x=x, y=y, order="i:Q").properties(name="plot")
+    hover = Chart(data(every(rows, HOVER_SAMPLES))).mark_point(opacity=0, filled=True, size=110)
     points = [
         {
             "run": label,
@@ -122,7 +123,7 @@ def polar_chart(polar: Json, marked: Mapping[str, Mapping[str, Json]], *, title:
         for label, glide in marked.items()
     ]
     look = series_look(list(marked), as_points=list(marked))
-    dots = alt.Chart(data(points)).mark_point(size=90, strokeWidth=2)
+    dots = Chart(data(points)).mark_point(size=90, strokeWidth=2)
     layers = [
         line,
         hover.encode(x=x, y=y, tooltip=tooltip),
@@ -177,7 +178,7 @@ def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str],
         alt.Tooltip("t:Q", title=titles[0], format=NUMBER),
         alt.Tooltip("e:Q", title=titles[1], format=NUMBER),
     ]
-    base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour)
+    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
     line = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
     dots = base.mark_point(clip=True, filled=True).encode(tooltip=tooltip)
     text = ", ".join(label for label, _, _ in series)
@@ -212,10 +213,10 @@ def _plane(
     for label, x, y in drawn:
         kept = thin_line([x, y], LINE_SAMPLES)
         rows += records(label, {"a": x[kept], "b": y[kept]})
-    line = alt.Chart(data(rows)).mark_line(clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
     layers = [line.encode(**position, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")]
     if arms:
-        base = alt.Chart(data(list(arms))).encode(**position)
+        base = Chart(data(list(arms))).encode(**position)
         layers.append(
             base.mark_line(style="reference", strokeWidth=0.8, clip=True).encode(detail="axis:N", order="i:Q")
         )

@@ -14,6 +14,7 @@ from tank2sim.records.thinning import Indices, thin_points
 from tank2sim.report.kit.before_after import before_after_switch, switch
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    Chart,
     ChartRecord,
     Position,
     axis_above,
@@ -199,7 +200,7 @@ def _window_map(
         alt.Tooltip("text:N", title="share (%)"),
         alt.Tooltip("error:N", title="rms error"),
     ]
-    base = alt.Chart(data(rows)).encode(x=x, y=y, tooltip=tooltip)
+    base = Chart(data(rows)).encode(x=x, y=y, tooltip=tooltip)
     cells = base.mark_rect().encode(color=alt.Color("share:Q", scale=colours, legend=legend))
     ink = alt.condition("datum.share > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
     numbers = base.mark_text(fontSize=10.5).encode(text="text:N", color=ink)
@@ -272,13 +273,13 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
         alt.Tooltip("predicted:Q", title=f"predicted ({unit})", format=NUMBER),
         alt.Tooltip("error:Q", title=f"error ({error_unit})", format=NUMBER),
     ]
-    line = alt.Chart(data([{"a": value, "b": value} for value in scale.domain]))
+    line = Chart(data([{"a": value, "b": value} for value in scale.domain]))
     equal = line.mark_line(style="reference", strokeWidth=1).encode(
         x=alt.X("a:Q", scale=scale, title=f"measured {words} ({unit})", axis=alt.Axis(tickCount=5)),
         y=alt.Y("b:Q", scale=scale, title=f"predicted {words} ({unit})", axis=alt.Axis(tickCount=5)),
     )
-    base = alt.Chart(data(reached)).encode(color=look.colour, shape=look.shape, tooltip=tooltip)
-    bars = alt.Chart(data(reached)).mark_rule(strokeWidth=1.2, clip=True).encode(color=look.colour)
+    base = Chart(data(reached)).encode(color=look.colour, shape=look.shape, tooltip=tooltip)
+    bars = Chart(data(reached)).mark_rule(strokeWidth=1.2, clip=True).encode(color=look.colour)
     points = base.mark_point(filled=False, size=46).encode(
         x=alt.X("measured:Q", scale=scale), y=alt.Y("predicted:Q", scale=scale)
     )
@@ -293,7 +294,7 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
         ),
         y=y,
     )
-    zero = alt.Chart(data([{"error": 0.0}])).mark_rule(style="reference").encode(x="error:Q")
+    zero = Chart(data([{"error": 0.0}])).mark_rule(style="reference").encode(x="error:Q")
     return alt.hconcat(
         alt.layer(equal, bars.encode(x="measured:Q", y="low:Q", y2="high:Q"), points).properties(width=210, height=210),
         alt.layer(zero, bars.encode(x="least:Q", x2="most:Q", y=y), errors).properties(
@@ -338,7 +339,7 @@ def _marks(position: Position, tooltip: Sequence[alt.Tooltip]) -> list[alt.Chart
 
 
 def _drawn(kind: str, sign: str, encoding: ChartRecord, **mark: float) -> alt.Chart:
-    return alt.Chart(
+    return Chart(
         mark={"type": kind, "clip": True, **mark},
         encoding=alt.FacetedEncoding(**encoding),
         transform=[{"filter": f"datum.run {sign} '{MEASURED}'"}, {"filter": before_after_switch(MODEL_SERIES)}],

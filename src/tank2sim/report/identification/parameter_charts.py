@@ -8,7 +8,7 @@ import altair as alt
 
 from tank2sim.identification.trials.as_json import as_number, value_with_error
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
 
 _NORMAL = 1.959964
@@ -36,15 +36,15 @@ def parameter_chart(parameters: Mapping[str, Json], *, title: str = "") -> alt.H
     look = series_look(["estimate", "prior"], as_points=["estimate", "prior"])
     bands = [row | {"run": "prior", "v": 0.0, "low": -_NORMAL, "high": _NORMAL} for row in rows]
     found = [row | {"run": "estimate"} for row in rows]
-    layers = [alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(x="v:Q")]
+    layers = [Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(x="v:Q")]
     for these_rows, offset in ((found, -4), (bands, 4)):
-        base = alt.Chart(data(these_rows)).encode(y=y, color=look.colour, tooltip=tooltip)
+        base = Chart(data(these_rows)).encode(y=y, color=look.colour, tooltip=tooltip)
         layers.append(base.mark_rule(strokeWidth=1.8, yOffset=offset).encode(x=alt.X("low:Q"), x2="high:Q"))
         layers.append(base.mark_point(size=34, yOffset=offset).encode(x=x, shape=look.shape))
     height = 21 * len(rows)
     bare = alt.Y("name:N", sort=list(parameters), axis=alt.Axis(title=None, labels=False, ticks=False))
     shares = alt.X("share:Q", scale=alt.Scale(domain=[0, 100]), title="information from trials (%)")
-    bars = alt.Chart(data(rows)).mark_bar(height=9, opacity=0.7).encode(x=shares, y=bare, tooltip=tooltip)
+    bars = Chart(data(rows)).mark_bar(height=9, opacity=0.7).encode(x=shares, y=bare, tooltip=tooltip)
     intervals = alt.layer(*layers).properties(width=400, height=height)
     chart = alt.hconcat(intervals, bars.properties(width=150, height=height), spacing=18)
     return chart.properties(
@@ -97,8 +97,8 @@ def posterior_chart(parameters: Mapping[str, Json], posterior: Json, *, title: s
         alt.Tooltip("found:N", title="median"),
         alt.Tooltip("interval:N", title="95 %"),
     ]
-    normal = alt.Chart(data([{"low": -_NORMAL, "high": _NORMAL}])).mark_rect(style="reference", opacity=0.15)
-    base = alt.Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
+    normal = Chart(data([{"low": -_NORMAL, "high": _NORMAL}])).mark_rect(style="reference", opacity=0.15)
+    base = Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
     layers = [
         normal.encode(x=alt.X("low:Q"), x2="high:Q"),
         base.mark_rule(strokeWidth=1.4).encode(x=alt.X("low:Q"), x2="high:Q"),
@@ -128,9 +128,9 @@ def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
     colour = alt.Color(
         "c:Q", scale=alt.Scale(domain=[-1, 1], scheme="blueorange"), legend=alt.Legend(gradientLength=180)
     )
-    cells = alt.Chart(data(rows)).mark_rect().encode(x=x, y=y, color=colour, tooltip=tooltip)
+    cells = Chart(data(rows)).mark_rect().encode(x=x, y=y, color=colour, tooltip=tooltip)
     close = [row for row in rows if row["one"] != row["other"] and abs(row["c"] or 0.0) > CLOSE_CORRELATION]
-    frames = alt.Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
+    frames = Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
     layers = [cells, *([frames.encode(x=x, y=y, tooltip=tooltip)] if close else [])]
     pairs = len(known["correlated_pairs"])
     text = f"Framed: {pairs} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
@@ -151,8 +151,8 @@ def singular_value_chart(values: Sequence[float], *, title: str = "") -> alt.Lay
     x = x.axis(format="d", tickMinStep=1)
     y = alt.Y("v:Q", title="singular value (-)", scale=alt.Scale(type="log"), axis=alt.Axis(format="~g"))
     tooltip = [alt.Tooltip("order:Q", title="direction"), alt.Tooltip("v:Q", title="singular value", format=NUMBER)]
-    line = alt.Chart(data([{"v": 1.0}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(y="v:Q")
-    points = alt.Chart(data(rows)).mark_point(filled=True, size=45).encode(x=x, y=y, tooltip=tooltip)
+    line = Chart(data([{"v": 1.0}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(y="v:Q")
+    points = Chart(data(rows)).mark_point(filled=True, size=45).encode(x=x, y=y, tooltip=tooltip)
     return alt.layer(line, points).properties(
         title=title,
         width=620,

@@ -10,7 +10,7 @@ import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
 
 EXACT, DIFFERENCE = "exact slope", "10 % difference"
@@ -103,9 +103,9 @@ def _panel(
         alt.Tooltip("exact:Q", title=f"K, {EXACT} (%)", format=NUMBER),
         alt.Tooltip("step:Q", title=f"K, {DIFFERENCE} (%)", format=NUMBER),
     ]
-    zero = alt.Chart(data([{"k": 0.0}])).mark_rule(style="reference").encode(x=x)
-    drawn = alt.Chart(data(bars)).mark_bar(height=9, opacity=0.65).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
-    marks = alt.Chart(data(points)).mark_point(size=34, strokeWidth=1.6)
+    zero = Chart(data([{"k": 0.0}])).mark_rule(style="reference").encode(x=x)
+    drawn = Chart(data(bars)).mark_bar(height=9, opacity=0.65).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
+    marks = Chart(data(points)).mark_point(size=34, strokeWidth=1.6)
     marked = marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
     return alt.layer(drawn, zero, marked).properties(
         width=width, height=19 * len(names), title=alt.Title(result.figures[row], fontSize=12, anchor="middle")
@@ -141,7 +141,7 @@ def variance_chart(result: InfluenceData) -> alt.Chart:
     axis = alt.Axis(title=None, labelLimit=200, ticks=False)
     scale = alt.Scale(domain=[0, max(10.0, float(shares.max(initial=0.0)))], scheme="blues")
     return (
-        alt.Chart(data(rows))
+        Chart(data(rows))
         .mark_rect()
         .encode(
             x=alt.X("name:N", sort=names, axis=alt.Axis(title=None, labelAngle=-60, ticks=False)),
@@ -177,9 +177,9 @@ def moves_chart(tuned: Json, names: Mapping[str, str]) -> alt.LayerChart:
         alt.Tooltip("z:Q", title="standard errors", format=".3f"),
     ]
     within = tuned["within_standard_errors"]
-    bounds = alt.Chart(data([{"z": -within}, {"z": within}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(x=x)
-    zero = alt.Chart(data([{"z": 0.0}])).mark_rule(style="reference").encode(x=x)
-    bars = alt.Chart(data(rows)).mark_bar(height=10, opacity=0.75).encode(x=x, y=y, tooltip=tooltip)
+    bounds = Chart(data([{"z": -within}, {"z": within}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(x=x)
+    zero = Chart(data([{"z": 0.0}])).mark_rule(style="reference").encode(x=x)
+    bars = Chart(data(rows)).mark_bar(height=10, opacity=0.75).encode(x=x, y=y, tooltip=tooltip)
     return alt.layer(bars, zero, bounds).properties(
         width=_WIDTH,
         height=max(60, 20 * len(shown)),

@@ -14,6 +14,7 @@ from tank2sim.records.thinning import thin_line
 from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
+    Chart,
     ChartRecord,
     SeriesLook,
     axis_above,
@@ -109,13 +110,13 @@ def pole_zero_chart(
         *(alt.Tooltip(f"{key}:Q", title=name, format=NUMBER) for key, name in _POLE_TOOLTIP.items()),
     ]
     edge = alt.value(frame.width_px)
-    unstable = alt.Chart(data([{"re": 0.0}])).mark_rect(style="region", clip=True).encode(x=x, x2=edge)
+    unstable = Chart(data([{"re": 0.0}])).mark_rect(style="region", clip=True).encode(x=x, x2=edge)
     axes = [
-        alt.Chart(data([{"re": 0.0}])).mark_rule(style="reference", clip=True).encode(x=x),
-        alt.Chart(data([{"im": 0.0}])).mark_rule(style="reference", clip=True).encode(y=y),
+        Chart(data([{"re": 0.0}])).mark_rule(style="reference", clip=True).encode(x=x),
+        Chart(data([{"im": 0.0}])).mark_rule(style="reference", clip=True).encode(y=y),
     ]
     points = (
-        alt.Chart(data(rows))
+        Chart(data(rows))
         .mark_point(size=110, strokeWidth=2, clip=True)
         .encode(x=x, y=y, color=look.colour, shape=kind, tooltip=tooltip)
     )
@@ -153,7 +154,7 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
         alt.Tooltip("error:N", title="largest error"),
         alt.Tooltip("limit:Q", title="limit", format=".2~e"),
     ]
-    base = alt.Chart().encode(y=y)
+    base = Chart().encode(y=y)
     stem = base.mark_rule(style="stem").encode(x=x, x2=alt.value(0), color=verdict)
     point = base.mark_point(size=70, strokeWidth=2).encode(x=x, color=verdict, shape=shape, tooltip=tooltip)
     limit = base.mark_tick(style="limit", orient="vertical", height=alt.RelativeBandSize(1.0), thickness=2)
@@ -193,8 +194,8 @@ def _bode_panel(rows: list[ChartRecord], look: SeriesLook, y: alt.Axis, frequenc
         alt.Tooltip("w:Q", title="frequency (rad/s)", format=NUMBER),
         alt.Tooltip("v:Q", title=y.title, format=NUMBER),
     ]
-    line = alt.Chart(data(rows)).mark_line(clip=True)
-    unseen = alt.Chart(data(every(rows, 200))).mark_point(opacity=0, filled=True, size=110, clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
+    unseen = Chart(data(every(rows, 200))).mark_point(opacity=0, filled=True, size=110, clip=True)
     return alt.layer(
         line.encode(**position, color=look.colour, strokeDash=look.dash, order="i:Q"),
         unseen.encode(**position, tooltip=tooltip),

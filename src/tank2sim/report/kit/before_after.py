@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import ChartRecord, data
+from tank2sim.report.kit.chart_parts import Chart, ChartRecord, data
 
 BOTH, ALL = "both", "all"
 """The first setting of a switch, and that on paper: two series together, or more of them."""
@@ -80,7 +80,7 @@ def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[
     colours = alt.Scale(type="log", domain=[1, MISFIT_SHOWN], scheme="blues", clamp=True)
     bar = alt.Legend(title="misfit (noise units)", gradientLength=180)  # of all maps alike, which makes it one
     tooltip = [alt.Tooltip("trial:N"), alt.Tooltip("signal:N"), alt.Tooltip("text:N", title="misfit (noise units)")]
-    base = alt.Chart().encode(x=x, y=y, tooltip=tooltip)
+    base = Chart().encode(x=x, y=y, tooltip=tooltip)
     ink = alt.condition("datum.misfit > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
     both = alt.layer(
         base.mark_rect().encode(color=alt.Color("misfit:Q", scale=colours, legend=bar)),

@@ -20,6 +20,7 @@ from tank2sim.records.thinning import thin_line
 from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
+    Chart,
     ChartRecord,
     axis_above,
     data,
@@ -268,15 +269,15 @@ def way_chart(
         alt.Tooltip("x:Q", title="ahead (m)", format=NUMBER),
         alt.Tooltip("y:Q", title="to starboard (m)", format=NUMBER),
     ]
-    line = alt.Chart(data(rows)).mark_line(clip=True).encode(**position, color=_ONE, order="i:Q")
-    hover = alt.Chart(data(every(rows, 90))).mark_point(opacity=0, filled=True, size=110, clip=True)
+    line = Chart(data(rows)).mark_line(clip=True).encode(**position, color=_ONE, order="i:Q")
+    hover = Chart(data(every(rows, 90))).mark_point(opacity=0, filled=True, size=110, clip=True)
     layers = [line.properties(name="plot")]
     if len(polygon):
         corners = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
-        band = alt.Chart(data(corners)).mark_line(style="band", interpolate="linear-closed", strokeWidth=0, clip=True)
+        band = Chart(data(corners)).mark_line(style="band", interpolate="linear-closed", strokeWidth=0, clip=True)
         layers.append(band.encode(**position, order="i:Q"))
     if outlines:
-        hull = alt.Chart(data(outlines)).mark_line(style="hull", interpolate="linear-closed", clip=True)
+        hull = Chart(data(outlines)).mark_line(style="hull", interpolate="linear-closed", clip=True)
         layers.append(hull.encode(**position, order="i:Q", detail="hull:N"))
     layers += [*_dimension_layers(dimensions, position), hover.encode(**position, tooltip=tooltip)]
     described = "; ".join(dimension.text for dimension in dimensions)
@@ -326,20 +327,20 @@ def zigzag_chart(
         alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
         alt.Tooltip("v:Q", title="angle (deg)", format=NUMBER),
     ]
-    base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour)
+    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
     lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
-    targets = alt.Chart(data([{"v": heading_deg}, {"v": -heading_deg}])).mark_rule(style="dimension").encode(y="v:Q")
+    targets = Chart(data([{"v": heading_deg}, {"v": -heading_deg}])).mark_rule(style="dimension").encode(y="v:Q")
     peaks = overshoot_marks(motion, figures, heading_deg, bands or {})
     layers = [lines, targets]
     if edges_deg is not None:
         columns = dict(zip(("t", "low", "high"), (vector(part) for part in edges_deg), strict=True))
-        area = alt.Chart(data(records("heading", columns))).mark_area(style="band", clip=True)
+        area = Chart(data(records("heading", columns))).mark_area(style="band", clip=True)
         layers.append(area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q"))
     if peaks:
-        marked = alt.Chart(data(peaks)).encode(x="t:Q")
+        marked = Chart(data(peaks)).encode(x="t:Q")
         intervals = [peak for peak in peaks if "low" in peak]
         if intervals:
-            interval = alt.Chart(data(intervals)).mark_rule(style="interval", clip=True)
+            interval = Chart(data(intervals)).mark_rule(style="interval", clip=True)
             layers.append(interval.encode(x="t:Q", y="low:Q", y2="high:Q"))
         layers.append(marked.mark_rule(style="overshoot", clip=True).encode(y="from:Q", y2="v:Q"))
         for up in (True, False):
@@ -402,9 +403,9 @@ def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: st
         alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
         alt.Tooltip("v:Q", title="yaw rate (deg/s)", format=NUMBER),
     ]
-    base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour)
-    zero = alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
-    order = alt.Chart(data([{"t": 0.0}])).mark_rule(style="dimension").encode(x="t:Q")
+    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
+    zero = Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
+    order = Chart(data([{"t": 0.0}])).mark_rule(style="dimension").encode(x="t:Q")
     lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
     hover = base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip)
     return alt.layer(lines, zero, order, hover, params=[pan_zoom("x", views=["plot"])]).properties(
@@ -433,7 +434,7 @@ def stop_speed_chart(motion: Motion, *, title: str = "") -> alt.VConcatChart:
         kept = thin_line([values, motion.way_m], LINE_SAMPLES)
         rows = records("run", {"s": motion.way_m[kept], "v": values[kept], "t": motion.time_s[kept]})
         axis = alt.Axis(title="distance along the track (m)" if last else None, labels=last, ticks=last)
-        base = alt.Chart(data(rows)).encode(
+        base = Chart(data(rows)).encode(
             x=alt.X("s:Q", scale=alt.Scale(nice=False), axis=axis),
             y=alt.Y("v:Q", axis=axis_above(title_of_axis), scale=alt.Scale(zero=True)),
         )
@@ -535,7 +536,7 @@ def _dimension_layers(dimensions: Sequence[Dimension], position: Mapping[str, ob
 
 
 def _rules(rows: Sequence[ChartRecord], style: str, position: Mapping[str, object]) -> alt.Chart:
-    return alt.Chart(data(rows)).mark_rule(style=style, clip=True).encode(**position, x2="y2:Q", y2="x2:Q")
+    return Chart(data(rows)).mark_rule(style=style, clip=True).encode(**position, x2="y2:Q", y2="x2:Q")
 
 
 def _written(
@@ -544,6 +545,6 @@ def _written(
     """Words on a chart, over a rim in the colour of the paper that keeps them legible."""
     if not rows:
         return []
-    base = alt.Chart(data(rows)).encode(**position, text="text:N")
+    base = Chart(data(rows)).encode(**position, text="text:N")
     aside = {"left": 6, "right": -6}.get(align, 0)
     return [base.mark_text(style=style, dy=dy, dx=aside, align=align) for style in ("rim", "words")]

@@ -16,6 +16,7 @@ from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
     POINT_SAMPLES,
+    Chart,
     ChartRecord,
     Position,
     SeriesLook,
@@ -138,7 +139,7 @@ def track_chart(
     rows = [(track.measured, _track_rows(track, x, y)) for track, x, y in paths]
     position = frame.axes(across=("y:Q", "east y (m)"), up=("x:Q", "north x (m)"))
     starts = [row[0] for measured, row in rows if not measured] or [row[0] for _, row in rows]
-    start = alt.Chart(data(starts)).mark_point(style="start", shape="diamond", tooltip="start", clip=True)
+    start = Chart(data(starts)).mark_point(style="start", shape="diamond", tooltip="start", clip=True)
     layers = _lines_and_points(rows, position, _look(tracks), _track_tooltip(tracks))
     return _in_window(
         [layers[0].properties(name="plot"), *layers[1:], start.encode(**position)],
@@ -206,9 +207,9 @@ def tow_chart(tows: Sequence[Tow], *, title: str = "", width_px: int = 720, heig
         alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
         alt.Tooltip("v:Q", title="measured (m/s)", format=NUMBER),
     ]
-    lines = alt.Chart(data(modelled), name="plot").mark_line(clip=True).encode(x=x, y=y, color=look.colour, order="i:Q")
+    lines = Chart(data(modelled), name="plot").mark_line(clip=True).encode(x=x, y=y, color=look.colour, order="i:Q")
     points = (
-        alt.Chart(data([row for row in measured if row["v"] is not None]))
+        Chart(data([row for row in measured if row["v"] is not None]))
         .mark_point(clip=True)
         .encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
     )
@@ -255,10 +256,10 @@ def spiral_chart(
         alt.Tooltip("d:Q", title="rudder (deg)", format=NUMBER),
         alt.Tooltip("r:Q", title="yaw rate (deg/s)", format=NUMBER),
     ]
-    base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
+    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
     zero = [
-        alt.Chart(data([{"d": 0.0}])).mark_rule(style="reference").encode(x="d:Q"),
-        alt.Chart(data([{"r": 0.0}])).mark_rule(style="reference").encode(y="r:Q"),
+        Chart(data([{"d": 0.0}])).mark_rule(style="reference").encode(x="d:Q"),
+        Chart(data([{"r": 0.0}])).mark_rule(style="reference").encode(y="r:Q"),
     ]
     lines = base.mark_line(clip=True).properties(name="plot")
     points = base.mark_point(clip=True).encode(shape=look.shape, tooltip=tooltip)
@@ -276,7 +277,7 @@ def _loop_layers(rudders: Array, x: alt.X, y: alt.Y) -> list[alt.Chart]:
     """The width of a loop along the line of zero yaw rate, in deg."""
     low, high = sorted(rudders.tolist())
     row = {"d": plain(low), "to": plain(high), "r": 0.0, "middle": plain((low + high) / 2)}
-    base = alt.Chart(data([row | {"text": f"loop {format_number(high - low, 3)}°"}]))
+    base = Chart(data([row | {"text": f"loop {format_number(high - low, 3)}°"}]))
     width = base.mark_rule(style="overshoot", clip=True).encode(x=x, x2="to:Q", y=y)
     words = base.encode(x=alt.X("middle:Q"), y=y, text="text:N")
     return [width, *(words.mark_text(style=style, dy=-11) for style in ("rim", "words"))]
@@ -335,7 +336,7 @@ def _history_layers(runs: Sequence[History], signal: Signal, look: SeriesLook, x
 def _shaded(band: HistoryBand, signal: Signal, x: alt.X) -> alt.Chart:
     factor = shown_unit(signal.unit, signal.display_unit)[1]
     columns = {"t": vector(band.time_s), "low": factor * vector(band.low), "high": factor * vector(band.high)}
-    area = alt.Chart(data(records("band", columns))).mark_area(style="band", clip=True)
+    area = Chart(data(records("band", columns))).mark_area(style="band", clip=True)
     return area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q")
 
 
@@ -347,7 +348,7 @@ def _marked(marks: Sequence[TimeMark], signal: Signal, x: alt.X) -> list[alt.Cha
     if not rows:
         return []
     tooltip = [alt.Tooltip("text:N", title="found"), alt.Tooltip("t:Q", title="from (s)", format=NUMBER)]
-    base = alt.Chart(data(rows)).encode(x=x, tooltip=tooltip)
+    base = Chart(data(rows)).encode(x=x, tooltip=tooltip)
     spans = base.mark_rect(style="region", clip=True).encode(x2="end:Q")
     return [spans, base.mark_rule(style="limit", clip=True, strokeWidth=1.2)]
 
@@ -363,12 +364,12 @@ def _lines_and_points(
     hover = [row for measured, series in rows if not measured for row in every(series, HOVER_SAMPLES)]
     layers = []
     if lines:
-        line = alt.Chart(data(lines)).mark_line(clip=True)
+        line = Chart(data(lines)).mark_line(clip=True)
         layers.append(line.encode(**position, color=look.colour, strokeDash=look.dash, order="i:Q"))
     if points:
-        point = alt.Chart(data(points)).mark_point(clip=True)
+        point = Chart(data(points)).mark_point(clip=True)
         layers.append(point.encode(**position, color=look.colour, shape=look.shape, tooltip=tooltip))
     if hover:
-        unseen = alt.Chart(data(hover)).mark_point(clip=True, opacity=0, filled=True, size=110)
+        unseen = Chart(data(hover)).mark_point(clip=True, opacity=0, filled=True, size=110)
         layers.append(unseen.encode(**position, tooltip=tooltip))
     return layers

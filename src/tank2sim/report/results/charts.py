@@ -20,6 +20,7 @@ from tank2sim.report.kit.before_after import misfit_maps
 from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
+    Chart,
     ChartRecord,
     axis_above,
     data,
@@ -109,7 +110,7 @@ def _panel(
         alt.Tooltip("x:Q", title=words(name)[0], format=NUMBER),
         alt.Tooltip(f"y{panel}:Q", title=words(key)[0], format=NUMBER),
     ]
-    chart = alt.Chart(data(rows))
+    chart = Chart(data(rows))
     encoded = {"x": x, "y": y, "color": _ONE, "order": alt.Order("i:Q"), "detail": alt.Detail("part:N")}
     line = chart.mark_line().encode(**encoded, **({"strokeDash": dash} if truth else {}))
     points = chart.mark_point(size=60, opacity=0).encode(x=x, y=y, tooltip=tooltip)
@@ -131,7 +132,7 @@ def heat_map(
     scale = alt.Scale(scheme="purpleorange" if both else "blues", domain=[-largest if both else 0, largest])
     x = alt.X("column:N", sort=list(across), title=None, axis=alt.Axis(labelAngle=-40))
     y = alt.Y("row:N", sort=list(names), title=None)
-    base = alt.Chart(data(rows)).encode(x=x, y=y)
+    base = Chart(data(rows)).encode(x=x, y=y)
     cells = base.mark_rect().encode(
         color=alt.Color("value:Q", scale=scale, legend=None),
         tooltip=["row:N", "column:N", alt.Tooltip("value:Q", format=NUMBER)],
@@ -174,7 +175,7 @@ def error_bars(heading: str, values: Mapping[str, Mapping[str, Json]]) -> Illust
     low = 10 ** math.floor(math.log10(min(float(row["percent"]) for row in known)))
     scale = alt.Scale(type="log", domainMin=low, nice=False)
     axis = alt.Axis(title="standard error (% of the value)", format="~r")
-    base = alt.Chart(data([{**row, "run": "", "low": low} for row in known])).encode(
+    base = Chart(data([{**row, "run": "", "low": low} for row in known])).encode(
         color=_ONE,
         y=alt.Y("name:N", sort=[row["name"] for row in known], title=None),
         tooltip=["name:N", alt.Tooltip("value:Q", format=NUMBER), alt.Tooltip("percent:Q", format=NUMBER)],
@@ -200,10 +201,10 @@ def force_fit(heading: str, runs: Sequence[Mapping[str, Json]]) -> Illustration 
     diagonal = [{"measured": end, "predicted": end} for end in (min(ends), max(ends))]
     x = alt.X("measured:Q", scale=alt.Scale(zero=False), title="measured")
     y = alt.Y("predicted:Q", scale=alt.Scale(zero=False), axis=axis_above("predicted"))
-    line = alt.Chart(data(diagonal)).mark_line(style="reference").encode(x=x, y=y)
+    line = Chart(data(diagonal)).mark_line(style="reference").encode(x=x, y=y)
     looks = {"color": alt.Color("type:N", legend=alt.Legend()), "shape": alt.Shape("type:N", legend=alt.Legend())}
     tooltip = ["run:N", "type:N", alt.Tooltip("measured:Q", format=NUMBER), alt.Tooltip("predicted:Q", format=NUMBER)]
-    points = alt.Chart(data(rows)).mark_point(size=50).encode(x=x, y=y, tooltip=tooltip, **looks)
+    points = Chart(data(rows)).mark_point(size=50).encode(x=x, y=y, tooltip=tooltip, **looks)
     chart = alt.layer(line, points).properties(width=480, height=340, title=heading)
     return Illustration(
         chart=chart.properties(description=f"{heading}: measured against predicted for {len(rows)} runs."),

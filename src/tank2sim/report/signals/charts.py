@@ -13,6 +13,7 @@ from tank2sim.report.kit.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
     POINT_SAMPLES,
+    Chart,
     ChartRecord,
     axis_above,
     data,
@@ -76,7 +77,7 @@ def spectrum_chart(name: SignalName, spectrum: Json, *, title: str = "") -> alt.
     up = f"power density (({name.unit})²/Hz)"
     scale = alt.Scale(type="log")
     y = alt.Y("v:Q", title=up, scale=scale, axis=alt.Axis(format=".0e", tickCount=8))
-    area = alt.Chart(data(rows)).mark_area(opacity=BAND_OPACITY, clip=True)
+    area = Chart(data(rows)).mark_area(opacity=BAND_OPACITY, clip=True)
     band = area.encode(x=x, y=alt.Y("low:Q", scale=scale), y2="high:Q", color=series_look([label]).colour)
     return _lines(rows, [label], x, y, title, below=[band]).properties(
         description=f"Power spectral density of {name.words} with its 95 % confidence band."
@@ -144,8 +145,8 @@ def _correlation_layers(
     y = alt.Y("v:Q", title="correlation coefficient", scale=alt.Scale(domain=[-1, 1]))
     dashes = [2, 3]
     level_rows, mark_rows = [{"v": plain(level)} for level in levels], [{"x": plain(mark)} for mark in marks_s]
-    rules = alt.Chart(data(level_rows)).mark_rule(style="reference", strokeDash=dashes, clip=True).encode(y="v:Q")
-    marks = alt.Chart(data(mark_rows)).mark_rule(style="limit", strokeDash=dashes, clip=True).encode(x="x:Q")
+    rules = Chart(data(level_rows)).mark_rule(style="reference", strokeDash=dashes, clip=True).encode(y="v:Q")
+    marks = Chart(data(mark_rows)).mark_rule(style="limit", strokeDash=dashes, clip=True).encode(x="x:Q")
     return _lines(rows, [label], x, y, title, below=[rules, marks])
 
 
@@ -165,8 +166,8 @@ def _lines(
 def _curve(rows: list[ChartRecord], labels: Sequence[str], x: alt.X, y: alt.Y) -> tuple[alt.Chart, alt.Chart]:
     """The lines of these series, and points that answer to the pointer."""
     look = series_look(labels)
-    line = alt.Chart(data(rows)).mark_line(clip=True)
-    unseen = alt.Chart(data(every(rows, 200))).mark_point(opacity=0, filled=True, size=110, clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
+    unseen = Chart(data(every(rows, 200))).mark_point(opacity=0, filled=True, size=110, clip=True)
     return (
         line.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q"),
         unseen.encode(x=x, y=y, tooltip=_tooltip(_words(x), _words(y))),
@@ -196,7 +197,7 @@ def _points_panel(rows: list[ChartRecord], span: list[float], axis: alt.Axis, sc
     x, y = _frequency_axis(span, named=False), alt.Y("v:Q", axis=axis, scale=scale)
     # The rows of one panel are one series, the same in all panels.
     colour = series_look([row["run"] for row in rows[:1]]).colour
-    base = alt.Chart(data(rows)).encode(color=colour)
+    base = Chart(data(rows)).encode(color=colour)
     intervals = base.mark_rule(style="stem", clip=True).encode(x=x, y=alt.Y("low:Q", scale=scale), y2="high:Q")
     points = base.mark_point(clip=True).encode(x=x, y=y, tooltip=_tooltip("frequency (Hz)", _words(y)))
     return alt.layer(points, intervals)
@@ -205,7 +206,7 @@ def _points_panel(rows: list[ChartRecord], span: list[float], axis: alt.Axis, sc
 def _coherence_panel(rows: list[ChartRecord], span: list[float], significant: float) -> alt.LayerChart:
     x = _frequency_axis(span, named=True)
     y = alt.Y("v:Q", axis=axis_above("coherence; dotted: by chance"), scale=alt.Scale(domain=[0, 1]))
-    line = alt.Chart(data(rows)).mark_line(clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
     line = line.encode(x=x, y=y, color=series_look([rows[0]["run"]]).colour, order="i:Q")
-    level = alt.Chart(data([{"v": plain(significant)}])).mark_rule(style="limit", strokeDash=[2, 3]).encode(y="v:Q")
+    level = Chart(data([{"v": plain(significant)}])).mark_rule(style="limit", strokeDash=[2, 3]).encode(y="v:Q")
     return alt.layer(line, level)

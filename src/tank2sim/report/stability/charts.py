@@ -13,6 +13,7 @@ from tank2sim.arrays import Array
 from tank2sim.report.kit.analysis_charts import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    Chart,
     ChartRecord,
     SeriesLook,
     axis_above,
@@ -100,12 +101,12 @@ def _turning_panel(
         alt.Tooltip("d:Q", title="rudder (deg)", format=NUMBER),
         alt.Tooltip("v:Q", title=name, format=NUMBER),
     ]
-    line = alt.Chart(data(rows)).mark_line(clip=True)
-    unseen = alt.Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
+    unseen = Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
     layers = [
         line.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, detail="part:N", order="i:Q"),
         unseen.encode(x=x, y=y, tooltip=tooltip),
-        alt.Chart(data([{"d": 0.0}])).mark_rule(style="reference", clip=True).encode(x=x),
+        Chart(data([{"d": 0.0}])).mark_rule(style="reference", clip=True).encode(x=x),
     ]
     points = [
         row
@@ -114,7 +115,7 @@ def _turning_panel(
     ]
     if points:
         layers.append(
-            alt.Chart(data(points))
+            Chart(data(points))
             .mark_point(clip=True)
             .encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
         )
@@ -138,15 +139,15 @@ def _curves(
         alt.Tooltip("x:Q", title=across, format=NUMBER),
         alt.Tooltip("y:Q", title=up, format=NUMBER),
     ]
-    line = alt.Chart(data(rows)).mark_line(clip=True)
-    unseen = alt.Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
+    line = Chart(data(rows)).mark_line(clip=True)
+    unseen = Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
     lines = line.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")
     chart = alt.layer(*marks, lines, unseen.encode(x=x, y=y, tooltip=tooltip), params=[pan_zoom("x", views=["plot"])])
     return chart.properties(width=_WIDTH, height=height)
 
 
 def _level(value: float) -> alt.Chart:
-    return alt.Chart(data([{"y": value}])).mark_rule(style="reference", clip=True).encode(y="y:Q")
+    return Chart(data([{"y": value}])).mark_rule(style="reference", clip=True).encode(y="y:Q")
 
 
 def step_chart(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
@@ -201,8 +202,8 @@ def influence_chart(margins: Json, *, title: str = "") -> alt.LayerChart:
     y = alt.Y("name:N", title=None, sort=names)
     x = alt.X("y:Q", title="change of C′ when the coefficient grows by 10 % (% of |C′|)")
     tooltip = [alt.Tooltip("name:N", title="coefficient"), alt.Tooltip("y:Q", title="change of C′ (%)", format=NUMBER)]
-    bars = alt.Chart(data(rows)).mark_bar(opacity=0.8).encode(x=x, y=y, tooltip=tooltip)
-    zero = alt.Chart(data([{"y": 0.0}])).mark_rule(style="reference").encode(x="y:Q")
+    bars = Chart(data(rows)).mark_bar(opacity=0.8).encode(x=x, y=y, tooltip=tooltip)
+    zero = Chart(data([{"y": 0.0}])).mark_rule(style="reference").encode(x="y:Q")
     return alt.layer(bars, zero).properties(
         title=title,
         width=_WIDTH - 60,
@@ -248,10 +249,10 @@ def criteria_chart(criteria: Sequence[Mapping[str, Json]], *, title: str = "") -
         title=None,
         axis=alt.Axis(labelExpr=_TWO_LINES, labelLineHeight=14),
     )
-    base = alt.Chart(data(rows)).encode(y=y)
+    base = Chart(data(rows)).encode(y=y)
     opacity = alt.condition("datum.beyond", alt.value(0.3), alt.value(0.85))
     bars = base.mark_bar(height=16).encode(x=x, opacity=opacity, tooltip=["name:N"])
-    limit = alt.Chart(data([{"percent": 100.0}])).mark_rule(style="limit", strokeWidth=2).encode(x="percent:Q")
+    limit = Chart(data([{"percent": 100.0}])).mark_rule(style="limit", strokeWidth=2).encode(x="percent:Q")
     return alt.layer(bars, limit).properties(
         title=title,
         width=480,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, pan_zoom, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, pan_zoom, plain, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import TrackData, track_chart
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
@@ -105,11 +105,11 @@ def _diagram(lines: list[ChartRecord], points: list[ChartRecord]) -> alt.LayerCh
         alt.Tooltip("d:Q", title="rudder (deg)", format=NUMBER),
         alt.Tooltip("r:Q", title="yaw rate (deg/min)", format=NUMBER),
     ]
-    line = alt.Chart(data(lines), name="plot").mark_line(clip=True)
-    unseen = alt.Chart(data(lines)).mark_point(opacity=0, filled=True, size=110, clip=True)
+    line = Chart(data(lines), name="plot").mark_line(clip=True)
+    unseen = Chart(data(lines)).mark_point(opacity=0, filled=True, size=110, clip=True)
     below = alt.Legend(title=None, orient="bottom")  # next to the lines they would be too wide for the page
     shape = alt.Shape("run:N", scale=alt.Scale(domain=marked, range=list(SHAPES[: len(marked)])), legend=below)
-    point = alt.Chart(data(points)).mark_point(style="start", filled=False, strokeWidth=1.8, clip=True)
+    point = Chart(data(points)).mark_point(style="start", filled=False, strokeWidth=1.8, clip=True)
     layers = [
         line.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q"),
         unseen.encode(x=x, y=y, tooltip=tooltip),
@@ -158,8 +158,8 @@ def influence_bars(models: Mapping[str, Mapping[str, float]]) -> alt.LayerChart:
     ]
     legend = None if len(labels) == 1 else alt.Legend(title=None, symbolType="square")
     colour = alt.Color("run:N", scale=alt.Scale(domain=labels), legend=legend)
-    bars = alt.Chart(data(rows)).mark_bar(opacity=0.85).encode(x=x, y=y, yOffset=offset, color=colour, tooltip=tooltip)
-    zero = alt.Chart(data([{"K": 0.0}])).mark_rule(style="reference").encode(x="K:Q")
+    bars = Chart(data(rows)).mark_bar(opacity=0.85).encode(x=x, y=y, yOffset=offset, color=colour, tooltip=tooltip)
+    zero = Chart(data([{"K": 0.0}])).mark_rule(style="reference").encode(x="K:Q")
     return alt.layer(bars, zero).properties(
         title="Influence of each coefficient",
         width=620,

@@ -9,7 +9,17 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, pan_zoom, plain, records, series_look, vector
+from tank2sim.report.kit.chart_parts import (
+    NUMBER,
+    Chart,
+    ChartRecord,
+    data,
+    pan_zoom,
+    plain,
+    records,
+    series_look,
+    vector,
+)
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
 
@@ -75,8 +85,8 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
         axis = alt.Axis(format="~s") if across == "re:Q" else alt.Axis()
         x = alt.X(across, title=words, axis=axis, scale=alt.Scale(nice=False))
         y = alt.Y(up, title=name, scale=alt.Scale(domain=_frame(drags, speeds, factors[up]), nice=True))
-        zero = alt.Chart(data([{"zero": 0.0}])).mark_rule(style="reference").encode(y="zero:Q")
-        base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
+        zero = Chart(data([{"zero": 0.0}])).mark_rule(style="reference").encode(y="zero:Q")
+        base = Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
         line = base.mark_line(clip=True).encode(strokeDash=look.dash)
         hover = base.mark_point(opacity=0, filled=True, size=110, clip=True).encode(tooltip=tooltip)
         panels.append(alt.layer(zero, line, hover).properties(width=330, height=300))
@@ -116,7 +126,7 @@ def ellipse_chart(
     look = series_look([*labels, *dots], as_points=dots)
     x = alt.X("m:Q", title="M (kg)", scale=alt.Scale(zero=False))
     y = alt.Y("b:Q", title="B3 (kg/m)", scale=alt.Scale(zero=False))
-    outline = alt.Chart(data(lines)).mark_line(clip=True)
+    outline = Chart(data(lines)).mark_line(clip=True)
     layers = [outline.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")]
     tooltip = [
         alt.Tooltip("run:N", title="of"),
@@ -125,7 +135,7 @@ def ellipse_chart(
         alt.Tooltip("b:Q", title="B3 (kg/m)", format=NUMBER),
     ]
     if points:
-        shown = alt.Chart(data(points)).mark_point(size=70, strokeWidth=1.8, clip=True)
+        shown = Chart(data(points)).mark_point(size=70, strokeWidth=1.8, clip=True)
         layers.append(shown.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
     return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
         title="M and B3 together",
@@ -161,7 +171,7 @@ def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) ->
         alt.Tooltip("high:Q", title="to", format=NUMBER),
         alt.Tooltip("aic:Q", title="AIC above the lowest", format=NUMBER),
     ]
-    base = alt.Chart(data(rows)).encode(y=y, tooltip=tooltip)
+    base = Chart(data(rows)).encode(y=y, tooltip=tooltip)
     scale = alt.Scale(zero=False)
     bars = base.mark_rule(strokeWidth=2).encode(x=alt.X("low:Q", scale=scale), x2="high:Q", color=look.colour)
     marks = base.mark_point(size=70, strokeWidth=2).encode(color=look.colour, shape=look.shape)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, data, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.units import in_words
 
@@ -37,10 +37,10 @@ def comparison_error_chart(figures: Sequence[Mapping[str, Json]], numbers: Mappi
     y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=170))
     outcomes = list(dict.fromkeys(str(row["run"]) for row in rows))
     look = series_look(outcomes, as_points=outcomes)
-    base = alt.Chart(data(rows))
+    base = Chart(data(rows))
     x = alt.X("low:Q", title="per cent of the measured figure")
     bars = base.mark_bar(style="uncertainty", height=14).encode(x=x, x2="high:Q", y=y)
-    zero = alt.Chart(data([{"zero": 0.0}])).mark_rule(style="reference").encode(x="zero:Q")
+    zero = Chart(data([{"zero": 0.0}])).mark_rule(style="reference").encode(x="zero:Q")
     points = base.mark_point(filled=True, size=80).encode(
         x="e:Q",
         y=y,

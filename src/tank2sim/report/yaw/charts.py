@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look, vector
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look, vector
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
 
@@ -53,8 +53,8 @@ def balance_chart(balance: Json, *, width_px: int = 340) -> alt.HConcatChart:
             alt.Tooltip("part:O", title="part"),
             alt.Tooltip("v:Q", title="work (mJ)", format=NUMBER),
         ]
-        stacked = alt.Chart(data(bars)).mark_bar(opacity=0.75).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
-        motors = alt.Chart(data(points)).mark_point(size=60, strokeWidth=2)
+        stacked = Chart(data(bars)).mark_bar(opacity=0.75).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
+        motors = Chart(data(points)).mark_point(size=60, strokeWidth=2)
         motors = motors.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
         panels.append(alt.layer(stacked, motors).properties(width=width_px, height=260))
     title = "Work of the motor, and what it goes into"
@@ -88,8 +88,8 @@ def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int 
         alt.Tooltip("high:Q", title="to", format=NUMBER),
     ]
     x = alt.X("v:Q", scale=scale, title=f"{words} (10⁻⁴ kg m²)")
-    best = alt.Chart(data([{"v": rows[0]["v"]}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(x=x)
-    base = alt.Chart(data(rows)).encode(y=y, tooltip=tooltip)
+    best = Chart(data([{"v": rows[0]["v"]}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(x=x)
+    base = Chart(data(rows)).encode(y=y, tooltip=tooltip)
     bars = base.mark_rule(strokeWidth=2).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
     points = base.mark_point(size=70, filled=True).encode(x=x)
     return alt.layer(best, bars, points).properties(
@@ -118,9 +118,9 @@ def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: 
         alt.Tooltip("hump:O", title="hump"),
         alt.Tooltip("v:Q", title="left over (µJ)", format=NUMBER),
     ]
-    zero = alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
+    zero = Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
     points = (
-        alt.Chart(data(rows))
+        Chart(data(rows))
         .mark_point()
         .encode(
             x=alt.X("w:Q", title="mean rate of the subinterval (deg/s)", scale=alt.Scale(zero=False)),
