@@ -64,7 +64,7 @@ def test_it_fits_a_screen_and_shows_its_charts(path):
     found = t2s.signals(path)
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()
-    assert set(found.charts()) == {"sine_r_density", "sine_r_correlation", "sine_r_spectrum"}
+    assert set(found.charts()) == {"sine_histories", "sine_r_density", "sine_r_autocorrelation", "sine_r_spectrum"}
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def test_errors_are_held_against_their_limits():
     verdicts = [row["verdict"] for row in rows(specification, specification)]
     assert verdicts == ["within the limit", "above the limit", "within the limit", "above the limit"]
     assert "Above the limit: motion.y." in specification["description"]
-    assert specification["facet"]["column"]["sort"] == ["FMI 2 CS", "FMI 3 ME"]
+    assert specification["facet"]["sort"] == ["FMI 2 CS", "FMI 3 ME"]
 
 
 def test_every_error_has_a_place_on_the_logarithmic_scale():

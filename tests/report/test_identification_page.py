@@ -218,8 +218,8 @@ def test_the_page_tells_the_errors_of_what_was_held_out(found) -> None:
     result, content, charts = found
     page = identification_page(content)
     figures = {figure.label: figure for figure in page.figures}
-    assert figures["Trials fitted"].value == figures["Trials held out"].value == 1
-    assert figures["Coefficients"].value == len(OFF)
+    assert figures["Trials held out"].value == 1 and figures["Trials held out"].note == "1 were fitted"
+    assert figures["Numbers fitted"].value == len(OFF)
     (turn,), (before,) = result.holdout.following, result.before_holdout.following
     shown = figures["Yaw-rate error, held out"]
     assert shown.value == pytest.approx(100 * turn.relative("motion.r"), 1e-2) and shown.unit == "%"

@@ -4,8 +4,10 @@ import json
 import re
 from html import escape, unescape
 
+import altair as alt
 import pytest
 
+from tank2sim.report.kit.chart_parts import STACKS
 from tank2sim.report.kit.charts import TrackData, track_chart
 from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
 from tests.report.opened_page import CHROMIUM, opened
@@ -100,7 +102,7 @@ MEASURE = """<script>
 const frame = document.querySelector("iframe");
 const measure = () => {
   const page = frame.contentDocument;
-  if (page?.documentElement.dataset.charts !== "drawn") return setTimeout(measure, 100);
+  if (page?.documentElement?.dataset.charts !== "drawn") return setTimeout(measure, 100);
   const charts = [...page.querySelectorAll(".drawing")].map((drawing) => ({
     room: drawing.clientWidth, chart: drawing.querySelector("svg").width.baseVal.value }));
   document.body.dataset.seen = JSON.stringify({ page: page.documentElement.scrollWidth, charts });
@@ -117,3 +119,41 @@ def test_charts_fit_a_window_of_400_px_at_the_size_of_their_letters(charts, tmp_
     found = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
     assert found["page"] <= 400
     assert all(chart["chart"] <= chart["room"] + 1 for chart in found["charts"]), found
+
+
+PLACES = """<script>
+const frames = [...document.querySelectorAll("iframe")];
+const measure = () => {
+  const pages = frames.map((frame) => frame.contentDocument);
+  if (pages.some((page) => page?.documentElement?.dataset.charts !== "drawn")) return setTimeout(measure, 100);
+  document.body.dataset.seen = JSON.stringify(pages.map((page) => {
+    page.querySelector("details.part").open = true;
+    const tops = (found) => [...found].map((one) => one.getBoundingClientRect())
+      .filter((box) => box.width > 100).map((box) => Math.round(box.top));
+    return {
+      page: page.documentElement.scrollWidth,
+      halves: tops(page.querySelectorAll("figure.half")),
+      panels: tops(page.querySelector("figure:not(.half)").querySelectorAll(".background")),
+      folded: page.querySelector("details.part svg").getBoundingClientRect().width,
+    };
+  }));
+};
+measure();
+</script>"""
+
+
+def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_charts_are_drawn(charts, tmp_path):
+    half = Illustration(chart=charts["track"], half=True)
+    panel = alt.Chart(alt.Data(values=[{"a": 1}])).mark_point().encode(x="a:Q", y="a:Q").properties(width=300)
+    beside = Illustration(chart=alt.hconcat(panel, panel, usermeta=STACKS))
+    sections = [
+        PageSection(heading="First", charts=[half, half, beside]),
+        PageSection(heading="Folded", charts=[Illustration(chart=charts["history"])], folded=True),
+    ]
+    inner = escape(render_page(Page(title="Places", verdict="It fits.", sections=sections)))
+    frames = (f'<iframe width="{width}" height="800" srcdoc="{inner}"></iframe>' for width in (1300, 400))
+    seen, _ = opened(f"<body>{''.join(frames)}{PLACES}</body>", tmp_path)
+    wide, narrow = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
+    assert narrow["page"] <= 400 and wide["folded"] > 400 and 200 < narrow["folded"] < 400
+    assert wide["halves"][0] == wide["halves"][1] and narrow["halves"][0] < narrow["halves"][1]
+    assert len(set(wide["panels"])) == 1 and narrow["panels"][0] < narrow["panels"][-1]

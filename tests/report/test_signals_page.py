@@ -28,7 +28,8 @@ def test_the_page_has_the_tests_and_every_chart(measured):
     found = SignalsResult(analyses, applied).to_dict()
     charts = signals_charts(found)
     assert set(charts) == {
-        *(("made", f"{name}_{kind}") for name in ("delta", "r") for kind in ("density", "correlation", "spectrum")),
+        *(("made", f"{name}_{kind}") for name in ("delta", "r") for kind in ("density", "autocorrelation", "spectrum")),
+        ("made", "histories"),
         ("made", "cross_correlation"),
         ("made", "transfer"),
         ("filter", "response"),
@@ -41,7 +42,7 @@ def test_the_page_has_the_tests_and_every_chart(measured):
     constant = [row for row in tables["Signals"].rows if row[0] == "propeller speed"]
     assert constant[0][-1] == "constant"
     assert [row[0] for row in tables["Tests"].rows] == ["rudder angle", "yaw rate"]
-    assert "no phase shift" in page.sections[-1].text
+    assert "no phase shift" in page.sections[0].text
     captions = {illustration.caption for section in page.sections for illustration in section.charts}
     assert any("95 % confidence interval" in caption for caption in captions)
 
@@ -49,8 +50,8 @@ def test_the_page_has_the_tests_and_every_chart(measured):
 def test_files_of_one_name_get_names_of_their_own(measured):
     found = SignalsResult([analyse(measured, SignalSettings(columns=["r"]))] * 2).to_dict()
     assert trial_labels(found["trials"]) == ["made_1", "made_2"]
-    assert len(signals_charts(found)) == 6
-    assert sum(len(section.charts) for section in signals_page(found).sections) == 6
+    assert len(signals_charts(found)) == 8
+    assert sum(len(section.charts) for section in signals_page(found).sections) == 8
 
 
 def test_a_trial_whose_name_begins_as_another_keeps_its_own_charts(measured):
@@ -58,4 +59,4 @@ def test_a_trial_whose_name_begins_as_another_keeps_its_own_charts(measured):
         analyse(replace(measured, path=Path(name)), SignalSettings(columns=["r"])) for name in ("a.csv", "a_b.csv")
     ]
     page = signals_page(SignalsResult(analyses).to_dict())
-    assert [len(section.charts) for section in page.sections] == [3, 3]
+    assert [len(section.charts) for section in page.sections] == [1, 1, 3, 3]

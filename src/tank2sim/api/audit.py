@@ -114,9 +114,9 @@ class AuditResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Track and histories of each record with the places of its findings; records with findings first."""
-        from tank2sim.report.results.motions import audit_sections
+        from tank2sim.report.audit.page import record_sections
 
-        return section_charts(audit_sections(self.to_dict()))
+        return section_charts(record_sections(self.to_dict()))
 
     @property
     def _all_findings(self) -> list[Finding]:

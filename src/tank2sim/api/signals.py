@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tank2sim.api.audit import MEASURED_SAMPLES
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.errors import InputError
 from tank2sim.records.signals.analysis import ColumnAnalysis, SignalSettings, Steering, TrialAnalysis, analyse
 from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
-from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, find_signal
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns, find_signal
 from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.requests import FilterRequest, parse_filter
 from tank2sim.records.signals.sampling import Series, even_series
@@ -128,7 +129,9 @@ class SignalsResult(Result):
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
-        content: dict[str, object] = {"trials": [analysis_as_json(analysis) for analysis in self.analyses]}
+        content: dict[str, object] = {
+            "trials": [analysis_as_json(each) | {"histories": _histories(each)} for each in self.analyses]
+        }
         if done := self.filtering:
             column = SignalName(done.before.name).file
             content["filter"] = {
@@ -228,6 +231,13 @@ def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSet
     sentence = f"{what} filtered by {request.text}: {after[0].effect.sentence}"
     changed = thinned(trial, after, sentence) if request.thins else with_filtered(trial, after[0], sentence)
     return FilteredSignal(request, before[0], after[0], sentence, changed)
+
+
+def _histories(analysis: TrialAnalysis) -> dict[str, list[float]]:
+    """The signals of a trial over time in the units of its columns, thinned to draw."""
+    shown = {"t_s", *(SignalName(column.series.name).file for column in analysis.columns)}
+    columns = {name: values for name, values in file_columns(analysis.trial).items() if name in shown}
+    return drawn_columns(columns, MEASURED_SAMPLES, peaks=True)
 
 
 def _history(series: Series) -> dict[str, list[float]]:

@@ -59,7 +59,7 @@ def mariner(workshop: Workshop) -> DemoOutcome:
     workshop.begin("Mariner: stability")
     judged = {kind: stability(model) for kind, model in models.items()}
     criteria = imo_criteria(models[THIRD])
-    sections = [_fmu_section(reports), *sections, _stability_section(models, judged, criteria)]
+    sections = [*sections, _stability_section(models, judged, criteria), _fmu_section(reports)]
     figures = _figures(reports, runs["turn-35"][THIRD], runs["zigzag-20-20"][THIRD], judged[THIRD])
     result: dict[str, object] = {
         "figures": {name: {kind: entry.figures for kind, entry in run.items()} for name, run in runs.items()},
@@ -107,9 +107,11 @@ def _manoeuvre_section(
         tables=[_figure_table(run)],
         charts=[
             Illustration(
-                chart=tracks, caption="North is up. The FMU's track lies on that of the model it was made from."
+                chart=tracks,
+                caption="North is up. The FMU's track lies on that of the model it was made from.",
+                half=True,
             ),
-            Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard."),
+            Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard.", half=True),
         ],
         notes=[f"{kind}: {notice}." for kind, result in run.items() for notice in result.notices],
     )
@@ -156,6 +158,7 @@ def _fmu_section(reports: list[CheckReport]) -> PageSection:
             "Co-Simulation is held against the same Runge-Kutta steps in CasADi, "
             "Model Exchange against the exact solution."
         ),
+        folded=True,
         tables=[table],
         charts=[
             Illustration(

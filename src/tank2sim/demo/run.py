@@ -30,6 +30,7 @@ def write_demo(folder: Path, begin: Callable[[str], None]) -> dict[str, object]:
     page = Page(
         title="From tank to simulator",
         subtitle="Five tows of a vehicle and the Mariner: measured, identified, simulated, exported, checked",
+        verdict="Measured tows and a published ship have become FMUs, each checked against an independent solution.",
         figures=[*towed.figures, *ship.figures],
         sections=[*towed.sections, *ship.sections],
     )

@@ -166,4 +166,4 @@ def _estimates(result: TowIdentification, caption: str) -> PageTable:
     columns = [Column(title="method")]
     for name in unknowns:
         columns += [Column(title=name, unit=units[name]), Column(title="±", unit=units[name], digits=2)]
-    return PageTable(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows)
+    return PageTable(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows, folded=True)

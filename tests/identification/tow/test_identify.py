@@ -88,7 +88,7 @@ def test_three_unknowns_are_still_too_many(table_1):
 
 def test_two_unknowns_only_show_the_late_start(two_unknowns):
     (warning,) = two_unknowns.warnings
-    assert warning.startswith("output_error: (1.5) does not follow the tows within their scatter: at 10 s it is")
+    assert warning.startswith("output_error: the equation does not follow the tows within their scatter: at 10 s it is")
     assert "too fast; a late start" in warning
 
 

@@ -183,7 +183,7 @@ document.querySelectorAll(".sheet").forEach((sheet, number) => {
     if (rect(one).right > paper.right || rect(one).bottom > paper.bottom)
       found.push(`${number} leaves the sheet: ${one.textContent.slice(0, 40)}`);
   });
-  const height = rect(sheet).height * 25.4 / 96;
+  const height = (rect(sheet).height / sheet.currentCSSZoom) * 25.4 / 96; // on paper, whatever the screen
   if (height > 297.2) found.push(`${number} is ${height} mm high`);
 });
 document.body.dataset.found = JSON.stringify(found);

@@ -162,7 +162,7 @@ def test_an_older_result_without_histories_still_has_its_page() -> None:
 
 def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of_the_time_in_all() -> None:
     page = result_page(AUDITED, "audit.json")
-    (chart,) = page.sections[0].charts
+    (chart,) = page.sections[1].charts
     specification = chart_specification(chart.chart)
     marked = []
     for panel in specification["vconcat"]:
@@ -170,7 +170,7 @@ def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of
         rows = [specification["datasets"][layer["data"]["name"]] for layer in layers]
         marked.append([(row["t"], row["end"], row["text"]) for one in rows for row in one])
     assert marked == [[(1.0, 1.0, "2 spikes"), (2.0, 3.0, "1 gaps")], [(2.0, 3.0, "1 gaps")]]
-    assert [row[1] for row in page.sections[0].tables[0].rows] == ["psi [deg]", "t_s"]
+    assert [row[0] for row in page.sections[0].tables[0].rows] == ["psi [deg]", "t_s"]
 
 
 def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -> None:
@@ -196,7 +196,7 @@ def tow() -> dict[str, Any]:
 def test_tows_have_their_readings_their_fits_and_what_is_between_them(tow: dict[str, Any]) -> None:
     charts = drawn(tow)
     titles = ["Speeds of the tows and of the models", "Models of different size", "M and B3 together"]
-    assert list(charts)[:4] == [*titles, "Drag coefficient (Fig. 2)"]
+    assert list(charts)[:4] == [*titles, "Drag coefficient"]
     speed, left = panels(charts[titles[0]]).values()
     first, *_ = tow["speeds"]["simulated_mps"]
     assert [row["v"] for row in speed if row["run"] == first] == pytest.approx(

@@ -109,8 +109,8 @@ def _conventions(reduction: Reduction) -> Iterator[str]:
     if turning and not campaign.inertia_removed and campaign.test.inertia_speed == "test":
         prime = campaign.model.mass_kg / float(campaign.scales.mass)
         yield (
-            "The carried body's m u r was taken with u = U, as in the paper (2.3). With u = U cos(beta) in the runs "
-            f"that yaw with drift Yvvr would come out lower by m'/2 = {prime / 2:.3g} and Nvvr by "
+            "The carried body's m u r was taken with u = U, as Krezelewski and Misiag take it. With u = U cos(beta) in "
+            f"the runs that yaw with drift Yvvr would come out lower by m'/2 = {prime / 2:.3g} and Nvvr by "
             f'{prime * campaign.model.x_G_m / campaign.model.length_m / 2:.2g}: [test] inertia_speed = "axial".'
         )
 
@@ -174,8 +174,8 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
     for difference in result.disagreements:
         yield (
             f"{difference.name} is {difference.together:.4g} by the regression over the whole campaign and "
-            f"{difference.stepwise:.4g} in the paper's order, {abs(difference.ratio):.1f} standard errors apart: the "
-            "tests do not agree with each other within (3.8)."
+            f"{difference.stepwise:.4g} test by test, {abs(difference.ratio):.1f} standard errors apart: the "
+            "tests do not agree with each other within the equations of the model."
         )
     for trend in result.trends:
         if trend.used:

@@ -169,7 +169,7 @@ def _amplitude_plot(reduction: Reduction, force: str, kind: str, words: str) -> 
                 "half_width": [_NORMAL * row.standard_errors[force + letter] for row in at_frequency],
             }
         )
-    title = f"{force}{letter} of single runs by (4.4) against the amplitude"
+    title = f"{force}{letter} of single runs against the amplitude"
     return _force_plot(series, (words, "1"), f"{force}{letter}", title)
 
 

@@ -103,7 +103,7 @@ def _how(reduction: Reduction, name: str) -> str:
     if name not in steps.names:
         return "measured, all runs together"
     place = steps.names.index(name)
-    return f"measured; in the paper's order {steps.values[place]:.4g}, from {steps.found_in[place]}"
+    return f"measured; test by test {steps.values[place]:.4g}, from {steps.found_in[place]}"
 
 
 def _constant_thrust(reduction: Reduction, found: Mapping[str, DerivativeEntry]) -> dict[str, DerivativeEntry]:

@@ -47,9 +47,9 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
         if row is not None:
             fast = speeds[row] - tows.mean_speed_mps[row]
             yield (
-                f"output_error: (1.5) does not follow the tows within their scatter: at {tows.time_s[row]:g} s it is "
-                f"{abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
-                f"{'' if fit.start_delay_s else 'a late start or '}a force that (1.5) lacks is likely."
+                f"output_error: the equation does not follow the tows within their scatter: at {tows.time_s[row]:g} s "
+                f"it is {abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
+                f"{'' if fit.start_delay_s else 'a late start or '}a force that it lacks is likely."
             )
     yield from _disagreement(messages)
 
@@ -108,7 +108,7 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
             "the body with the water in it."
         )
     if not np.isfinite(fit.largest_speed_error_mps):
-        yield f"{fit.method}: the speed of (1.5) with these values grows without bound; do not use this fit."
+        yield f"{fit.method}: the speed with these values grows without bound; do not use this fit."
     speeds = np.linspace(0.0, top_speed_mps, 401)[1:]
     drags = fit.drag_N(speeds)
     if drags.min() < 0:

@@ -25,8 +25,24 @@ def craft_autopilot_page(found: Json) -> Page:
     return Page(
         title=f"{found['ship']}: autopilot of heading and speed",
         subtitle=found["source"],
+        verdict=_verdict(found),
         figures=_figures(found),
         sections=sections,
+    )
+
+
+def _verdict(found: Json) -> str:
+    course, speed = found["course_change"], found["speed_change"]
+    turned = f"A change of course by {course['ordered']:.3g} deg"
+    if course["settling_time_s"] is None or speed["settling_time_s"] is None:
+        return f"{turned}, or one of speed by {speed['ordered']:.3g} m/s, does not settle in the run."
+    share = max(found["at_limit_percent"].values())
+    limit = (
+        f"A thruster is at its limit for {share:.2g} % of the time." if share > 0 else "No thruster is at its limit."
+    )
+    return (
+        f"{turned} settles in {course['settling_time_s']:.3g} s with {course['overshoot']:.2g} deg of overshoot, "
+        f"one of speed by {speed['ordered']:.3g} m/s in {speed['settling_time_s']:.3g} s. {limit}"
     )
 
 
@@ -56,7 +72,7 @@ def _runs(found: Json) -> PageSection:
         for key in thrusters
     ]  # fmt: skip
     charts = [
-        Illustration(chart=history_chart([_history(name, columns)], [first, *others, *turning], title=title))
+        Illustration(chart=history_chart([_history(name, columns)], [first, *others, *turning], title=title), half=True)
         for name, columns, first, others, title in (
             ("course", found["histories"]["course"], _HEADING, [_SPEED], "Change of course"),
             ("speed", found["histories"]["speed"], _SPEED, [], "Change of speed"),

@@ -56,6 +56,11 @@ class Box:
     note: str = ""
 
     @property
+    def known(self) -> bool:
+        """Whether any value is known to the model."""
+        return any(value is not None for row in self.rows for value in row.values)
+
+    @property
     def caution(self) -> str:
         """What the reader must not miss."""
         return NOT_FOR_USE if any(OUTSIDE in row.values for row in self.rows) else ""

@@ -19,7 +19,8 @@ from tank2sim.report.kit.page import resource_text
 PANEL_MM = (88.0, 62.0)
 STOPS_MM = (113.0, 48.0)
 CARD_MM = (88.0, 50.0)
-"""Width and height of the drawings."""
+WIDE_MM = (100.0, 96.0)
+"""Width and height of the drawings; the wide one is of a poster on which no other circles are known."""
 
 WARNING = "Performance may differ from this record due to environmental, hull and loading conditions"
 
@@ -132,13 +133,14 @@ def _panels(bridge: Bridge, ballast: Bridge | None) -> tuple[Panel, ...]:
         (first, bridge, bridge.shallow, shallow),
         (second, ballast, ballast.shallow if ballast else (), shallow),
     )
+    size = WIDE_MM if sum(1 for _, _, circles, _ in wanted if circles) == 1 else PANEL_MM
     panels = []
     for condition, bridge_shown, circles, where in wanted:
         title = f"{condition}, {where}"
         if bridge_shown is None or not circles:
             panels.append(Panel(title))
         else:
-            drawing = _circles(bridge_shown, circles, PANEL_MM)
+            drawing = _circles(bridge_shown, circles, size)
             panels.append(
                 Panel(f"{title}: {_turning_title(bridge_shown, '')}", drawing, boxes.turning(bridge_shown, circles))
             )

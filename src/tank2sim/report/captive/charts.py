@@ -30,6 +30,7 @@ from tank2sim.report.kit.chart_parts import (
     vector,
     with_unit,
 )
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.theme import BAND_OPACITY
 
 _CROWDED = 40
@@ -347,3 +348,38 @@ def _runs_axis(place: str, runs: Sequence[str], *, named: bool, bars: bool = Fal
 def _at(amplitudes: ArrayLike | None, order: int) -> float | None:
     values = vector(() if amplitudes is None else amplitudes)
     return plain(abs(float(values[order - 1]))) if order <= len(values) else None
+
+
+def derivative_certainty_chart(found: Mapping[str, Mapping[str, Json]], *, title: str) -> alt.LayerChart:
+    """Standard error of each number in % of its value, on a logarithmic scale, those without one left out.
+
+    Parameters
+    ----------
+    found : mapping
+        Name to ``value``, ``standard_error`` and ``origin``.
+    title : str
+        Title of the chart.
+    """
+    rows: list[ChartRecord] = [
+        {"name": name, "run": entry["origin"], "v": plain(100 * abs(entry["standard_error"] / entry["value"]))}
+        for name, entry in found.items()
+        if entry["standard_error"] and entry["value"]
+    ]
+    origins = list(dict.fromkeys(str(row["run"]) for row in rows))
+    look = series_look(origins, as_points=origins)
+    x = alt.X("v:Q", title="standard error (% of the value)", scale=alt.Scale(type="log"), axis=alt.Axis(format="~g"))
+    y = alt.Y("name:N", sort=None, axis=alt.Axis(title=None, grid=True))
+    tooltip = [
+        alt.Tooltip("name:N", title="number"),
+        alt.Tooltip("run:N", title="origin"),
+        alt.Tooltip("v:Q", title="standard error (%)", format=NUMBER),
+    ]
+    points = Chart(data(rows)).mark_point(size=55, filled=True)
+    points = points.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+    whole = Chart(data([{"v": 100.0}])).mark_rule(style="limit").encode(x="v:Q")
+    return alt.layer(whole, points).properties(
+        title=title,
+        width=640,
+        height=alt.Step(16),
+        description=f"Standard errors of {len(rows)} numbers in per cent of their values.",
+    )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import altair as alt
 
+from tank2sim.report.captive.charts import derivative_certainty_chart
 from tank2sim.report.kit.chart_parts import NUMBER, Chart, data
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
@@ -25,6 +26,7 @@ _CHANNELS = {
 def mmg_reduction_page(found: Json) -> Page:
     """The page of a result of ``reduce --model mmg``."""
     coefficients = found["coefficients"]
+    known = {name: entry for name, entry in coefficients.items() if entry["standard_error"] and entry["value"]}
     opened = [name for name, entry in coefficients.items() if entry["origin"] == "open"]
     rows = [[name, entry["value"], entry["standard_error"], entry["origin"]] for name, entry in coefficients.items()]
     rows.append(["x_R + a_H x_H", found["yaw_arm"]["value"], found["yaw_arm"]["standard_error"], "measured"])
@@ -59,9 +61,17 @@ def mmg_reduction_page(found: Json) -> Page:
     return Page(
         title=f"{found['model']}: coefficients of the MMG method",
         subtitle=f"From {len(found['conditions'])} steady captive conditions",
+        verdict=_verdict(found["channels"], sum(row[-1] == "measured" for row in rows[:-1])),
         figures=[
-            KeyFigure(label="Conditions", value=len(found["conditions"])),
-            KeyFigure(label="Coefficients measured", value=sum(row[-1] == "measured" for row in rows[:-1])),
+            *(
+                KeyFigure(
+                    label=f"{_CHANNELS[name].capitalize()} followed within",
+                    value=float(f"{100 * entry['unexplained']:.2g}"),
+                    unit="%",
+                    note=f"rms, {entry['standard_deviation']:.3g} {entry['unit'].replace('.', ' ')}",
+                )
+                for name, entry in found["channels"].items()
+            ),
             KeyFigure(
                 label="Left open by the tests",
                 value=len(opened),
@@ -71,28 +81,41 @@ def mmg_reduction_page(found: Json) -> Page:
         ],
         sections=[
             PageSection(
+                heading="Computed against measured",
+                text="Each point is a condition; on the line the method gives what the gauge showed.",
+                charts=[
+                    Illustration(chart=computed_chart(name, readings), half=True)
+                    for name, readings in found["readings"].items()
+                ],
+                tables=[
+                    PageTable(caption="What is left", columns=[Column(title=head) for head in left_heads], rows=left)
+                ],
+                notes=found["notices"],
+            ),
+            PageSection(
                 heading="Coefficients",
                 text="One weighted regression of all readings. The hull is in prime II, by 1/2 rho L d U².",
+                charts=[Illustration(chart=derivative_certainty_chart(known, title="Certainty of the coefficients"))]
+                if known
+                else [],
                 tables=[PageTable(caption="Coefficients", columns=[Column(title=head) for head in heads], rows=rows)],
-                notes=found["notices"],
             ),
             PageSection(
                 heading="Uncertainty budget",
                 text="After ITTC 7.5-02-06-04: the scatter of the tests, and errors common to all of them as "
                 "[uncertainty] of the campaign states them.",
                 tables=[budget],
-            ),
-            PageSection(
-                heading="Computed against measured",
-                text="Each point is a condition; on the line the method gives what the gauge showed.",
-                charts=[
-                    Illustration(chart=computed_chart(name, readings)) for name, readings in found["readings"].items()
-                ],
-                tables=[
-                    PageTable(caption="What is left", columns=[Column(title=head) for head in left_heads], rows=left)
-                ],
+                folded=True,
             ),
         ],
+    )
+
+
+def _verdict(channels: Mapping[str, Json], count: int) -> str:
+    worst = max(channels, key=lambda name: channels[name]["unexplained"])
+    return (
+        f"{count} coefficients are measured. With them the method follows every force within "
+        f"{100 * channels[worst]['unexplained']:.2g} % of its rms; the {_CHANNELS[worst]} is the worst."
     )
 
 

@@ -13,6 +13,7 @@ from tank2sim.report.captive.charts import (
     ForceSeries,
     Harmonics,
     Residual,
+    derivative_certainty_chart,
     force_chart,
     harmonic_chart,
     loop_chart,
@@ -28,12 +29,23 @@ def reduction_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim reduce``."""
     derivatives = found["derivatives"]
     estimated = [name for name, derivative in derivatives.items() if derivative["origin"] == "estimated"]
+    measured = len(derivatives) - len(estimated)
+    runs = len(found["runs"])
+    worst = _worst_predictions(found["prediction_errors"])
     figures = [
-        KeyFigure(label="Runs reduced", value=len(found["runs"]), note=f"{len(found['not_used'])} left out"),
         KeyFigure(
             label="Derivatives measured",
-            value=len(derivatives) - len(estimated),
-            note="prime system, rudder to starboard",
+            value=f"{measured} of {len(derivatives)}",
+            note=f"by {runs} runs; {len(found['not_used'])} left out",
+        ),
+        *(
+            KeyFigure(
+                label=f"{_FORCES[force].capitalize()} predicted within",
+                value=float(f"{percent:.2g}"),
+                unit="%",
+                note=f"of its range, in {kind}, the worst type of run",
+            )
+            for force, (percent, kind) in worst.items()
         ),
         KeyFigure(
             label="Derivatives estimated",
@@ -42,25 +54,57 @@ def reduction_page(found: Json) -> Page:
             note=", ".join(estimated) or "none",
         ),
     ]
+    charts = reduction_charts(found)
+    certainty = charts.pop("certainty")
+    residuals = charts.pop("residuals")
+    every = derivatives | found.get("heel_derivatives", {})
     sections = [
         PageSection(
             heading="Derivatives",
-            text="One weighted regression over the whole campaign, and next to it the tests one after the other.",
-            tables=[_derivatives(derivatives | found.get("heel_derivatives", {}))],
+            text="One weighted regression over the whole campaign; in the table, next to it the tests one after the "
+            "other.",
+            tables=[_derivatives(every)],
+            charts=[Illustration(chart=certainty, caption=_CERTAINTY)],
             notes=found["warnings"],
         ),
-        *_chart_sections(reduction_charts(found)),
+        *_chart_sections(charts),
         PageSection(
-            heading="Leave one run out",
-            text="How well each run is predicted from the others: root mean square error, % of the force's range.",
+            heading="Each run predicted from the others",
+            text="Root mean square error, % of the force's range.",
             tables=[_predictions(found["prediction_errors"])],
+            charts=[Illustration(chart=residuals)],
         ),
         *_left_out(found["selection"]),
         *_budget(found.get("uncertainty_budget")),
     ]
     return Page(
-        title=found["model"]["name"], subtitle="Captive model tests, reduced", figures=figures, sections=sections
+        title=found["model"]["name"],
+        subtitle="Captive model tests, reduced",
+        verdict=_verdict(measured, len(derivatives), worst),
+        figures=figures,
+        sections=sections,
     )
+
+
+_CERTAINTY = "A derivative whose standard error is as large as its value (red) is no more than its order of magnitude."
+
+
+def _worst_predictions(errors: Json) -> dict[str, tuple[float, str]]:
+    """The largest prediction error of each force, % of its range, and the type of the runs that have it."""
+    found: dict[str, tuple[float, str]] = {}
+    for kind, percents in prediction_rows(errors).items():
+        for force, percent in percents.items():
+            if force in _FORCES and percent is not None and percent > found.get(force, (0.0, ""))[0]:
+                found[force] = percent, kind.replace("_", " ")
+    return {force: found[force] for force in _FORCES if force in found}
+
+
+def _verdict(measured: int, count: int, worst: Mapping[str, tuple[float, str]]) -> str:
+    text = f"{measured} of {count} derivatives are measured"
+    if not worst:
+        return f"{text}."
+    errors = ", ".join(f"{_FORCES[force]} within {percent:.2g} %" for force, (percent, _) in worst.items())
+    return f"{text}. Each run is predicted from all the others, as a share of the range: {errors}."
 
 
 def reduction_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
@@ -77,7 +121,11 @@ def reduction_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
         for row in rows
     ]
     title = "Each run against its prediction from all the others"
-    return {**charts, "residuals": residual_chart(residuals, title=title)}
+    return {
+        "certainty": derivative_certainty_chart(found["derivatives"], title="Certainty of the derivatives"),
+        **charts,
+        "residuals": residual_chart(residuals, title=title),
+    }
 
 
 def _plot_chart(plot: Json) -> alt.TopLevelMixin:
@@ -113,7 +161,7 @@ def _derivatives(derivatives: Json) -> PageTable:
         rows.append([name, *regression, *stepwise, derivative["origin"]])
     heads = ("", "regression", "±", "test by test", "±", "from tests", "origin")
     columns = [Column(title=head) for head in heads]
-    return PageTable(caption="Prime system, times 10⁵", columns=columns, rows=rows, folded=False)
+    return PageTable(caption="Derivatives, prime system, times 10⁵", columns=columns, rows=rows)
 
 
 def _budget(budget: Json) -> list[PageSection]:
@@ -150,7 +198,7 @@ def _budget(budget: Json) -> list[PageSection]:
         percent = 100 * budget["blockage_speed_relative"]
         notes.append(f"By Schuster's formula the walls raise the speed past the model by {percent:.2g} %.")
     text = "After ITTC 7.5-02-06-04: the combined uncertainty is the standard error of the result."
-    return [PageSection(heading="Uncertainty budget", text=text, tables=tables, notes=notes)]
+    return [PageSection(heading="Uncertainty budget", text=text, tables=tables, notes=notes, folded=True)]
 
 
 def _left_out(selection: Json) -> list[PageSection]:
@@ -165,7 +213,7 @@ def _left_out(selection: Json) -> list[PageSection]:
     columns = [Column(title=head) for head in ("term", "reason", "why")]
     text = "Terms that the runs excite and that are not in the card."
     table = PageTable(caption="Left out", columns=columns, rows=rows)
-    return [PageSection(heading="Which terms, and why", text=text, tables=[table])]
+    return [PageSection(heading="Which terms, and why", text=text, tables=[table], folded=True)]
 
 
 def _predictions(errors: Json) -> PageTable:
@@ -185,6 +233,18 @@ def _chart_sections(charts: Mapping[str, alt.TopLevelMixin]) -> list[PageSection
     groups: dict[str, list[Illustration]] = {}
     for stem, chart in charts.items():
         words = _FORCES.get(stem.rpartition("_")[2])
-        heading = f"{words.capitalize()} against motion" if words else "Loops and residuals"
-        groups.setdefault(heading, []).append(Illustration(chart=chart, caption=_AGAINST_MOTION if words else ""))
-    return [PageSection(heading=heading, charts=illustrations) for heading, illustrations in groups.items()]
+        heading = f"{words.capitalize()} against motion" if words else _LOOPS_HEADING
+        illustration = Illustration(chart=chart, half=bool(words) and not stem.startswith("harmonics"))
+        groups.setdefault(heading, []).append(illustration)
+    return [
+        PageSection(
+            heading=heading,
+            text="" if heading == _LOOPS_HEADING else _AGAINST_MOTION,
+            charts=illustrations,
+            folded=heading == _LOOPS_HEADING,
+        )
+        for heading, illustrations in groups.items()
+    ]
+
+
+_LOOPS_HEADING = "Loops of the oscillating runs"

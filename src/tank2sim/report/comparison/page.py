@@ -8,7 +8,7 @@ import altair as alt
 
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
 from tank2sim.marks import assumed_words
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, SeriesLook, data, plain, series_look, stacked
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import TrackData, track_chart
 from tank2sim.report.kit.numbers import format_number
@@ -44,8 +44,8 @@ def compare_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim compare``."""
     labels = [card["label"] for card in found["cards"]]
     sections = [
+        *_tracks(found["trials"]),
         *_figure_differences(found["trials"], labels, assumed_words(found["notices"])),
-        *(_trial(trial, labels) for trial in found["trials"]),
         _coefficients(found["coefficients"], found.get("effects", []), labels),
         _cards(found["cards"]),
     ]
@@ -53,9 +53,25 @@ def compare_page(found: Json) -> Page:
     return Page(
         title=found["cards"][0]["ship"],
         subtitle=f"Comparison of cards: {', '.join(labels)}",
+        verdict=_verdict(found, labels),
         figures=[*_largest(found["trials"], labels), *(_figure(card) for card in found["summary"])],
         sections=sections,
     )
+
+
+def _verdict(found: Json, labels: Sequence[str]) -> str:
+    """What differs most between the reference and the card that is farthest from it."""
+    percents = _percents(found["trials"], labels)
+    if not percents:
+        return ""
+    label, name, percent, _ = max(percents, key=lambda row: abs(row[2]))
+    sure = [z for *_, z in percents if z is not None]
+    beyond = sum(abs(z) > BEYOND_STANDARD_ERRORS for z in sure)
+    trial, _, figure = name.partition(": ")
+    text = f"{label} differs from {labels[0]} most in the {figure} of the {trial}: {percent:+.3g} %."
+    if not sure:
+        return text
+    return f"{text} {beyond} of {len(sure)} figures differ by more than {BEYOND_STANDARD_ERRORS:g} standard deviations."
 
 
 def _percents(
@@ -200,7 +216,8 @@ def _figure_differences(trials: Sequence[Mapping[str, Json]], labels: Sequence[s
     if not rows:
         return []
     chart = Illustration(chart=_percent_chart(rows, labels, assumed), caption=_PERCENT)
-    return [PageSection(heading="Figures of manoeuvres", text=_TRIALS, charts=[chart])]
+    tables = [_trial_table(trial, labels) for trial in trials]
+    return [PageSection(heading="Figures of manoeuvres", text=_TRIALS, charts=[chart], tables=tables)]
 
 
 _PERCENT = (
@@ -208,27 +225,54 @@ _PERCENT = (
 )
 
 
-def _percent_chart(rows: Sequence[ChartRecord], labels: Sequence[str], assumed: str) -> alt.LayerChart:
-    """Differences in per cent of the reference's figure, a row a figure, a shape and colour for each card."""
-    names = list(dict.fromkeys(str(row["name"]) for row in rows))
+def _percent_chart(rows: Sequence[ChartRecord], labels: Sequence[str], assumed: str) -> alt.VConcatChart:
+    """Differences in per cent of the reference's figure: a panel a manoeuvre, a row a figure, a shape and colour for
+    each card."""
+    panels: dict[str, list[ChartRecord]] = {}
+    for row in rows:
+        trial, _, figure = str(row["name"]).partition(": ")
+        panels.setdefault(trial, []).append(row | {"figure": figure})
+    ends = [float(row[key]) for row in rows for key in ("percent", "low", "high") if row.get(key) is not None]
+    scale = alt.Scale(domain=[min(ends), max(ends)], zero=True, nice=True)
     look = series_look(labels[1:], as_points=labels[1:])
-    y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=180))
-    base = Chart(data(rows)).encode(y=y, color=look.colour)
+    charts = [
+        _percent_panel(panel, trial, alt.X("percent:Q", scale=scale, title=None), look)
+        for trial, panel in panels.items()
+    ]
+    return stacked(
+        charts,
+        title=f"Difference of the figures from {labels[0]}, %{assumed}",
+        description=f"Differences of {len(rows)} figures from {labels[0]} in per cent.",
+    )
+
+
+def _percent_panel(rows: Sequence[ChartRecord], trial: str, x: alt.X, look: SeriesLook) -> alt.LayerChart:
+    y = alt.Y("figure:N", sort=None, title=None, axis=alt.Axis(grid=True))
+    base = Chart(data(list(rows))).encode(y=y, color=look.colour)
     tooltip = ["run:N", "name:N", alt.Tooltip("percent:Q", title="difference (%)", format=NUMBER)]
-    x = alt.X("percent:Q", title=f"difference from {labels[0]} (%)")
     points = base.mark_point(filled=True, size=60).encode(x=x, shape=look.shape, tooltip=tooltip)
     bars = base.mark_rule(strokeWidth=2, opacity=0.6).encode(x="low:Q", x2="high:Q")
     zero = Chart(data([{"percent": 0.0}])).mark_rule(style="reference").encode(x="percent:Q")
     chart: alt.LayerChart = alt.layer(zero, bars, points).properties(
-        title=f"Figures against the reference{assumed}",
-        width=440,
-        height=alt.Step(16),
-        description=f"Differences of {len(names)} figures from {labels[0]} in per cent.",
+        title=alt.Title(trial, anchor="start", fontSize=11), width=560, height=alt.Step(16)
     )
     return chart
 
 
-def _trial(trial: Mapping[str, Json], labels: Sequence[str]) -> PageSection:
+def _tracks(trials: Sequence[Mapping[str, Json]]) -> list[PageSection]:
+    charts = []
+    for trial in trials:
+        tracks = [
+            TrackData(label=track["card"], x_m=track["x_m"], y_m=track["y_m"], time_s=track["t_s"])
+            for track in trial["tracks"]
+        ]
+        if tracks:
+            name = trial["name"][:1].upper() + trial["name"][1:]
+            charts.append(Illustration(chart=track_chart(tracks, title=name, height_px=400), half=True))
+    return [PageSection(heading="Tracks", charts=charts)] if charts else []
+
+
+def _trial_table(trial: Mapping[str, Json], labels: Sequence[str]) -> PageTable:
     columns = [Column(title="figure"), Column(title="unit")]
     columns += [Column(title=label) for label in labels]
     for label in labels[1:]:
@@ -242,16 +286,7 @@ def _trial(trial: Mapping[str, Json], labels: Sequence[str]) -> PageSection:
         for apart, z in zip(row["differences"], row["differences_standard_errors"], strict=True):
             cells += [None if apart is None else format_number(apart, 3), z]
         rows.append(cells)
-    charts: Sequence[Illustration] = ()
-    name = trial["name"]
-    if trial["tracks"]:
-        tracks = [
-            TrackData(label=track["card"], x_m=track["x_m"], y_m=track["y_m"], time_s=track["t_s"])
-            for track in trial["tracks"]
-        ]
-        charts = [Illustration(chart=track_chart(tracks, title=f"Tracks: {name}"))]
-    table = PageTable(caption=f"Figures of the {name}.", columns=columns, rows=rows, folded=True)
-    return PageSection(heading=name[:1].upper() + name[1:], tables=[table], charts=charts)
+    return PageTable(caption=f"Figures of the {trial['name']}.", columns=columns, rows=rows, folded=True)
 
 
 def _with_error(value: float | None, error: float | None) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -9,6 +10,7 @@ import altair as alt
 
 from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
+from tank2sim.units import in_words
 
 _WIDTH = 320
 _HEIGHT = 240
@@ -67,6 +69,13 @@ def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> alt
     )
 
 
+def figure_words(figure: str) -> str:
+    """A figure as a reader sees it: ``advance_m@35`` is ``advance, 35 deg``."""
+    kind, _, argument = figure.partition("@")
+    words = re.sub(r"(?<=[a-z])(?=\d)", " ", in_words(kind)[0])
+    return f"{words}, {argument}{'' if '/' in argument else ' deg'}" if argument else words
+
+
 def certainty_charts(found: Json, across: str, unit: str) -> list[alt.TopLevelMixin]:
     """Standard error of each figure over the time, by the design and by the usual programme."""
     curve = found["certainty"]
@@ -81,7 +90,9 @@ def certainty_charts(found: Json, across: str, unit: str) -> list[alt.TopLevelMi
         look = series_look([DESIGN, USUAL])
         base = Chart(data(rows)).encode(
             x=alt.X("x:Q", title=f"time ({unit})", scale=alt.Scale(zero=False)),
-            y=alt.Y("y:Q", title="standard error", scale=alt.Scale(zero=True)),
+            y=alt.Y(
+                "y:Q", title=f"standard error ({in_words(figure.partition('@')[0])[1]})", scale=alt.Scale(zero=True)
+            ),
         )
         lines = base.mark_line().encode(color=look.colour, strokeDash=look.dash)
         points = base.mark_point(filled=True, size=36).encode(
@@ -96,8 +107,8 @@ def certainty_charts(found: Json, across: str, unit: str) -> list[alt.TopLevelMi
             alt.layer(lines, points).properties(
                 width=2 * _WIDTH,
                 height=160,
-                title=f"Certainty of {figure}",
-                description=f"Standard error of {figure} over the time, by the design and by the usual programme.",
+                title=f"Certainty of the {figure_words(figure)}",
+                description=f"Standard error of the {figure_words(figure)} over the time, by both programmes.",
             )
         )
     return charts

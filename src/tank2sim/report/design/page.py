@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tank2sim.report.design.charts import certainty_charts, run_planes
+from tank2sim.report.design.charts import certainty_charts, figure_words, run_planes
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import (
     Cell,
@@ -50,32 +50,54 @@ def campaign_design_page(found: Json) -> Page:
         f"model {model['length_m']:.3g} m at {model['speed_mps']:.3g} m/s; drift to {reach['drift_deg']:.3g} deg, "
         f"rudder to {reach['rudder_deg']:.3g} deg, r' to {reach['yaw_rate_prime']:.2g}"
     )
-    charts = [Illustration(chart=chart) for chart in certainty_charts(found, "hours", "h")]
+    charts = [Illustration(chart=chart, half=True) for chart in certainty_charts(found, "hours", "h")]
     sections = [
         PageSection(heading="Certainty of the figures", text=_FIGURES, charts=charts, tables=[figure_table(found)]),
         PageSection(
-            heading="Where the runs are", text=_RUNS, charts=[Illustration(chart=chart) for chart in run_planes(found)]
+            heading="Where the runs are",
+            text=_RUNS,
+            charts=[Illustration(chart=chart, half=True) for chart in run_planes(found)],
         ),
         PageSection(heading="Coefficients that matter", text=_COEFFICIENTS, tables=[coefficient_table(found)]),
         PageSection(heading="The plan", tables=[_runs(found)]),
         *notices_section(found["notices"]),
     ]
     return Page(
-        title=f"{found['ship']}: the next captive campaign", subtitle=subtitle, figures=cards, sections=sections
+        title=f"{found['ship']}: the next captive campaign",
+        subtitle=subtitle,
+        verdict=_verdict(needed, hours, "h", "the usual matrix"),
+        figures=cards,
+        sections=sections,
     )
 
 
 def _key_figure(name: str, row: Json) -> KeyFigure:
-    kind, _, argument = name.partition("@")
-    words, unit = in_words(kind)
+    unit = in_words(name.partition("@")[0])[1]
+    label = figure_words(name)
     note = f"± {row['design']:.2g}; usual programme ± {row['usual']:.2g}"
-    return KeyFigure(label=f"{words}, {argument} deg" if argument else words, value=row["value"], unit=unit, note=note)
+    return KeyFigure(label=label[:1].upper() + label[1:], value=row["value"], unit=unit, note=note)
+
+
+def _verdict(needed: float | None, whole: float, unit: str, usual: str) -> str:
+    if needed is None:
+        return f"In {whole:.3g} {unit} the plan does not reach the certainty of {usual}."
+    return (
+        f"The plan reaches in {needed:.3g} {unit} the certainty that {usual} has in {whole:.3g} {unit}: "
+        f"{100 * needed / whole:.0f} % of the time."
+    )
 
 
 def figure_table(found: Json) -> PageTable:
     """Figures with their standard errors by the design and by the usual programme."""
     rows: list[list[Cell]] = [
-        [name, row["value"], row["design"], row["usual"], row["design"] / row["usual"], row["variance_ratio"]]
+        [
+            figure_words(name),
+            row["value"],
+            row["design"],
+            row["usual"],
+            row["design"] / row["usual"],
+            row["variance_ratio"],
+        ]
         for name, row in found["figures"].items()
     ]
     heads = ("figure", "value", "design", "usual", "ratio", "ratio of variances")
@@ -105,7 +127,7 @@ def coefficient_table(found: Json) -> PageTable:
             Column(title="value"),
             Column(title="design", digits=3),
             Column(title="usual", digits=3),
-            *(Column(title=figure, unit="%", digits=2) for figure in names),
+            *(Column(title=figure_words(figure), unit="%", digits=2) for figure in names),
         ],
         rows=rows,
     )
@@ -158,7 +180,7 @@ def trial_design_page(found: Json) -> Page:
     ]
     cards += [_key_figure(name, row) for name, row in found["figures"].items()]
     figures: list[list[Cell]] = [
-        [name, row["value"], row["before"], row["design"], row["usual"], row["design"] / row["usual"]]
+        [figure_words(name), row["value"], row["before"], row["design"], row["usual"], row["design"] / row["usual"]]
         for name, row in found["figures"].items()
     ]
     heads = ("figure", "value", "before", "design", "usual", "ratio")
@@ -170,7 +192,7 @@ def trial_design_page(found: Json) -> Page:
         PageSection(
             heading="Certainty of the figures",
             text=_TRIAL,
-            charts=[Illustration(chart=chart) for chart in certainty_charts(found, "minutes", "min")],
+            charts=[Illustration(chart=chart, half=True) for chart in certainty_charts(found, "minutes", "min")],
             tables=[
                 PageTable(
                     caption="Figures and their standard errors",
@@ -210,4 +232,10 @@ def trial_design_page(found: Json) -> Page:
     ]
     usual = found["usual_set"]
     subtitle = f"usual set: {', '.join(usual['manoeuvres'])}, {usual['minutes']:.3g} min"
-    return Page(title=f"{found['ship']}: the next sea trial", subtitle=subtitle, figures=cards, sections=sections)
+    return Page(
+        title=f"{found['ship']}: the next sea trial",
+        subtitle=subtitle,
+        verdict=_verdict(needed, minutes, "min", "the usual set"),
+        figures=cards,
+        sections=sections,
+    )

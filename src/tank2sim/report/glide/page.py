@@ -30,12 +30,24 @@ def glide_page(found: Json) -> Page:
         sections.append(_path(found))
     if errors := found.get("quasi_steady_error"):
         sections.append(_quasi_steady(errors))
-    sections.append(PageSection(heading="What to know of this card", notes=found["notices"]))
+    sections.append(
+        PageSection(heading="What to know of this card", text=f"From {found['source']}.", notes=found["notices"])
+    )
     return Page(
         title=found["glider"],
-        subtitle=f"Underwater glider. {found['source']}",
+        subtitle="Underwater glider",
+        verdict=_verdict(found),
         figures=_figures(found),
         sections=sections,
+    )
+
+
+def _verdict(found: Json) -> str:
+    least, fastest = found["design"]["smallest_angle_deg"], found["design"]["fastest_glide"]
+    return (
+        f"At its best the glider moves {1 / math.tan(math.radians(least)):.3g} m over the ground for each metre of "
+        f"depth, on a path of {least:.3g} deg; it is fastest, {fastest['horizontal_speed_mps']:.3g} m/s over the "
+        f"ground, at {-fastest['path_angle_deg']:.3g} deg."
     )
 
 
@@ -94,11 +106,12 @@ def _row(glide: Json) -> list[Cell]:
 def _design(found: Json) -> PageSection:
     design = found["design"]
     marked = {"best glide": design["best_glide"], "fastest over the ground": design["fastest_glide"]}
+    # Straight glides have no turning radius.
     tables = [
         PageTable(
             caption="Design glides",
-            columns=[Column(title=""), *_HEADS],
-            rows=[[name, *_row(glide)] for name, glide in marked.items()],
+            columns=[Column(title=""), *_HEADS[:-1]],
+            rows=[[name, *_row(glide)[:-1]] for name, glide in marked.items()],
         )
     ]
     if design["ranges"]:
@@ -156,12 +169,12 @@ def _glides(glides: Sequence[Json], printed: Sequence[Json]) -> PageSection:
         columns = [*_HEADS, Column(title="speed over that of the corrected equations", digits=3)]
         pairs = zip(printed, glides, strict=True)
         rows = [[*_row(row), row["speed_mps"] / glide["speed_mps"]] for row, glide in pairs]
-        caption = "The same by the equations as the paper prints them"
+        caption = "The same by the equations as printed"
         tables.append(PageTable(caption=caption, columns=columns, rows=rows))
     return PageSection(
         heading="Steady glides",
         text="Angles + up, incidence + when the flow comes from below, roll + starboard side down: it turns a dive to "
-        "starboard and a climb to port. The turning radius neglects the added mass, as the paper does; the last column "
+        "starboard and a climb to port. The turning radius neglects the added mass, as published; the last column "
         "is that of the transient model, which has it.",
         tables=tables,
     )
@@ -179,9 +192,10 @@ def _quasi_steady(errors: Json) -> PageSection:
     swings = swing_chart(errors["swings"], title="Error of the quasi-steady motion, swings")
     steps = quasi_steady_chart(errors["steps"], title="Error of the quasi-steady path, steps")
     return PageSection(
-        heading="What slow means",
-        text="The paper takes each moment for a steady glide because controls change slowly, and gives no number. Here "
-        "the transient model, with mass and added mass, flies swings and steps of the controls.",
+        heading="How slowly the controls must change",
+        text="A path of steady glides holds where the controls change slowly. How slowly, "
+        "the transient model shows: with mass and added mass, it flies swings and steps of the controls.",
+        folded=True,
         charts=[
             Illustration(
                 chart=swings,

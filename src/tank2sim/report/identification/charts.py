@@ -14,6 +14,7 @@ from tank2sim.records.thinning import Indices, thin_points
 from tank2sim.report.kit.before_after import before_after_switch, switch
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    STACKS,
     Chart,
     ChartRecord,
     Position,
@@ -174,6 +175,7 @@ def window_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.
     return alt.vconcat(*rows, spacing=18).properties(
         title=alt.Title(title, subtitle="Number and colour: root mean square error as a share of the signal, %."),
         description="Errors over windows by trial and signal, of the card before and the card found.",
+        usermeta=STACKS,
     )
 
 
@@ -226,7 +228,9 @@ def figure_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.
     if not panels:
         return None
     return alt.vconcat(*panels, spacing=26).properties(
-        title=title, description="Figures of turns and zigzags predicted against measured, and their errors."
+        title=title,
+        description="Figures of turns and zigzags predicted against measured, and their errors.",
+        usermeta=STACKS,
     )
 
 

@@ -81,26 +81,32 @@ def identification_page(found: Json) -> Page:
             if stem.startswith(stems)
         ]
 
-    sections = [
-        PageSection(
-            heading="How well trials are followed",
-            text=_FOLLOWED,
-            charts=drawn("windows"),
-            tables=[_table("Yaw rate, error over windows", ("trial", "", "before", "now"), following_rows(found))],
-        )
-    ]
-    if tables := _figure_tables(found):
-        sections.append(
-            PageSection(heading="Figures of manoeuvres", text=_FIGURES, charts=drawn("figures"), tables=tables)
-        )
+    sections: list[PageSection] = []
     for word in (HELD_OUT, FITTED):
         stem = word.replace(" ", "_")
         if charts_there := drawn(f"tracks_{stem}", f"histories_{stem}"):
             count = len(found["errors_over_windows"][SET_KEYS[word]])
             text = f"The {MOST_TRIALS} of {count} trials with the largest error of yaw rate."
             sections.append(
-                PageSection(heading=f"Trials {word}", text=text if count > MOST_TRIALS else "", charts=charts_there)
+                PageSection(
+                    heading=f"Trials {word}",
+                    text=text if count > MOST_TRIALS else "",
+                    charts=charts_there,
+                    folded=bool(sections),
+                )
             )
+    if tables := _figure_tables(found):
+        sections.append(
+            PageSection(heading="Figures of manoeuvres", text=_FIGURES, charts=drawn("figures"), tables=tables)
+        )
+    sections.append(
+        PageSection(
+            heading="Error of each signal",
+            text=_FOLLOWED,
+            charts=drawn("windows"),
+            tables=[_table("Yaw rate, error over windows", ("trial", "", "before", "now"), following_rows(found))],
+        )
+    )
     sections.append(
         PageSection(
             heading="Parameters",
@@ -125,10 +131,18 @@ def identification_page(found: Json) -> Page:
     if found["notices"]:
         rows: list[list[object]] = [[notice] for notice in found["notices"]]
         sections.append(
-            PageSection(heading="Notices", tables=[_table("What was repaired, scaled and assumed", ("",), rows)])
+            PageSection(
+                heading="What was repaired, scaled and assumed", tables=[_table("Notices", ("",), rows)], folded=True
+            )
         )
     subtitle = f"Coefficients from free-running trials by {found['method'].replace('_', ' ')}"
-    return Page(title=found["ship"], subtitle=subtitle, figures=_key_figures(found), sections=sections)
+    return Page(
+        title=found["ship"],
+        subtitle=subtitle,
+        verdict=_verdict(found),
+        figures=_key_figures(found),
+        sections=sections,
+    )
 
 
 _FOLLOWED = (
@@ -187,10 +201,8 @@ def _key_figures(found: Json) -> list[KeyFigure]:
     word = HELD_OUT if windows[SET_KEYS[HELD_OUT]] else FITTED
     trials, compared = windows[SET_KEYS[word]], found["figures"][SET_KEYS[word]]
     effects = f"{len(found['effects_of_card'])} effects"
+    held_out = len(windows[SET_KEYS[HELD_OUT]])
     figures = [
-        KeyFigure(label="Trials fitted", value=len(windows[SET_KEYS[FITTED]])),
-        KeyFigure(label="Trials held out", value=len(windows[SET_KEYS[HELD_OUT]])),
-        KeyFigure(label="Coefficients", value=len(found["identifiability"]["parameters"]), note=effects),
         _compared("Yaw-rate error", word, "%", *(100 * pooled_error(trials, key) for key in ("before", "found"))),
     ]
     for label, unit, names in (
@@ -201,7 +213,29 @@ def _key_figures(found: Json) -> list[KeyFigure]:
         old, new = (_rms(figures_named, key, 100 if unit == "%" else 1) for key in ("before", "predicted"))
         if not np.isnan(new):
             figures.append(_compared(label, word, unit, old, new))
-    return figures
+    return [
+        *figures,
+        KeyFigure(
+            label="Trials held out",
+            value=held_out,
+            verdict=Verdict.NONE if held_out else Verdict.CAUTION,
+            note=f"{len(windows[SET_KEYS[FITTED]])} were fitted",
+        ),
+        KeyFigure(label="Numbers fitted", value=len(found["identifiability"]["parameters"]), note=effects),
+    ]
+
+
+def _verdict(found: Json) -> str:
+    """How the card found follows trials, next to the card before; those held out, where there are any."""
+    windows = found["errors_over_windows"]
+    word = HELD_OUT if windows[SET_KEYS[HELD_OUT]] else FITTED
+    before, after = (100 * pooled_error(windows[SET_KEYS[word]], key) for key in ("before", "found"))
+    if not np.isfinite(after):
+        return ""
+    better = "better than" if after < before else "no better than"
+    text = f"The card found follows the yaw rate of the trials {word} within {after:.3g} % (rms), {better} the card "
+    text += f"before ({before:.3g} %)." if np.isfinite(before) else "before."
+    return text if word == HELD_OUT else f"{text} None was held out, so this card is untested."
 
 
 def _compared(label: str, word: str, unit: str, before: float, after: float) -> KeyFigure:

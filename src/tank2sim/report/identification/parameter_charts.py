@@ -8,7 +8,7 @@ import altair as alt
 
 from tank2sim.identification.trials.as_json import as_number, value_with_error
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.chart_parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
 
 _NORMAL = 1.959964
@@ -48,7 +48,9 @@ def parameter_chart(parameters: Mapping[str, Json], *, title: str = "") -> alt.H
     intervals = alt.layer(*layers).properties(width=400, height=height)
     chart = alt.hconcat(intervals, bars.properties(width=150, height=height), spacing=18)
     return chart.properties(
-        title=title, description="Estimates and priors with 95 % intervals, and the share of the trials in each."
+        title=title,
+        description="Estimates and priors with 95 % intervals, and the share of the trials in each.",
+        usermeta=STACKS,
     )
 
 

@@ -162,7 +162,8 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
     exceeded = sorted({error.output for error in errors if not error.within})
     panels = alt.layer(stem, limit, point).properties(width=max(110, width_px // len(kinds) - 20), height=alt.Step(19))
     header = alt.Header(title=None, labelAnchor="start")
-    return panels.facet(data=data(rows), column=alt.Column("kind:N", sort=kinds, header=header), spacing=20).properties(
+    facet = alt.Facet("kind:N", sort=kinds, header=header)
+    return panels.facet(facet, data=data(rows), columns=len(kinds), spacing=20).properties(
         title=title,
         description=f"Largest error of {len(outputs)} outputs in {', '.join(kinds)}. "
         + (f"Above the limit: {', '.join(exceeded)}." if exceeded else "All are within their limits."),

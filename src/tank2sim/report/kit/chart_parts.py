@@ -23,6 +23,9 @@ POINT_SAMPLES = 120
 HOVER_SAMPLES = 90
 """Places along a line that answer to the pointer."""
 
+STACKS = {"stacks": True}
+"""Meta data of a chart whose panels go under each other where they are too narrow side by side."""
+
 NUMBER = ",.4~r"
 """How tooltips write numbers: four significant digits."""
 

@@ -65,7 +65,9 @@
     return vegaEmbed(holder, chart, { mode: "vega-lite", actions: false, defaultStyle: false, ...looks });
   }
 
-  // Legends that reach beyond the page leave no room for the chart: their entries then go under each other.
+  // Legends that reach beyond the page leave no room for the chart: their entries then go into fewer columns.
+  const LEGEND_COLUMNS = [3, 1];
+
   function legendsFit(holder, room) {
     const picture = holder.querySelector("svg"); // the style of the page may show it smaller than it is
     const { left, width } = picture.getBoundingClientRect();
@@ -75,15 +77,31 @@
     return (right - left) * scale <= room;
   }
 
-  function withStackedLegends(config) {
+  function withStackedLegends(config, columns) {
     const { layout, ...legend } = config.legend;
     const top = { ...layout.top, direction: "vertical", margin: 6 };
-    return { ...config, legend: { ...legend, columns: 1, layout: { ...layout, top } } };
+    return { ...config, legend: { ...legend, columns, layout: { ...layout, top } } };
   }
 
   // Panels side by side that are wider than the page: fewer in a row, before they become too small to be read.
   function inFewerColumns(chart, width, room) {
     return { ...chart, columns: Math.max(1, Math.floor((chart.columns * room) / width)) };
+  }
+
+  // Panels side by side of a chart that says so go under each other, each with the labels of its own axis.
+  function withStackedPanels(node) {
+    const { hconcat, ...copy } = node;
+    if (copy.vconcat) copy.vconcat = copy.vconcat.map(withStackedPanels);
+    if (hconcat) copy.vconcat = hconcat.map(withLabels);
+    return copy;
+  }
+
+  function withLabels(node) {
+    const copy = { ...node };
+    const y = copy.encoding?.y;
+    if (copy.layer) copy.layer = copy.layer.map(withLabels);
+    if (y?.axis?.labels === false) copy.encoding = { ...copy.encoding, y: { ...y, axis: { ...y.axis, labels: true } } };
+    return copy;
   }
 
   async function draw(place, config) {
@@ -94,20 +112,28 @@
     const room = holder.clientWidth;
     let factor = 1;
     let look = config;
+    const columns = [...LEGEND_COLUMNS];
     let chart = charts[place];
+    let stacks = Boolean(charts[place].usermeta?.stacks);
     let before = null; // the attempt before, of the same parts: axes and legends keep their width
-    for (let attempt = 0; attempt < 7; attempt += 1) {
+    for (let attempt = 0; attempt < 8; attempt += 1) {
       views.get(place)?.finalize();
       views.set(place, await embedded(holder, shrunk(chart, factor, equal), look, choice));
       const width = holder.querySelector("svg").width.baseVal.value;
       if (width <= room || room === 0) break;
+      if (stacks && room < LEAST_SHRINK * width) {
+        chart = withStackedPanels(chart);
+        stacks = false;
+        before = null;
+        continue;
+      }
       if (chart === charts[place] && chart.columns > 1 && room < LEAST_SHRINK * width) {
         chart = inFewerColumns(chart, width, room);
         before = null;
         continue;
       }
-      if (look === config && !legendsFit(holder, room)) {
-        look = withStackedLegends(config);
+      if (columns.length && !legendsFit(holder, room)) {
+        look = withStackedLegends(config, columns.shift());
         before = null;
         continue;
       }

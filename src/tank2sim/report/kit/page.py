@@ -137,10 +137,14 @@ class PageTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Illustration:
-    """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption."""
+    """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption.
+
+    Where the page is wide, two charts of `half` its width that follow each other are side by side.
+    """
 
     chart: alt.TopLevelMixin
     caption: str = ""
+    half: bool = False
 
     @property
     def title(self) -> str:
@@ -152,13 +156,17 @@ class Illustration:
 
 @dataclass(frozen=True, kw_only=True)
 class PageSection:
-    """A part of the page. An empty line in `text` starts a paragraph; `notes` are what the reader must not miss."""
+    """A part of the page. An empty line in `text` starts a paragraph; `notes` are what the reader must not miss.
+
+    Of a `folded` section only the heading is seen until the reader opens it; on paper it is open.
+    """
 
     heading: str
     text: str = ""
     tables: Sequence[PageTable] = ()
     charts: Sequence[Illustration] = ()
     notes: Sequence[str] = ()
+    folded: bool = False
 
 
 def notices_section(notices: Sequence[str]) -> list[PageSection]:
@@ -168,10 +176,14 @@ def notices_section(notices: Sequence[str]) -> list[PageSection]:
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """All of a page, from top to bottom; everything is plain text, never HTML."""
+    """All of a page, from top to bottom; everything is plain text, never HTML.
+
+    `verdict` is the result in a sentence.
+    """
 
     title: str
     subtitle: str = ""
+    verdict: str = ""
     figures: Sequence[KeyFigure] = ()
     sections: Sequence[PageSection] = ()
 
@@ -294,6 +306,7 @@ def _chart(illustration: Illustration, number: int) -> dict[str, Any]:
         "heading": heading,
         "caption": " ".join(text for text in (subtitle, illustration.caption) if text),
         "description": specification.get("description", heading),
+        "half": illustration.half,
         "switch": any(
             "bind" in parameter for parameter in specification.get("params", ()) if "select" not in parameter
         ),

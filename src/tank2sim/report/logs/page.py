@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import PurePath
 
 import numpy as np
@@ -48,21 +49,37 @@ def log_page(found: Json) -> Page:
     files = [stretch for stretch in stretches if stretch["file"]]
     faults = sum(finding["kind"] == "fault" for finding in found["findings"])
     figures = [
-        KeyFigure(label="Duration", value=found["duration_s"], unit="s"),
+        KeyFigure(label="Trials cut out", value=len(files), note=f"of {len(stretches)} stretches"),
+        KeyFigure(
+            label="Time that excites the vessel",
+            value=round(sum(float(stretch["duration_s"]) for stretch in exciting)),
+            unit="s",
+            note=f"of {found['duration_s']:.4g} s",
+        ),
         KeyFigure(label="Channels in use", value=sum(channel["use"] for channel in channels)),
-        KeyFigure(label="Stretches that excite", value=len(exciting), note=f"of {len(stretches)}"),
-        KeyFigure(label="Trials", value=len(files)),
         KeyFigure(label="Faults", value=faults, verdict=Verdict.CAUTION if faults else Verdict.PASSED),
     ]
     sections = [*_map(found), *_time_line(found)]
     sections.append(PageSection(heading="Stretches", tables=[_stretch_table(stretches)]))
-    sections.append(PageSection(heading="Channels", tables=[_channel_table(channels)]))
     sections += _verdicts(found.get("identified"))
-    sections.append(PageSection(heading="Logs", tables=[_log_table(found["logs"])]))
     sections += notices_section(found["notices"])
+    tables = [_channel_table(channels), _log_table(found["logs"])]
+    sections.append(PageSection(heading="Channels and logs", tables=tables, folded=True))
     names = ", ".join(PurePath(str(entry["file"])).name for entry in found["logs"])
     subtitle = f"Voyage from {found['begins_utc']}" if found["begins_utc"] else "Voyage without a date"
-    return Page(title=f"Log: {names}", subtitle=subtitle, figures=figures, sections=sections)
+    return Page(
+        title=f"Log: {names}", subtitle=subtitle, verdict=_verdict(files, faults), figures=figures, sections=sections
+    )
+
+
+def _verdict(cut: Sequence[Json], faults: int) -> str:
+    """What the log gives for an identification."""
+    if not cut:
+        return "The log has no manoeuvre that could be cut out as a trial."
+    stems = (PurePath(stretch["file"]).stem for stretch in cut[:_MOST_TRACKS])  # such as 02_zigzag_-20
+    names = ", ".join(stem.partition("_")[2].replace("_", " ") for stem in stems)
+    count = f"{len(cut)} trials are" if len(cut) > 1 else "One trial is"
+    return f"{count} cut out: {names}." + (f" {faults} faults are noted below." if faults else "")
 
 
 def _map(found: Json) -> list[PageSection]:
@@ -94,25 +111,25 @@ def _time_line(found: Json) -> list[PageSection]:
     shown = [signal for signal in _SIGNALS if signal.name in line]
     if not shown:
         return []
-    runs = []
-    charts = []
-    for signal in shown:
-        entry = line[signal.name]
-        runs.append(History(label="log", time_s=vector(entry["t_s"]), values={signal.name: vector(entry["value"])}))
-        marks = [
-            TimeMark(
-                signal=signal.name,
-                begin_s=float(stretch["begins_s"]),
-                end_s=float(stretch["begins_s"]) + float(stretch["duration_s"]),
-                text=str(stretch["file"] or stretch["kind"]),
-            )
-            for stretch in found["stretches"]
-            if stretch["excites"]
-        ]
-        title = signal.title[:1].upper() + signal.title[1:]
-        charts.append(Illustration(chart=history_chart(runs[-1:], [signal], title=title, marks=marks)))
-    text = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
-    return [PageSection(heading="Time line", text=text, charts=charts)]
+    read = {signal.name: (vector(line[signal.name]["t_s"]), vector(line[signal.name]["value"])) for signal in shown}
+    time = np.unique(np.concatenate([own for own, _ in read.values()]))
+    values = {name: np.interp(time, *series, left=np.nan, right=np.nan) for name, series in read.items()}
+    marks = [
+        TimeMark(
+            signal=signal.name,
+            begin_s=float(stretch["begins_s"]),
+            end_s=float(stretch["begins_s"]) + float(stretch["duration_s"]),
+            text=str(stretch["file"] or stretch["kind"]),
+        )
+        for signal in shown
+        for stretch in found["stretches"]
+        if stretch["excites"]
+    ]
+    caption = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
+    chart = history_chart(
+        [History(label="log", time_s=time, values=values)], shown, title="What was logged", height_px=70, marks=marks
+    )
+    return [PageSection(heading="Time line", charts=[Illustration(chart=chart, caption=caption)])]
 
 
 def _stretch_table(stretches: Json) -> PageTable:

@@ -67,10 +67,12 @@ def manoeuvre_page(result: Json) -> Page:
         PageSection(heading="Figures", tables=_tables(result, ensemble)),
         *notices_section([*result.get("notices", []), *ensemble.get("notices", [])]),
     ]
+    tiles = [_key_figure(name, figures[name], result, ensemble) for name in names if name in figures]
     return Page(
         title=f"{result['ship']}: {_title(result)}",
         subtitle=f"Simulated manoeuvre {result['manoeuvre']}" + (f", {_members(ensemble)}" if ensemble else ""),
-        figures=[_key_figure(name, figures[name], result, ensemble) for name in names if name in figures],
+        verdict=_verdict(result, tiles),
+        figures=tiles,
         sections=[section for section in sections if section.charts or section.tables or section.notes],
     )
 
@@ -134,6 +136,33 @@ def _key_figure(name: str, value: float, result: Json, ensemble: Json) -> KeyFig
     return KeyFigure(
         label=label[:1].upper() + label[1:], value=value, unit=unit, verdict=verdict, note="; ".join(notes), limit=limit
     )
+
+
+_MEET = 0.05
+"""Yaw rates at the end of the pull-outs from both sides that differ by less than this share of those at their begin
+have met. Project choice: what is left of a stable ship's after three of its time constants."""
+
+
+def _verdict(result: Json, tiles: Sequence[KeyFigure]) -> str:
+    """The result in a sentence, where IMO or a pull-out has one."""
+    if _kind(result) == "pullout" and result.get("other_side"):
+        pairs = [(side["steady_rate_degps"], side["residual_rate_degps"]) for side in _both_sides(result)]
+        (first, first_left), (second, second_left) = pairs
+        if abs(first_left - second_left) <= _MEET * abs(first - second):
+            return "The ship is stable on a straight course: the yaw rates from both sides meet."
+        return "The yaw rates from both sides stay apart: the ship is unstable on a straight course, or very slow."
+    judged = [tile for tile in tiles if tile.limit is not None]
+    if not judged:
+        return ""
+    if failed := [tile.label.lower() for tile in judged if tile.verdict is Verdict.FAILED]:
+        return f"Beyond the limit of IMO MSC.137(76): {' and '.join(failed)}."
+    if any(tile.verdict is Verdict.CAUTION for tile in judged):
+        return "The run leaves the range of the card: figures that were settled there have no verdict."
+    return "Within the limits of IMO MSC.137(76)."
+
+
+def _both_sides(result: Json) -> tuple[Json, Json]:
+    return result["figures"], result["other_side"]["figures"]
 
 
 def _limit(result: Json, name: str) -> float | None:

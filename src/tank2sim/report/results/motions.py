@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
@@ -22,7 +23,7 @@ from tank2sim.report.kit.motion_charts import (
     track_chart,
 )
 from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Column, Illustration, PageSection, PageTable
+from tank2sim.report.kit.page import Illustration, PageSection
 from tank2sim.units import to_si
 
 _Columns = Mapping[str, Sequence[float | None]]
@@ -59,9 +60,6 @@ _UNITS = {
 }
 _TRACK = ("x_m", "y_m")
 _ORDER, _ANGLE = "delta_order", "delta"
-
-_MOST_RECORDS = 12
-"""Records drawn in one page, a quarter of a MB each (project choice)."""
 
 
 def is_columns(value: Json) -> bool:
@@ -103,6 +101,16 @@ def motions(
     return drawn
 
 
+def measured_histories(columns: _Columns, title: str) -> alt.VConcatChart | None:
+    """The signals of a record over time, but its positions; None without any."""
+    signals = _signals({"measured": columns})
+    if not signals:
+        return None
+    table = _in_si(columns)
+    record = History(label="measured", time_s=table["t_s"], values=_by_stem(table))
+    return history_chart([record], signals, title=title, height_px=60)
+
+
 def varying_histories(columns: _Columns, ensemble: Mapping[str, Json]) -> Illustration | None:
     """The signals of a run that change, over time, with the bands of an ensemble; those that do not in the caption."""
     table = _by_stem(_in_si(columns))
@@ -127,32 +135,12 @@ def varying_histories(columns: _Columns, ensemble: Mapping[str, Json]) -> Illust
 def _band(name: str, band: Mapping[str, Sequence[float | None]], time_s: Sequence[float]) -> HistoryBand:
     edges = _in_si({f"{edge}_{name}": band[edge] for edge in ("p5", "p95")})
     low, high = edges.values()
-    return HistoryBand(signal=_stem(name), time_s=time_s, low=low, high=high)
+    return HistoryBand(signal=stem_of(name), time_s=time_s, low=low, high=high)
 
 
 def _held(signal: Signal, value: float) -> str:
     unit, factor = shown_unit(signal.unit, signal.display_unit)
     return f"{format_number(factor * value)} {unit}".strip()
-
-
-def audit_sections(result: Json) -> list[PageSection]:
-    """What each trial measured, with the places of the findings, below what was found."""
-    sections = []
-    # Trials with findings come first: of many records the page has as many as it can hold.
-    faulty = {entry["file"] for entry in result["findings"]}
-    trials = [entry for entry in result["trials"] if is_columns(entry.get("histories"))]
-    for trial in sorted(trials, key=lambda entry: entry["file"] not in faulty)[:_MOST_RECORDS]:
-        found = [entry for entry in result["findings"] if entry["file"] == trial["file"]]
-        name = str(trial["file"]).rpartition("/")[2]
-        marks = _marks(found, trial)
-        charts = motions(name, {"measured": trial["histories"]}, marks=marks)
-        text = "" if found else "Nothing is found wrong."
-        if marks:
-            text = "Red in the histories: the places of findings about single values and rows."
-        sections.append(
-            PageSection(heading=f"Record {name}", text=text, charts=charts, tables=[_findings(found)] if found else [])
-        )
-    return sections
 
 
 _WAYS = {
@@ -172,24 +160,6 @@ def from_the_bridge(result: Json) -> list[PageSection]:
     return [PageSection(heading="Ways", charts=charts)] if charts else []
 
 
-def _findings(found: Sequence[Mapping[str, Json]]) -> PageTable:
-    heads = {"kind": "", "column": "column", "what": "what", "likely_truth": "likely truth", "repaired": "repaired"}
-    rows = [[finding.get(key) for key in heads] for finding in found]
-    return PageTable(caption="Findings", columns=[Column(title=head) for head in heads.values()], rows=rows)
-
-
-def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> list[TimeMark]:
-    """A finding about a column in its panel, one about the time in all."""
-    _, *columns = trial["histories"]
-    stems = dict(zip(trial["columns"], map(_stem, columns), strict=False))  # by what the file calls them
-    marks = []
-    for finding in found:
-        at = [stems[finding["column"]]] if finding["column"] in stems else list(stems.values())
-        for begin, end in finding.get("places_s") or ():
-            marks += [TimeMark(signal=name, begin_s=begin, end_s=end, text=str(finding["what"])) for name in at]
-    return marks
-
-
 def _in_si(columns: _Columns) -> dict[str, Array]:
     found = {}
     for name, values in columns.items():
@@ -199,12 +169,13 @@ def _in_si(columns: _Columns) -> dict[str, Array]:
     return found
 
 
-def _stem(name: str) -> str:
+def stem_of(name: str) -> str:
+    """Return the name of a column without its unit."""
     return name.rpartition("_")[0] or name
 
 
 def _by_stem(table: Mapping[str, Array]) -> dict[str, Array]:
-    return {_stem(name): values for name, values in table.items() if name != "t_s" and name not in _TRACK}
+    return {stem_of(name): values for name, values in table.items() if name != "t_s" and name not in _TRACK}
 
 
 def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
@@ -212,10 +183,10 @@ def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
     found = []
     for name in names:
         unit = to_si(name, 1.0)[0].rpartition("_")[2]
-        display = {"n": "rpm"}.get(_stem(name))
+        display = {"n": "rpm"}.get(stem_of(name))
         known = _UNITS.get(unit, "1")
-        title = _TITLES.get(_stem(name)) or (words(name)[0] if unit in _UNITS else titled(name))
-        found.append(Signal(name=_stem(name), title=title, unit=known, display_unit=display))
+        title = _TITLES.get(stem_of(name)) or (words(name)[0] if unit in _UNITS else titled(name))
+        found.append(Signal(name=stem_of(name), title=title, unit=known, display_unit=display))
     order = list(_TITLES)
     return sorted(found, key=lambda signal: order.index(signal.name) if signal.name in order else len(order))
 

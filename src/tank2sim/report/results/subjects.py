@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from tank2sim.report.audit.page import audit_page
 from tank2sim.report.autopilot.craft_page import craft_autopilot_page
 from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.captive.mmg_page import mmg_reduction_page
@@ -22,7 +23,7 @@ from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
 from tank2sim.report.logs.page import log_page
 from tank2sim.report.manoeuvre.page import manoeuvre_page
-from tank2sim.report.results.motions import audit_sections, from_the_bridge
+from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
@@ -52,9 +53,6 @@ class _Page:
 _WAY = ("ahead_m", "starboard_m")
 
 _SECTIONS: Mapping[str, _Sections] = {
-    "Audit of trials": _Sections(
-        audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")
-    ),
     "Bridge": _Sections(
         from_the_bridge,
         {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
@@ -63,6 +61,7 @@ _SECTIONS: Mapping[str, _Sections] = {
 }
 
 _PAGES: Mapping[str, _Page] = {
+    "Audit of trials": _Page(audit_page, {"findings": list, "trials": list}),
     "Cards compared": _Page(
         compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),

@@ -14,6 +14,7 @@ from tank2sim.report.kit.chart_parts import vector
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+from tank2sim.report.results.motions import measured_histories
 from tank2sim.report.signals.charts import (
     autocorrelation_chart,
     cross_correlation_chart,
@@ -30,6 +31,9 @@ ChartKey = tuple[str, str]
 _FILTER = "filter"
 _UNITS = {"rad": "rad", "radps": "rad/s", "mps": "m/s", "m": "m"}
 
+_SIDE_BY_SIDE = ("_density", "_autocorrelation", "_spectrum")
+"""Endings of the subjects of charts of a single signal."""
+
 _HOW = (
     "Mean and standard deviation of directions are those on the circle. "
     "Stationarity: augmented Dickey-Fuller and KPSS tests, whose null hypotheses are opposite, at 5 %. Normality is "
@@ -42,42 +46,89 @@ _HOW = (
 def signals_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim signals``."""
     trials = found["trials"]
-    columns = [column for trial in trials for column in trial["columns"].values()]
-    stationary = [column for column in columns if _is_stationary(column)]
-    figures = [
-        KeyFigure(label="Trials", value=len(trials)),
-        KeyFigure(label="Signals", value=len(columns)),
-        KeyFigure(label="Stationary", value=len(stationary), note="of these signals"),
-    ]
     sections: list[PageSection] = []
-    for label, trial in zip(trial_labels(trials), trials, strict=True):
-        steering = trial["rudder_to_yaw_rate"] or {"notices": ()}
-        charts = [Illustration(chart=chart, caption=_caption(key[1])) for key, chart in _trial_charts(label, trial)]
-        sections.append(
-            PageSection(
-                heading=label,
-                text="" if sections else _HOW,
-                tables=[_signals(trial["columns"]), _tests(trial["columns"])],
-                charts=charts,
-                notes=[*trial["notices"], *steering["notices"]],
-            )
-        )
     if (applied := found.get("filter")) and "before" in applied:
         charts = [Illustration(chart=chart) for _, chart in _filter_charts(applied)]
         sections.append(PageSection(heading="Filter", text=applied["sentence"], charts=charts))
-    title = _name(trials[0]) if len(trials) == 1 else f"{len(trials)} trials"
-    return Page(title=title, subtitle="Measured signals", figures=figures, sections=sections)
+    for label, trial in zip(trial_labels(trials), trials, strict=True):
+        steering = trial["rudder_to_yaw_rate"] or {"notices": ()}
+        sections.append(
+            PageSection(
+                heading=label,
+                tables=[_signals(trial["columns"])],
+                charts=_illustrations(_trial_charts(label, trial)),
+                notes=[*trial["notices"], *steering["notices"]],
+            )
+        )
+    for label, trial in zip(trial_labels(trials), trials, strict=True):
+        sections.append(
+            PageSection(
+                heading=f"Each signal of {label}",
+                text=_HOW,
+                charts=_illustrations(_signal_charts(label, trial)),
+                tables=[_tests(trial["columns"])],
+                folded=True,
+            )
+        )
+    title = f"Signals of {_name(trials[0])}" if len(trials) == 1 else f"Signals of {len(trials)} trials"
+    columns = [column for trial in trials for column in trial["columns"].values()]
+    return Page(
+        title=title,
+        subtitle="Statistics and spectra of what was measured",
+        verdict=_verdict(columns),
+        figures=_figures(trials, columns),
+        sections=sections,
+    )
+
+
+def _verdict(columns: Sequence[Json]) -> str:
+    varying = [column for column in columns if not column["constant"]]
+    steady = sum(map(_is_stationary, varying))
+    if not varying:
+        return "No signal varies."
+    if steady == len(varying):
+        return "All signals that vary are stationary: their means and spectra describe the record."
+    return (
+        f"{steady} of {len(varying)} signals that vary are stationary. Of the others mean and spectrum say little: "
+        "they drift over the record, as those of a manoeuvre do."
+    )
+
+
+def _figures(trials: Sequence[Json], columns: Sequence[Json]) -> list[KeyFigure]:
+    varying = [column for column in columns if not column["constant"]]
+    steady = sum(map(_is_stationary, varying))
+    figures = [KeyFigure(label="Stationary signals", value=f"{steady} of {len(varying)}")]
+    counts = [column["effective_count"] for column in varying if column.get("effective_count") is not None]
+    if counts:
+        slow = max(varying, key=lambda column: column.get("correlation_time_s") or 0.0)
+        time_s = slow["correlation_time_s"]
+        figures.append(KeyFigure(label="Longest correlation time", value=float(f"{time_s:.3g}"), unit="s"))
+        note = "of the slowest signal: what its mean rests on"
+        figures.append(KeyFigure(label="Independent samples, fewest", value=float(f"{min(counts):.3g}"), note=note))
+    lags = [steering["cross_correlation"] for trial in trials if (steering := trial["rudder_to_yaw_rate"])]
+    if lags:
+        lag_s = float(f"{lags[0]['lag_of_largest_s']:.3g}")
+        note = "lag of the largest correlation" + (" in the first trial" if len(trials) > 1 else "")
+        figures.append(KeyFigure(label="Yaw rate after the rudder", value=lag_s, unit="s", note=note))
+    return figures
+
+
+def _illustrations(charts: Iterator[tuple[ChartKey, alt.TopLevelMixin]]) -> list[Illustration]:
+    return [
+        Illustration(chart=chart, caption=_caption(key[1]), half=key[1].endswith(_SIDE_BY_SIDE))
+        for key, chart in charts
+    ]
 
 
 def signals_charts(found: Json) -> dict[ChartKey, alt.TopLevelMixin]:
-    """Return the charts of the page: three of each signal that varies, two of rudder and yaw rate, two of a filter."""
+    """Return the charts of the page: a filter's two; of each trial its histories and two of rudder and yaw rate; three
+    of each signal that varies."""
     trials = found["trials"]
-    charts = {
-        key: chart
-        for label, trial in zip(trial_labels(trials), trials, strict=True)
-        for key, chart in _trial_charts(label, trial)
-    }
-    return charts | dict(_filter_charts(found["filter"]) if found.get("filter") else ())
+    labelled = list(zip(trial_labels(trials), trials, strict=True))
+    charts = dict(_filter_charts(found["filter"]) if found.get("filter") else ())
+    for drawn in (_trial_charts, _signal_charts):
+        charts |= {key: chart for label, trial in labelled for key, chart in drawn(label, trial)}
+    return charts
 
 
 def trial_labels(trials: Sequence[Json]) -> list[str]:
@@ -103,22 +154,31 @@ def _is_stationary(column: Json) -> bool:
 
 
 def _trial_charts(label: str, trial: Json) -> Iterator[tuple[ChartKey, alt.TopLevelMixin]]:
+    if trial.get("histories") and (chart := measured_histories(trial["histories"], title=f"Measured: {label}")):
+        yield (label, "histories"), chart
+    if steering := trial["rudder_to_yaw_rate"]:
+        pair = _signal(steering["rudder"]), _signal("r_degps")
+        title = f"From {pair[0].words} to {pair[1].words}"
+        yield (label, "transfer"), transfer_chart(*pair, steering, title=title)
+        title = f"Cross-correlation of {pair[0].words} and {pair[1].words}"
+        correlation = steering["cross_correlation"]
+        yield (label, "cross_correlation"), cross_correlation_chart(*pair, correlation, title=title)
+
+
+def _signal_charts(label: str, trial: Json) -> Iterator[tuple[ChartKey, alt.TopLevelMixin]]:
+    """Correlation and spectrum of each signal side by side, and its density."""
     for file, column in trial["columns"].items():
         if column["constant"]:
             continue
         name = _signal(file)
-        stem, subject = name.stem, f"{name.words}, {label}"
+        stem, subject = name.stem, name.words[:1].upper() + name.words[1:]
         density, spectrum = column["probability_density"], column["spectrum"]
-        yield (label, f"{stem}_density"), density_chart(name, density, title=f"Probability density of {subject}")
-        yield (label, f"{stem}_correlation"), autocorrelation_chart(name, column, title=f"Autocorrelation of {subject}")
-        yield (label, f"{stem}_spectrum"), spectrum_chart(name, spectrum, title=f"Spectrum of {subject}")
-    if steering := trial["rudder_to_yaw_rate"]:
-        pair = _signal(steering["rudder"]), _signal("r_degps")
-        title = f"Cross-correlation of {pair[0].words} and {pair[1].words}, {label}"
-        correlation = steering["cross_correlation"]
-        yield (label, "cross_correlation"), cross_correlation_chart(*pair, correlation, title=title)
-        title = f"From {pair[0].words} to {pair[1].words}, {label}"
-        yield (label, "transfer"), transfer_chart(*pair, steering, title=title)
+        yield (label, f"{stem}_density"), density_chart(name, density, title=f"{subject}: probability density")
+        yield (
+            (label, f"{stem}_autocorrelation"),
+            autocorrelation_chart(name, column, title=f"{subject}: autocorrelation"),
+        )
+        yield (label, f"{stem}_spectrum"), spectrum_chart(name, spectrum, title=f"{subject}: spectrum")
 
 
 def _filter_charts(applied: Json) -> Iterator[tuple[ChartKey, alt.TopLevelMixin]]:

@@ -87,7 +87,9 @@ def stability_page(found: Json) -> Page:
         sections.append(_characteristic(found["characteristic"]))
     sections += notices_section(found["notices"])
     subtitle = f"Stability and manoeuvrability, {found['operating_point']['speed_mps']:.4g} m/s"
-    return Page(title=found["ship"], subtitle=subtitle, figures=_figures(found), sections=sections)
+    return Page(
+        title=found["ship"], subtitle=subtitle, verdict=_verdict(found), figures=_figures(found), sections=sections
+    )
 
 
 def _figures(found: Json) -> list[KeyFigure]:
@@ -116,12 +118,29 @@ def _figures(found: Json) -> list[KeyFigure]:
     return figures
 
 
+def _verdict(found: Json) -> str:
+    straight, imo = found["stability_criterion"], found["imo"]
+    course = "Stable on a straight course" if straight["stable"] else "Unstable on a straight course"
+    loop = (found["steady_turning"] or {}).get("loop")
+    width = f", with a loop {loop['width_deg']:.3g} deg wide" if loop else ""
+    met = [criterion["passed"] for criterion in imo]
+    if missed := [criterion["name"] for criterion in imo if criterion["passed"] is False]:
+        return f"{course}{width}. Beyond IMO MSC.137(76): {'; '.join(missed)}."
+    if not any(met):
+        return f"{course}{width}."
+    judged = "all criteria" if all(met) else f"{met.count(True)} of {len(met)} criteria, the others are open,"
+    return f"{course}{width}. It meets {judged} of IMO MSC.137(76)."
+
+
 def _margin_figure(straight: Json, margins: Json) -> KeyFigure:
     if not straight["C_prime_decides"]:
         note = f"a mode grows at {straight['growth_per_s']:.3g} 1/s that C′ does not show"
         return KeyFigure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
     note = f"levers {format_number(margins['lever_margin_lengths'], 3)} L apart"
     return KeyFigure(label="Margin", value=margins["margin_percent"], unit="%", note=note)
+
+
+_NOMOTO_TIMES = ("T", "T1", "T2", "T3")
 
 
 def _straight_line(found: Json) -> PageSection:
@@ -156,11 +175,8 @@ def _straight_line(found: Json) -> PageSection:
             eigenvalues,
             PageTable(
                 caption=f"Nomoto's coefficients, yaw rate by rudder{slow}.",
-                columns=[Column(title=title) for title in ("", "K", "T", "T1", "T2", "T3")],
-                rows=[
-                    ["1/s and s", *nomoto["dimensional"].values()],
-                    ["prime (L/U)", *nomoto["prime"].values()],
-                ],
+                columns=[Column(title="K", unit="1/s"), *(Column(title=name, unit="s") for name in _NOMOTO_TIMES)],
+                rows=[list(nomoto["dimensional"].values())],
             ),
         ],
     )
@@ -198,7 +214,7 @@ def _margin_influences(found: Json) -> PageSection:
     if margins["derivatives"]:
         charts.insert(0, Illustration(chart=influence_chart(margins, title="Influence on C′")))
     text = f"Derivatives are prime, mass in kg and x_G in m. {_TRIM}"
-    return PageSection(heading="What moves the margin", text=text, tables=[table], charts=charts)
+    return PageSection(heading="What moves the margin", text=text, tables=[table], charts=charts, folded=True)
 
 
 def _response(responses: Sequence[Json]) -> PageSection:
@@ -210,7 +226,7 @@ def _response(responses: Sequence[Json]) -> PageSection:
         Illustration(chart=steering_bode(responses, title="Bode diagram")),
         Illustration(chart=step_chart(responses, title="Step of the rudder")),
     ]
-    return PageSection(heading=heading, text=_RESPONSE, charts=charts)
+    return PageSection(heading=heading, text=_RESPONSE, charts=charts, folded=True)
 
 
 def _turning(turning: Json, spirals: Json) -> PageSection:
@@ -254,6 +270,7 @@ def _characteristic(found: Json) -> PageSection:
         heading="Nonlinear steering characteristic",
         text=_CHARACTERISTIC,
         tables=[PageTable(caption=caption, columns=heads, rows=rows)],
+        folded=True,
         charts=[Illustration(chart=characteristic_chart(found, title="Rudder that holds a yaw rate"))],
     )
 

@@ -18,15 +18,28 @@ def steering_catalogue_page(found: Json) -> Page:
     return Page(
         title=found["ship"],
         subtitle="Steering models compared by their turns and their influence coefficients",
+        verdict=_verdict(found),
         figures=_figures(found),
         sections=[
             _turning(found),
+            _manoeuvres(found),
             _influence(found),
             *([_joint_variation(found)] if found["combined_predictions"] else []),
-            _manoeuvres(found),
             *([_tuning(found["two_point_tuning"])] if found["two_point_tuning"] else []),
             _missing(found),
         ],
+    )
+
+
+def _verdict(found: Json) -> str:
+    """How far apart the models are."""
+    radii = {found["titles"][model]: table["radius_m"] for model, table in found["influence"].items()}
+    if len(radii) < 2:
+        return ""
+    least, most = min(radii, key=lambda name: radii[name]), max(radii, key=lambda name: radii[name])
+    return (
+        f"At {found['rudder_deg']:g} deg of rudder the models turn with radii from {radii[least]:.3g} m ({least}) to "
+        f"{radii[most]:.3g} m ({most})."
     )
 
 
@@ -206,6 +219,7 @@ def _joint_variation(found: Json) -> PageSection:
             PageTable(caption="Predicted and computed radius", columns=columns, rows=rows),
         ],
         notes=[f"The source multiplies {slip}: that slip, not the method, is the difference."] if slip else [],
+        folded=True,
     )
 
 
@@ -225,7 +239,7 @@ def _manoeuvres(found: Json) -> PageSection:
     columns = [Column(title="model"), *heads, *overshoot_heads]
     return PageSection(
         heading="Manoeuvres",
-        text="The steady models in time: (1) of the paper, drift angle and yaw rate, from a straight course.",
+        text="The steady models in time, by drift angle and yaw rate, from a straight course.",
         charts=[Illustration(chart=chart)],
         tables=[PageTable(caption="Figures", columns=columns, rows=rows)],
     )
@@ -271,4 +285,4 @@ def _missing(found: Json) -> PageSection:
         tables.append(
             PageTable(caption="K over the draught T in m, through its printed values", columns=heads, rows=polynomials)
         )
-    return PageSection(heading="What is missing", text="As far as it is published.", tables=tables)
+    return PageSection(heading="What is missing", text="As far as it is published.", tables=tables, folded=True)

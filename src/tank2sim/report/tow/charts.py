@@ -11,6 +11,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
 from tank2sim.report.kit.chart_parts import (
     NUMBER,
+    STACKS,
     Chart,
     ChartRecord,
     data,
@@ -53,7 +54,7 @@ def tow_speed_chart(speeds: Json, *, title: str = "") -> alt.VConcatChart:
 
 
 def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_mps: float) -> alt.HConcatChart:
-    """Fig. 2 of paper 1: C referred to L^2 against speed, and C referred to V^(2/3) against Reynolds number."""
+    """C referred to L^2 against speed, and C referred to V^(2/3) against Reynolds number."""
     speeds = np.linspace(0.0, top_speed_mps, 121)
     look = series_look(list(drags))
     rows = [
@@ -91,8 +92,9 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
         hover = base.mark_point(opacity=0, filled=True, size=110, clip=True).encode(tooltip=tooltip)
         panels.append(alt.layer(zero, line, hover).properties(width=330, height=300))
     return alt.hconcat(*panels, spacing=28).properties(
-        title="Drag coefficient (Fig. 2)",
+        title="Drag coefficient",
         description="Drag coefficient referred to length squared over speed, and to volume over Reynolds number.",
+        usermeta=STACKS,
     )
 
 
@@ -183,7 +185,11 @@ def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) ->
     height = 30 * len(models)
     return alt.hconcat(
         masses.properties(width=width_px, height=height), ranks.properties(width=width_px - 60, height=height)
-    ).properties(title="Models of different size", description="Mass and AIC of each model fitted by output error.")
+    ).properties(
+        title="Models of different size",
+        description="Mass and AIC of each model fitted by output error.",
+        usermeta=STACKS,
+    )
 
 
 def _verdict(model: Mapping[str, Json]) -> str:

@@ -9,13 +9,17 @@ from numpy.polynomial import Polynomial
 
 from tank2sim.dynamics.surge import SurgeCoefficients
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody, drag_polynomial
+from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.fit import DELAY, TOW_PARAMETERS
 from tank2sim.identification.tow.force import force_words
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 from tank2sim.report.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
+
+_LARGEST_CONDITION = COLLINEAR**2
+"""Scaled condition number up to which the unknowns can be distinguished."""
 
 _UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}
 
@@ -23,17 +27,19 @@ _UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay"
 def tow_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim tow``."""
     best = _best_model(found)
-    sections = [_estimates(found), _speeds(found["speeds"]), _models(found)]
-    if found["tow_by_tow"]:
-        sections.append(_by_tow(found["tow_by_tow"]))
+    sections = [_speeds(found), _models(found)]
     if found.get("body"):
         sections += [_drag(found, best), _theory(found, best)]
+    sections.append(_estimates(found))
+    if found["tow_by_tow"]:
+        sections.append(_by_tow(found["tow_by_tow"]))
     count = len(found["speeds"]["measured_mps"])
     tows = f"{count} tows" if count > 1 else "one tow"
     force = force_words(Polynomial(found["force_polynomial"]))
     return Page(
         title="Surge mass and drag from accelerating tows",
         subtitle=f"{PurePath(found['tows']).name}: {tows}, {force}, m = {found['mass_kg']:g} kg",
+        verdict=_verdict(found, best),
         figures=_figures(found, best),
         sections=sections,
     )
@@ -47,6 +53,14 @@ def _best_model(found: Json) -> Json:
 
 def _label(model: Json) -> str:
     return ", ".join(model["unknowns"])
+
+
+def _verdict(found: Json, best: Json) -> str:
+    if best is None:
+        return "These tows determine no model with a drag that a hull can have: more tows, or others, are needed."
+    mass, half = best["estimates"]["M"], best["half_widths_95"]["M"]
+    text = f"The body moves as {mass:.0f} ± {half:.0f} kg (95 %), of which {mass - found['mass_kg']:.0f} kg is water"
+    return f"{text}. These tows determine {_label(best)}, and no more."
 
 
 def _figures(found: Json, best: Json) -> list[KeyFigure]:
@@ -63,21 +77,25 @@ def _figures(found: Json, best: Json) -> list[KeyFigure]:
         label = "Range of M that these tows leave"
         figures.append(KeyFigure(label=label, value=value, unit="t", note="over all usable models"))
     worst = max(found["methods"].values(), key=lambda fit: fit["condition_scaled"] or 0.0)
-    note = f"scaled, of {', '.join(worst['estimated'])}; up to 900 is acceptable"
     if worst["condition_scaled"] is not None:
         condition = float(f"{worst['condition_scaled']:.2g}")
-        figures.append(KeyFigure(label="Largest condition number", value=condition, note=note))
+        verdict = Verdict.PASSED if condition <= _LARGEST_CONDITION else Verdict.FAILED
+        note = f"scaled; at most {_LARGEST_CONDITION:g} distinguishes them"
+        label = f"Condition number of {', '.join(worst['estimated'])}"
+        figures.append(KeyFigure(label=label, value=condition, note=note, verdict=verdict, limit=_LARGEST_CONDITION))
     return figures
 
 
+_METHODS = {"paper": "as published", "qr": "least squares", "output_error": "output error"}
+
 _ESTIMATES = (
-    "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T (1.5). The method of the paper and QR put a polynomial through the mean "
-    "speeds and solve the least squares of the equation; output error integrates the equation and fits all "
+    "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T. The published method and least squares put a polynomial through the mean "
+    "speeds and solve this equation for it; output error integrates the equation and fits all "
     "readings. ± is one standard error. A force that is wrong by one per cent makes all of them wrong by one per "
     "cent: a constant force next to T cannot be found."
 )
 _FIT_ROWS = (
-    ("J of (1.6), N √s", "J"),
+    ("root of the integrated square error, N √s", "J"),
     ("condition number, scaled", "condition_scaled"),
     ("largest speed error, m/s", "largest_speed_error_mps"),
 )
@@ -87,7 +105,7 @@ def _estimates(found: Json) -> PageSection:
     methods = found["methods"]
     columns = [Column(title="")]
     for name in methods:
-        columns += [Column(title=name.replace("_", " "), digits=5), Column(title="±", digits=2)]
+        columns += [Column(title=_METHODS.get(name, name), digits=5), Column(title="±", digits=2)]
     names = {key: name for name, key in TOW_PARAMETERS.items()} | {"added_mass_kg": "added mass"}
     rows: list[list[Cell]] = []
     keys = dict.fromkeys(key for fit in methods.values() for key in fit["estimates"] if key != "added_mass_kg")
@@ -97,7 +115,7 @@ def _estimates(found: Json) -> PageSection:
     for title, key in _FIT_ROWS:
         rows.append([title, *(cell for fit in methods.values() for cell in (_text(fit[key], 5), None))])
     tables = [PageTable(caption="Estimates by method", columns=columns, rows=rows), _polynomials(found)]
-    return PageSection(heading="Estimates", text=_ESTIMATES, tables=tables, notes=found["warnings"])
+    return PageSection(heading="Estimates by method", text=_ESTIMATES, tables=tables, folded=True)
 
 
 def _cells(fit: Json, key: str) -> tuple[Cell, Cell]:
@@ -127,19 +145,19 @@ def _polynomials(found: Json) -> PageTable:
         if printed:
             values, error = tow_paper.TABLE_2[degree]
             rows.append([f"{degree}, printed", *values, *absent, error, None])
-    source = ", next to Table 2 of the paper, which no single change of its Table 1 gives" if printed else ""
+    source = ", next to the printed ones, which no single change of the printed readings gives" if printed else ""
     caption = f"Polynomials v = α₀ + α₁ t + ... through the mean speeds, m/s over s{source}"
     return PageTable(caption=caption, columns=columns, rows=rows)
 
 
-def _speeds(speeds: Json) -> PageSection:
-    """Readings, simulated speeds and their differences."""
-    heading = "Speeds and residuals"
+def _speeds(found: Json) -> PageSection:
+    """Readings, simulated speeds and their differences, and what the reader of the result must not miss."""
+    heading, speeds, notes = "Measured and computed speeds", found["speeds"], found["warnings"]
     if not speeds["simulated_mps"]:
-        return PageSection(heading=heading)
+        return PageSection(heading=heading, notes=notes)
     chart = tow_speed_chart(speeds, title="Speeds of the tows and of the models")
     caption = f"Below, everything less {next(iter(speeds['simulated_mps']))}."
-    return PageSection(heading=heading, charts=[Illustration(chart=chart, caption=caption)])
+    return PageSection(heading=heading, charts=[Illustration(chart=chart, caption=caption)], notes=notes)
 
 
 def _models(found: Json) -> PageSection:
@@ -168,7 +186,7 @@ def _models(found: Json) -> PageSection:
         heading="What these tows determine",
         text="The same readings by output error with fewer and with more unknowns (SI units; delay: the body starts so "
         "much later than t = 0).",
-        tables=[PageTable(caption="Models by output error", columns=columns, rows=rows)],
+        tables=[PageTable(caption="Models by output error", columns=columns, rows=rows, folded=True)],
         charts=charts,
     )
 
@@ -199,9 +217,10 @@ def _by_tow(by_tow: Mapping[str, Json]) -> PageSection:
         tables.append(PageTable(caption=label[0].upper() + label[1:], columns=columns, rows=rows))
     return PageSection(
         heading="Tow by tow",
-        text="Each tow by itself, as the authors propose at their end, and one left out in turn. These errors hold "
+        text="Each tow by itself, and one left out in turn. These errors hold "
         "also where the readings of one tow err together.",
         tables=tables,
+        folded=True,
     )
 
 
@@ -211,7 +230,7 @@ _ORDERS = (("A1", "s²/m²"), ("A2", "s/m"), ("A3", ""))
 def _drag(found: Json, best: Json) -> PageSection:
     body = TowedBody(**found["body"])
     drags = {
-        name.replace("_", " "): DragPolynomial(**drag["by_length_squared"])
+        _METHODS.get(name, name): DragPolynomial(**drag["by_length_squared"])
         for name, drag in found["drag_coefficients"].items()
         if name != "paper" or "qr" not in found["drag_coefficients"]
     }
@@ -221,7 +240,7 @@ def _drag(found: Json, best: Json) -> PageSection:
         if drag_of_best not in drags.values():
             drags[f"best usable: {_label(best)}"] = drag_of_best
     if found["tows_of_the_paper"]:
-        drags["paper, printed (2.4)"] = drag_polynomial(tow_paper.SOLUTION, body)
+        drags["as printed"] = drag_polynomial(tow_paper.SOLUTION, body)
     columns = [Column(title="")]
     for area in ("L²", "V^(2/3)"):
         columns += [Column(title=f"{name} by {area}", unit=unit) for name, unit in _ORDERS]
@@ -229,7 +248,7 @@ def _drag(found: Json, best: Json) -> PageSection:
         [name, *drag.as_json().values(), *drag.times(body.area_ratio).as_json().values()]
         for name, drag in drags.items()
     ]
-    table = PageTable(caption="C = A1 v² + A2 v + A3 (1.3)", columns=columns, rows=rows)
+    table = PageTable(caption="C = A1 v² + A2 v + A3", columns=columns, rows=rows, folded=True)
     chart = drag_chart(drags, body, found["top_speed_mps"])
     viscosity = format_number(body.viscosity_m2ps)
     caption = (
@@ -256,7 +275,7 @@ def _theory(found: Json, best: Json) -> PageSection:
         estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
     return PageSection(
         heading="Mass by theory",
-        text="M_s = k* (1 + k₁₁) ρ V (2.5), with Lamb's k₁₁ of ellipsoids and k* = 0.96 for the free surface as in the "
-        "paper. Its k₁₁ of 0.156 belongs to a spheroid 2.5 times as long as thick." + estimate,
-        tables=[PageTable(caption="Mass in surge by (2.5)", columns=columns, rows=rows)],
+        text="M_s = k* (1 + k₁₁) ρ V, with Lamb's k₁₁ of ellipsoids and the published k* = 0.96 for the free surface. "
+        "The published k₁₁ of 0.156 belongs to a spheroid 2.5 times as long as thick." + estimate,
+        tables=[PageTable(caption="Mass in surge by theory", columns=columns, rows=rows)],
     )

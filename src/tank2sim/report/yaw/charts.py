@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look, vector
+from tank2sim.report.kit.chart_parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look, vector
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
 
@@ -61,7 +61,11 @@ def balance_chart(balance: Json, *, width_px: int = 340) -> alt.HConcatChart:
     description = (
         "Energy balance of each subinterval: kinetic energy and each term of friction against the motor's work."
     )
-    return alt.hconcat(*panels, spacing=24).resolve_scale(y="shared").properties(title=title, description=description)
+    return (
+        alt.hconcat(*panels, spacing=24)
+        .resolve_scale(y="shared")
+        .properties(title=title, description=description, usermeta=STACKS)
+    )
 
 
 def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int = 560) -> alt.LayerChart:

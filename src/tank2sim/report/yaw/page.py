@@ -20,11 +20,11 @@ from tank2sim.report.yaw.charts import (
 
 _HOW = {
     "energy_least_squares": "all subintervals, measured speeds, the programme for instruments",
-    "as_many_equations": "(1) and sums (2) of three parts",
-    "two_intervals": "(1) and (2), measured speeds",
-    "output_error": "(3) integrated, fitted to the angle",
+    "as_many_equations": "as many equations as unknowns: an interval, and sums over three parts",
+    "two_intervals": "an accelerating and a braking interval, measured speeds",
+    "output_error": "equation of motion integrated, fitted to the angle",
     "energy_least_squares_reference": "all subintervals, the programme's speeds",
-    "two_intervals_reference": "(1) and (2), the programme's speeds",
+    "two_intervals_reference": "an accelerating and a braking interval, the programme's speeds",
 }
 
 
@@ -34,7 +34,8 @@ _ESTIMATES = (
 )
 _BALANCE = "Over each part of the intervals the work of the motor is kinetic energy plus what friction and water take."
 _ANGLE = (
-    "Equation (3) integrated under the recorded current from a start of its own for each hump, less the recorded angle."
+    "The equation of motion, integrated under the recorded current from a start of its own for each hump, less the "
+    "recorded angle."
 )
 
 
@@ -64,6 +65,7 @@ def yaw_page(found: Json) -> Page:
     return Page(
         title="Added yaw inertia by the energy method",
         subtitle=f"{names}, in {found['medium']}",
+        verdict=_verdict(found),
         figures=_figures(found),
         sections=[*sections, *_theory(found.get("theory") or ())],
     )
@@ -75,14 +77,14 @@ def _theory(values: Sequence[Json]) -> list[PageSection]:
     columns = [
         Column(title="formula"),
         Column(title="added inertia", unit="10⁻⁴ kg m²", digits=5),
-        Column(title="paper's Table 1", unit="10⁻⁴ kg m²", digits=5),
+        Column(title="as printed", unit="10⁻⁴ kg m²", digits=5),
         Column(title="remark"),
     ]
     rows: list[list[Cell]] = [
         [value["formula"], _scaled(value["value_kgm2"]), _scaled(value["printed_kgm2"]), value["remark"]]
         for value in values
     ]
-    text = "Added yaw inertia from the body's form, by the formulas (7), (8) and (9) of Alyshev (2019)."
+    text = "Added yaw inertia from the body's form, by the formulas of Alyshev (2019)."
     table = PageTable(caption="From the form", columns=columns, rows=rows)
     return [PageSection(heading="Theory", text=text, tables=[table])]
 
@@ -90,6 +92,14 @@ def _theory(values: Sequence[Json]) -> list[PageSection]:
 def _scaled(value: float | None) -> float | None:
     """A value in 10⁻⁴ of its unit."""
     return None if value is None else 1e4 * value
+
+
+def _verdict(found: Json) -> str:
+    best = found["methods"][YAW_METHODS[0]]
+    kind = "total" if best["added_inertia_kgm2"] is None else "added"
+    inertia, error = best[f"{kind}_inertia_kgm2"], best[f"{kind}_inertia_standard_error_kgm2"]
+    shown = f"{1e4 * inertia:.4g}" if error is None else f"({1e4 * inertia:.4g} ± {1e4 * error:.2g})"
+    return f"The {kind} yaw inertia is {shown} · 10⁻⁴ kg m² by the energy least squares; ± is one standard error."
 
 
 def _figures(found: Json) -> list[KeyFigure]:
@@ -144,7 +154,7 @@ def _estimates(methods: Json) -> PageTable:
     ]
     columns = [Column(title=title, unit=unit, digits=digits) for title, unit, digits, _ in _COLUMNS]
     heads = [Column(title="method"), Column(title="how")]
-    return PageTable(caption="Estimates with standard errors", columns=[*heads, *columns], rows=rows)
+    return PageTable(caption="Estimates with standard errors", columns=[*heads, *columns], rows=rows, folded=True)
 
 
 def _friction(found: Json) -> PageTable:
@@ -165,7 +175,7 @@ def _friction(found: Json) -> PageTable:
             row.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
         rows.append(row)
     columns = [Column(title=title) for title in ("term", "unit", *(name.replace("_", " ") for name in methods))]
-    return PageTable(caption="Friction and water, times 10⁴", columns=columns, rows=rows)
+    return PageTable(caption="Friction and water, times 10⁴", columns=columns, rows=rows, folded=True)
 
 
 _UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}
