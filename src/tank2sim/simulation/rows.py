@@ -82,7 +82,9 @@ class ArrayFunction:
         self._program = []
         for k in range(function.n_instructions()):
             operation, to, source = (
-                get(k) for get in (function.instruction_id, function.instruction_output, function.instruction_input)
+                function.instruction_id(k),
+                function.instruction_output(k),
+                function.instruction_input(k),
             )
             constant = np.float64(function.instruction_constant(k)) if operation == ca.OP_CONST else None
             known = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST)

@@ -402,9 +402,9 @@ class Replayer:
                 return np.append(residuals(start) / each, (start - guess) / spread)
 
             then, all_residuals = downhill(misfit, start, np.append(residual / each, (start - guess) / spread), J)
-            near = float(np.max(np.abs(then - start) / spread)) < _SETTLED
+            settled = float(np.max(np.abs(then - start) / spread)) < _SETTLED
             start, residual = then, all_residuals[: len(column)] * each
-            if near:
+            if settled:
                 break
         whole = float(np.sqrt(np.mean((residual / sigma[column]) ** 2)))
         return start, whole if np.isfinite(whole) else np.inf
