@@ -4,6 +4,9 @@ The card is identified here from turns and zigzags, in which no propeller turns 
 the mirror of that ahead, and once with the share that is published of this ship. Or it is the one that is given. The
 measured rudder, revolutions and wind are its inputs; each window starts in the measured state. Needs the data folder.
 
+At the end, where the error comes from: median errors after 20 s with the propeller astern and ahead, and a propeller
+walk and share of the thrust astern that are fitted to two of the runs (errors after 20 s) and tried on the third.
+
 ``python benchmarks/berthing.py [CARD ...]``
 """
 
@@ -29,6 +32,9 @@ DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[1] 
 WINDOW_S, STRIDE_S, STEP_S = 100.0, 10.0, 0.5
 STATES = {"u_mps": "u", "v_mps": "v", "r_radps": "r", "psi_rad": "psi", "x_m": "x", "y_m": "y"}
 SMOOTHED_S = 1.0
+SHORT_S = 20.0
+START, STEPS = np.array([0.0, 0.0, ASTERN_THRUST]), np.array([-2e-3, 1e-3, -0.1])
+"""Y' and N' of the walk and the share astern where the fit begins, and the steps of its slopes."""
 
 
 def at(trial: Trial, name: str, time: float) -> float:
@@ -42,18 +48,17 @@ def at(trial: Trial, name: str, time: float) -> float:
     return float(np.nanmean(values[near]))
 
 
-def errors(ship: t2s.Ship, trial: Trial) -> Iterator[tuple[float, float]]:
-    """Position error after each window, in lengths: of the model, and of a ship that keeps its first velocity."""
+def windows(ship: t2s.Ship, trial: Trial, duration: float) -> Iterator[tuple[float, dict[str, float], Running]]:
+    """Begin of each window, the measured state there, and the run of the model at its end."""
     integrator = Integrator(ship.model)
-    length = ship.manoeuvring().ship.length_m
     orders_of = [integrator.model[name] for name in ("rudder.command", "propeller.speed")]
     limits = [order.accepted_range for order in orders_of if isinstance(order, Input)]
-    for begin in np.arange(0.0, trial.time_s[-1] - WINDOW_S, STRIDE_S):
+    for begin in np.arange(0.0, trial.time_s[-1] - duration, STRIDE_S):
         first = {name: at(trial, name, begin) for name in STATES}
         start = {f"initial.{state}": first[name] for name, state in STATES.items()}
         start["initial.rudder_angle"] = at(trial, "delta_rad", begin)
         running = Running(integrator, {}, start)
-        for time in np.arange(begin, begin + WINDOW_S, STEP_S):
+        for time in np.arange(begin, begin + duration, STEP_S):
             orders = [at(trial, name, time + STEP_S / 2) for name in ("delta_rad", "n_radps")]
             rudder, revolutions = (float(np.clip(order, *limit)) for order, limit in zip(orders, limits, strict=True))
             inputs = {"rudder.command": rudder, "propeller.speed": revolutions}
@@ -62,11 +67,73 @@ def errors(ship: t2s.Ship, trial: Trial) -> Iterator[tuple[float, float]]:
                 inputs["wind.direction"] = at(trial, "wind_direction_rad", time)
             running.order(inputs)
             running.run(STEP_S)
+        yield float(begin), first, running
+
+
+def errors(ship: t2s.Ship, trial: Trial) -> Iterator[tuple[float, float]]:
+    """Position error after each window, in lengths: of the model, and of a ship that keeps its first velocity."""
+    length = ship.manoeuvring().ship.length_m
+    for begin, first, running in windows(ship, trial, WINDOW_S):
         reached = complex(running.state("motion.x"), running.state("motion.y"))
         truth = complex(at(trial, "x_m", begin + WINDOW_S), at(trial, "y_m", begin + WINDOW_S))
         velocity = complex(first["u_mps"], first["v_mps"]) * np.exp(1j * first["psi_rad"])
         straight = complex(first["x_m"], first["y_m"]) + velocity * WINDOW_S
         yield abs(reached - truth) / length, abs(straight - truth) / length
+
+
+def short_errors(ship: t2s.Ship, trial: Trial) -> np.ndarray:
+    """After 20 s, (n, 6): errors of x, y (lengths), heading (rad), u (m/s), r (rad/s), and mean revolutions (1/s)."""
+    length, found = ship.manoeuvring().ship.length_m, []
+    for begin, _, running in windows(ship, trial, SHORT_S):
+        end = begin + SHORT_S
+        x, y, psi, u, r = (
+            running.state(f"motion.{STATES[name]}") - at(trial, name, end)
+            for name in ("x_m", "y_m", "psi_rad", "u_mps", "r_radps")
+        )
+        turning = np.mean([at(trial, "n_radps", time) for time in np.arange(begin, end, STEP_S)]) / (2 * np.pi)
+        found.append([x / length, y / length, (psi + np.pi) % (2 * np.pi) - np.pi, u, r, turning])
+    return np.array(found)
+
+
+def print_causes(ship: t2s.Ship, trials: list[Trial]) -> None:
+    """Print errors after 20 s, and what a propeller walk fitted to other runs does to each; `ship` has none."""
+
+    def with_walk(values: np.ndarray) -> t2s.Ship:
+        card, (Y, N, factor) = ship.manoeuvring(), values
+        added = (
+            EffectEntry(name="astern_thrust", parameters={"factor": float(factor)}),
+            EffectEntry(name="propeller_walk", parameters={"Y_prime": float(Y), "N_prime": float(N)}),
+        )
+        return t2s.Ship(replace(card, effects=(*card.effects, *added)))
+
+    first = [short_errors(with_walk(START), trial) for trial in trials]
+    every = np.concatenate(first)
+    print(f"errors after {SHORT_S:g} s with the thrust astern as published, model less measured, medians:")
+    for words, chosen in (("astern", every[:, 5] < -1), ("ahead", every[:, 5] > 1)):
+        u, r, psi = np.median(every[chosen][:, [3, 4, 2]], axis=0)
+        turned = f"r {np.degrees(r):+.2f} deg/s, heading {np.degrees(psi):+.1f} deg"
+        print(f"  propeller {words}, {chosen.sum()} windows: u {u:+.3f} m/s, {turned}")
+    slopes = [
+        np.stack(
+            [
+                (short_errors(with_walk(START + step), trial)[:, :3] - before[:, :3]).ravel() / STEPS[place]
+                for place, step in enumerate(np.diag(STEPS))
+            ],
+            axis=1,
+        )
+        for trial, before in zip(trials, first, strict=True)
+    ]
+    held_out = []
+    for left, trial in enumerate(trials):
+        others = [place for place in range(len(trials)) if place != left]
+        slope = np.concatenate([slopes[place] for place in others]) * np.abs(STEPS)
+        missed = np.concatenate([first[place][:, :3].ravel() for place in others])
+        fitted = START + np.linalg.lstsq(slope, -missed, rcond=None)[0] * np.abs(STEPS)
+        held_out.append(np.array(list(errors(with_walk(fitted), trial)))[:, 0])
+        Y, N, factor = fitted
+        print(f"  without run {left + 1}: Y' {Y:.1e}, N' {N:.2e}, share astern {factor:.2f}; its", end=" ")
+        print(f"error after {WINDOW_S:g} s {np.median(held_out[-1]):.2f} L")
+    print(f"  median of held-out windows {np.median(np.concatenate(held_out)):.2f} L")
 
 
 def identified() -> t2s.Ship:
@@ -99,6 +166,8 @@ def main() -> None:
             print(f"  {path.stem}: {len(run)} windows, {np.median(run[:, 0]):.2f} L")
         model, straight = np.median(np.concatenate(found), axis=0)
         print(f"  median position error after {WINDOW_S:g} s {model:.2f} L, first velocity kept {straight:.2f} L")
+    if not names:
+        print_causes(cards["thrust astern as ahead"], trials)
 
 
 if __name__ == "__main__":
