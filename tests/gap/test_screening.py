@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.fit_all import Fitting
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.kalman_filter import observer
 from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
 from tank2sim.gap.inference.prior import likelihood_from_card
-from tank2sim.gap.search.screening import LEAST_AMPLITUDE, Screen, Variant, variants
+from tank2sim.gap.search.explanations import _proposals
+from tank2sim.gap.search.screening import LEAST_AMPLITUDE, Screen, Screened, Variant, variants
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.identification.trials import made_up_ship
 from tests.identification.trials.made_up_ship import TRUTH
@@ -196,3 +201,13 @@ def test_a_faulty_sensor_adds_to_what_is_shown_alone(card, damped) -> None:
     inside = damped.motion.inside
     assert gyro.shown[inside][:, place, 0] == pytest.approx(np.full(inside.sum(), gyro.theta[0]))
     assert np.all(np.delete(gyro.shown[inside], place, axis=1) == 0)
+
+
+def test_two_forms_of_one_effect_are_not_proposed_together() -> None:
+    nothing = np.zeros(1)
+    screened = [
+        Screened({first: nothing, second: nothing}, 100.0)
+        for first, second in [("loaded_rudder", "rudder_slipstream"), ("loaded_rudder", "current")]
+    ]
+    fitting = cast(Fitting, SimpleNamespace(found={}))
+    assert [proposal.effects for proposal in _proposals(fitting, screened, [])] == [("current", "loaded_rudder")]

@@ -178,7 +178,9 @@ def run_gap_workflow(
             wanted = None if options.effects is None else tuple(name for name in options.effects if name not in named)
             if wanted == () or gap.improved is card:
                 break
-            more = replace(options, effects=wanted, without=(*options.without, *named), max_effects=most)
+            simpler = [name for effect in named for name in EFFECTS[effect].includes]
+            without = (*options.without, *named, *simpler)
+            more = replace(options, effects=wanted, without=without, max_effects=most)
             further, found_trials = _search_once(gap.improved, trials, more, progress, pool)
             if not _adds(gap, further, 1 - options.false_discovery):
                 break

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.gear import CONTACT
 from tank2sim.simulation.scheme import runge_kutta_step
 
@@ -203,3 +204,13 @@ def test_the_loaded_rudder_stays_finite_at_rest_and_astern() -> None:
     for at in ({"motion.u": 0.0, "motion.v": 0.01}, {"motion.u": 2.0, "propeller.speed": -N0}):
         state = {"motion.v": 0.0, "motion.r": 0.0, "rudder.angle": 0.2, **at}
         assert np.isfinite(values(model, ["rudder.X", "rudder.Y", "rudder.N"], state)).all()
+
+
+def test_the_slipstream_is_the_loaded_rudder_for_small_losses_of_speed_without_cross_flow() -> None:
+    """So one includes the other, and they are not sought together."""
+    assert EFFECTS["loaded_rudder"].includes == ("rudder_slipstream",)
+    at = {"motion.u": 0.999 * U0, "motion.v": 0.0, "motion.r": 0.0, "rudder.angle": 0.01}
+    loaded = ship({"loaded_rudder": {"loading": 0.3, "straightening": 0.0, "lever": 0.0}})
+    slipstream = ship({"rudder_slipstream": {"gain": 0.6}})
+    bare, first, second = (values(model, ["rudder.Y", "rudder.N"], at) for model in (ship(), loaded, slipstream))
+    np.testing.assert_allclose(first - bare, second - bare, rtol=0.01)

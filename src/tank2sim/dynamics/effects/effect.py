@@ -196,6 +196,8 @@ class Effect:
         True if the equations of the MMG method have it already: it is not for such a card.
     in_roll : bool
         True if a card with ``[roll]`` has it already: it is not for such a card.
+    includes : tuple of str
+        Effects that are a simpler form of this one: they are not sought together with it.
     sought : bool
         False if it is not to be tried on trials: what it describes is given, not found, or another effect is sought in
         its place.
@@ -225,6 +227,7 @@ class Effect:
     of_craft: bool = False
     in_mmg: bool = False
     in_roll: bool = False
+    includes: tuple[str, ...] = ()
     sought: bool = True
 
     @property

@@ -9,6 +9,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales
+from tank2sim.dynamics.effects.rudder import RUDDER_SLIPSTREAM
 from tank2sim.dynamics.model import Model
 
 LEAST_INFLOW = 0.05
@@ -85,4 +86,5 @@ LOADED_RUDDER = Effect(
     equations=_in_loaded_slipstream,
     in_mmg=True,
     reads_derivatives=True,
+    includes=(RUDDER_SLIPSTREAM.name,),
 )

@@ -244,9 +244,14 @@ def _proposals(
     least: int = 0,
     limit: float = np.inf,
 ) -> list[Proposal]:
-    """Proposals with a sufficient gain that were not fitted yet; the first `least` of them in any case."""
+    """Proposals with a sufficient gain that were not fitted yet; the first `least` of them in any case.
+
+    None holds two forms of one effect.
+    """
     proposals: dict[tuple[str, ...], Proposal] = {}
     for place, proposed in enumerate(screened):
+        if any(name in EFFECTS[other].includes for other in proposed.thetas for name in proposed.thetas):
+            continue
         proposal = Proposal(proposed.thetas, starts, ROUNDS, limit)
         if proposal.effects not in fitting.found and (proposed.gain > -WORTH or place < least):
             proposals.setdefault(proposal.effects, proposal)
