@@ -434,12 +434,12 @@ def _surroundings_by_simulation(
     if reached <= MUCH or any(EFFECTS[name].surroundings for name, *_ in judged.estimated):
         return judged
     tried: dict[str, tuple[ExplanationFit, CommonSurroundings, _Proof]] = {}
-    for name in surroundings:
-        fit = next((fit for fit in found.fits if fit.hypothesis.effects == (name,)), None)
-        if fit is None:
-            continue
-        at_sea = add_effects_to_card(card, [(name, at_rest(name), {})])
-        common = fit_common_surroundings(at_sea, trials[0], name, replays.noise)
+    alone = {fit.hypothesis.effects: fit for fit in reversed(found.fits)}
+    fits = {name: alone[name,] for name in surroundings if (name,) in alone}
+    at_sea = [add_effects_to_card(card, [(name, at_rest(name), {})]) for name in fits]
+    arguments = at_sea, [trials[0]] * len(fits), fits, [dict(replays.noise)] * len(fits)
+    each = map if replays.executor is None else replays.executor.map
+    for (name, fit), common in zip(fits.items(), each(fit_common_surroundings, *arguments), strict=True):
         if np.median(common.predicted) < PREDICTS:
             named = _NamedEffects([(name, common.values, common.errors)], {name: common.by_trial})
             proof = _prove(card, trials, named, replays, found, fit)
