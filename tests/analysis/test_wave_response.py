@@ -99,5 +99,8 @@ def test_a_mesh_of_another_size_and_a_file_that_is_none_are_refused(hull: Path, 
     for name, message in ((wrong, "cannot be read as a mesh"), (tmp_path / "none.gdf", "does not exist")):
         with pytest.raises(InputError, match=message):
             ship.with_waves(name, **OPTIONS)
+    for given in ({"frequencies_radps": [0.0, 1.0]}, {"directions_deg": [0.0, 50.0, 180.0]}):
+        with pytest.raises(InputError, match="give other frequencies_radps or directions_deg"):
+            ship.with_waves(hull, **{**OPTIONS, **given})
     with pytest.raises(InputError, match=r"ship\.metacentric_height_m: is missing"):
         ship.with_waves(hull)

@@ -19,7 +19,7 @@ import tomlkit
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import parse_card
-from tank2sim.cards.wave_table import DRIFT_COLUMNS, MIRRORED, WAVE_MOTIONS, motion_columns
+from tank2sim.cards.wave_table import DRIFT_COLUMNS, MIRRORED, WAVE_MOTIONS, motion_columns, wave_table
 from tank2sim.dynamics.effects.effect import card_particular
 from tank2sim.errors import InputError
 
@@ -208,6 +208,16 @@ def _inertia(mass: float, centre: Array, hull: HullInWaves) -> Array:
     return mass * np.block([[np.eye(3), -arm], [arm, own - arm @ arm]])
 
 
+def _check_grid(hull: HullInWaves, path: str | Path) -> None:
+    """Raise InputError if what is asked for is not a table that a card may have."""
+    frequencies = (1.0, 2.0) if hull.frequencies_radps is None else hull.frequencies_radps
+    rows = [(frequency, direction, 0.0) for frequency in frequencies for direction in hull.directions_deg]
+    try:
+        wave_table(["frequency_radps", "direction_deg", DRIFT_COLUMNS["X"]], rows)
+    except ValueError as error:
+        raise InputError(path, "", str(error), "give other frequencies_radps or directions_deg") from None
+
+
 _DIGITS = 5
 """Significant digits of the numbers on a card: far beyond what a mesh of panels resolves. Project choice."""
 
@@ -226,6 +236,7 @@ def card_in_waves(card: ManoeuvringCard, path: str | Path, hull: HullInWaves) ->
     if not 0.8 < length / card.ship.length_m < 1.25:
         problem = f"is {length:.4g} m long, and the ship {card.ship.length_m:.4g} m"
         raise InputError(path, "", problem, "give the mesh in m, at the size of the ship")
+    _check_grid(hull, path)
     columns, rows = wave_rows(
         body, hull, card.environment.water_density_kgpm3, card.environment.gravity_mps2, card.ship.length_m
     )

@@ -83,6 +83,8 @@ def test_on_an_mmg_card_the_thrust_and_the_race_on_the_rudder_change() -> None:
         change = 1000.0 * n**2 * D**4 * (at_pitch(J, pitch) - at_pitch(J, 0.72))
         assert found[0] - without[0] == pytest.approx(change, rel=1e-9, abs=1e-9)
         assert np.sign(found[1] - without[1]) == np.sign(pitch - 0.72)
+    with pytest.raises(InputError, match=r"advance_share: acts on nothing"):
+        build(parse_card(text + added.replace("}", ", advance_share = 0.6}"), "ship.toml"))
     assert not [name for name in model.outputs if name.startswith(("propeller.torque", "propeller.power"))]
 
 

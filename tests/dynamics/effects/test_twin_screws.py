@@ -24,10 +24,10 @@ L7, RHO7, DIAMETER, K_T, T_P, W_P0 = 7.0, 1000.0, 0.216, (0.2931, -0.2753, -0.13
 Y_P = 0.03
 
 
-def twin_mmg() -> Model:
+def twin_mmg(more: str = "") -> Model:
     text = MMG.replace("[propeller]", f"[propeller]\nnumber = 2\ny_P = {Y_P}")
     text = text.replace("[rudder]", f"[rudder]\nnumber = 2\ny_R = {Y_P}").replace("C_1 = 2.0", "C_1 = 0.0")
-    given = "propeller_starboard_rpm = 0.0, propeller_port_rpm = 0.0"
+    given = f"propeller_starboard_rpm = 0.0, propeller_port_rpm = 0.0{more}"
     card = parse_card(f'{text}\n[[effects]]\nname = "twin_orders"\nparameters = {{{given}}}\n', "ship.toml")
     return build(card)
 
@@ -125,6 +125,8 @@ def test_a_ship_without_engine_or_with_one_propeller_is_refused() -> None:
     single = f'{MMG}\n[[effects]]\nname = "twin_orders"\nparameters = {{{given}}}\n'
     with pytest.raises(InputError, match=r"propeller\.number: is 1"):
         build(parse_card(single, "ship.toml"))
+    with pytest.raises(InputError, match=r"place_m: acts on nothing"):
+        twin_mmg(", place_m = 0.2")
     with pytest.raises(InputError) as caught:
         ship({"twin_orders": APART}).input_values({"propeller.port_offset": 90.0})
     assert caught.value.place == "propeller.port_offset"

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, refuse_given, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.hull import inside_range, validity_factor
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
@@ -164,6 +164,7 @@ def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
         return pitch_thrust(held, pitch.symbol, *blades), pitch_thrust(held, given["design_pitch"], *blades)
 
     if isinstance(card, MmgCard):
+        refuse_given(card, CONTROLLABLE_PITCH.name, "advance_share", "leave it out: the card's own J holds")
         return _without_torque(_on_each_side(model, coefficients))
     turning = model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
     designed = given["advance_share"] * given["design_pitch"]

@@ -391,6 +391,13 @@ def with_steps_for_time(model: Model, time_s: float) -> Model:
     return replace(model, step_s=step)
 
 
+def refuse_given(card: ManoeuvringCard, effect: str, parameter: str, remedy: str) -> None:
+    """Raise InputError if the card gives a parameter (its name in SI) of an effect that would act on nothing."""
+    for number, entry in enumerate(card.effects):
+        if entry.name == effect and parameter in entry.parameters:
+            raise card.fault(f"effects.{number}.parameters.{parameter}", "acts on nothing on this card", remedy)
+
+
 def card_particular(card: ManoeuvringCard, key: str, remedy: str) -> float:
     """A number of the card's ``[ship]``; raises InputError that names the key if the card has none."""
     value = getattr(card.ship, key)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, refuse_given
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.effects.froude_scale import rates
 from tank2sim.dynamics.effects.particulars import model_particular
@@ -61,7 +61,8 @@ def _with_separate_orders(model: Model, given: EffectSymbols, card: ManoeuvringC
         if isinstance(card, MmgCard):
             model = model.redefine(f"propeller.speed_actual{suffix}", lambda _, turning=turning: turning.symbol)  # type: ignore[misc]
     model = replace(model, outputs=(*model.outputs, *shown, *(f"rudder.angle_{side}" for side in SIDES)))
-    if isinstance(card, MmgCard):  # y_P is the card's own
+    if isinstance(card, MmgCard):
+        refuse_given(card, TWIN_ORDERS.name, "place_m", "leave it out: propeller.y_P of the card holds")
         kept = tuple(one for one in model.parameters if one.name != "twin_orders.place")
         return replace(model, parameters=kept)
     return _with_thrust_of_each(model, given["place"])
