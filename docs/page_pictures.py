@@ -23,6 +23,10 @@ PAGES = {
     "autopilot": "autopilot mariner-nominal",
     "compare": "compare mariner mariner-nominal",
     "poster": "poster esso-osaka-ship",
+    "pilotcard": "pilotcard esso-osaka-ship",
+    "craft": "autopilot otter",
+    "guess": "guess --length 320 --beam 58 --draught 20.8 --block 0.81 --speed 15.5 -o guessed.toml",
+    "design": "design mariner --hours 40 --carriage-length 240",
 }
 """Name of the thumbnail to the command that writes its page; the gallery shows the same."""
 
@@ -44,7 +48,7 @@ def main() -> int:
         for stem, command in PAGES.items():
             page, picture = Path(name) / f"{stem}.html", FOLDER / f"{stem}.png"
             program = Path(sys.executable).with_name("tank2sim")
-            subprocess.run([program, *command.split(), "--page", page], check=True, capture_output=True)
+            subprocess.run([program, *command.split(), "--page", page], check=True, capture_output=True, cwd=name)
             size = f"--window-size={WIDTH_PX},{HEIGHT_PX}"
             taken = [f"--user-data-dir={Path(name) / 'profile'}", size, f"--screenshot={picture}", page.as_uri()]
             subprocess.run([chromium, *FLAGS, *taken], check=True, capture_output=True, timeout=120)

@@ -1,9 +1,12 @@
 """Figures are drawn on a manoeuvre where its motion has them."""
 
+import json
+
 import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.files import json_text
 from tank2sim.report.kit.charts import SpiralData, chart_specification, spiral_chart
 from tank2sim.report.kit.manoeuvre_charts import (
     hull_rows,
@@ -137,6 +140,11 @@ def test_a_pull_out_is_simulated_to_both_sides():
         "from a turn to starboard",
         "from a turn to port",
     }
+    result = json.loads(json_text(found.to_dict()))
+    assert "is stable" in result_page(result, "m.json").verdict
+    for side in (result, result["other_side"]):
+        side["figures"]["residual_rate_degps"] = 0.5 * side["figures"]["steady_rate_degps"]
+    assert "stay apart" in result_page(result, "m.json").verdict
 
 
 def test_a_stop_shows_speed_and_revolutions_over_the_distance_along_the_track():

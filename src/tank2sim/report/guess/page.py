@@ -117,8 +117,9 @@ def figures_chart(found: Json) -> alt.TopLevelMixin:
     base = Chart(alt.Data(values=rows))
     title = "times the median"
     x = alt.X("low:Q", title=title, scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format="~g"))
-    y = alt.Y("figure:N", title=None, sort=None, axis=alt.Axis(labelLimit=240))
-    colour = alt.Color("kind:N", title=None, sort=["by dimensions", "with the figures", "given"])
+    y = alt.Y("figure:N", title=None, sort=None, axis=alt.Axis(labelExpr="split(datum.label, ': ')"))
+    legend = alt.Legend() if anything else None
+    colour = alt.Color("kind:N", title=None, sort=["by dimensions", "with the figures", "given"], legend=legend)
     offset = alt.YOffset("kind:N", sort=["by dimensions", "with the figures", "given"])
     bars = base.transform_filter("datum.kind != 'given'").mark_bar(height=6)
     points = base.transform_filter("datum.kind == 'given'").mark_point(filled=True, size=50)
@@ -126,7 +127,7 @@ def figures_chart(found: Json) -> alt.TopLevelMixin:
     if anything:
         layers.append(points.encode(x=x, y=y, color=colour))
     chart: alt.TopLevelMixin = alt.layer(*layers).properties(
-        width=560, title="Figures that nine of ten such ships have"
+        width=560, height=36 * len(found["figures"]), title="Figures that nine of ten such ships have"
     )
     return chart
 

@@ -62,7 +62,7 @@ def manoeuvre_page(result: Json) -> Page:
     ensemble = result.get("ensemble") or {}
     names = _FIRST.get(_kind(result), tuple(figures)[:_OTHERS])
     sections = [
-        PageSection(heading="The manoeuvre", text=_reading(result), charts=_charts(result, figures, ensemble)),
+        PageSection(heading="The manoeuvre", text=_explanation(result), charts=_charts(result, figures, ensemble)),
         *_history_section(result, ensemble),
         PageSection(heading="Figures", tables=_tables(result, ensemble)),
         *notices_section([*result.get("notices", []), *ensemble.get("notices", [])]),
@@ -153,12 +153,13 @@ def _verdict(result: Json, tiles: Sequence[KeyFigure]) -> str:
         return "The yaw rates from both sides stay apart: the ship is unstable on a straight course, or very slow."
     judged = [tile for tile in tiles if tile.limit is not None]
     if not judged:
-        return ""
+        return _loop_words(result) if _kind(result) == "spiral" else ""
     if failed := [tile.label.lower() for tile in judged if tile.verdict is Verdict.FAILED]:
         return f"Beyond the limit of IMO MSC.137(76): {' and '.join(failed)}."
     if any(tile.verdict is Verdict.CAUTION for tile in judged):
         return "The run leaves the range of the card: figures that were settled there have no verdict."
-    return "Within the limits of IMO MSC.137(76)."
+    names = " and ".join(tile.label.lower() for tile in judged)
+    return f"Within the limits of IMO MSC.137(76): {names}."
 
 
 def _both_sides(result: Json) -> tuple[Json, Json]:
@@ -174,14 +175,19 @@ def _limit(result: Json, name: str) -> float | None:
     return float(of_length * length) if of_length is not None and length else None
 
 
-def _reading(result: Json) -> str:
-    """What the chart says, in a sentence, where a figure alone does not."""
-    figures, kind = result["figures"], _kind(result)
-    if kind == "spiral" and is_number_value(figures.get("loop_width_deg")):
-        if figures["loop_width_deg"] > 0:
-            return "Within the loop the ship turns to the side that it comes from: it is unstable on a straight course."
-        return "The curve has no loop: at each rudder angle the ship has one steady turn."
-    if kind == "pullout" and result.get("other_side"):
+def _loop_words(result: Json) -> str:
+    """What a spiral says of the ship."""
+    width = result["figures"].get("loop_width_deg")
+    if not is_number_value(width):
+        return ""
+    if width > 0:
+        return "Within the loop the ship turns to the side that it comes from: it is unstable on a straight course."
+    return "The curve has no loop: at each rudder angle the ship has one steady turn."
+
+
+def _explanation(result: Json) -> str:
+    """What the chart of a pull-out shows."""
+    if _kind(result) == "pullout" and result.get("other_side"):
         return (
             "On a ship that is stable on a straight course the yaw rates from both sides decay to one value, which is "
             "zero at the neutral rudder; on an unstable ship they remain apart."

@@ -79,7 +79,7 @@ def _figures(found: Json, best: Json) -> list[KeyFigure]:
     worst = max(found["methods"].values(), key=lambda fit: fit["condition_scaled"] or 0.0)
     if worst["condition_scaled"] is not None:
         condition = float(f"{worst['condition_scaled']:.2g}")
-        verdict = Verdict.PASSED if condition <= _LARGEST_CONDITION else Verdict.FAILED
+        verdict = Verdict.PASSED if condition <= _LARGEST_CONDITION else Verdict.CAUTION
         note = f"scaled; at most {_LARGEST_CONDITION:g} distinguishes them"
         label = f"Condition number of {', '.join(worst['estimated'])}"
         figures.append(KeyFigure(label=label, value=condition, note=note, verdict=verdict, limit=_LARGEST_CONDITION))
