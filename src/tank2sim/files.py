@@ -61,7 +61,7 @@ def write_together(
     """
     targets = [_target(path if isinstance(path, Path) else Path(path)) for path in contents]
     _refuse_doubled(targets)
-    _refuse_doubled([_target(path) for path in outputs if path is not None])
+    refuse_doubled(outputs)
     _refuse_inputs(targets, [Path(path) for path in inputs])
     ready: list[tuple[Path, _Target]] = []
     direct: list[tuple[bytes, _Target]] = []
@@ -85,6 +85,17 @@ def write_together(
     finally:
         for temporary, _ in ready:
             temporary.unlink(missing_ok=True)
+
+
+def refuse_doubled(outputs: Iterable[Path | None]) -> None:
+    """Refuse outputs, None for those left out, of which two are one file; asked before work that takes long.
+
+    Raises
+    ------
+    InputError
+        One is given twice or is a folder.
+    """
+    _refuse_doubled([_target(path) for path in outputs if path is not None])
 
 
 @dataclass(frozen=True)

@@ -253,18 +253,18 @@ REPAIRED = {
 }
 
 
-@pytest.mark.parametrize("name", REPAIRED)
-def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path, name: str) -> None:
-    found = {}
-    for kind in ("turn25.csv", "zigzag20.csv"):
-        rewritten(folder, kind, f"wrong_{kind}", REPAIRED[name])
-    for label, files in {"right": ("", "zigzag20.csv"), "wrong": ("wrong_", "wrong_zigzag20.csv")}.items():
-        arguments = ("identify", "off.toml", f"{files[0]}turn25.csv", files[1], "--method", "equation_error")
-        result = tank2sim(*arguments, "--members", "0", "--json", f"{label}.json", cwd=folder)
+def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path) -> None:
+    def identified(turn: str, zigzag: str) -> dict[str, float]:
+        options = ("--method", "equation_error", "--members", "0", "--json", "unit.json")
+        result = tank2sim("identify", "off.toml", turn, zigzag, *options, cwd=folder)
         assert result.returncode == 0, result.stderr
-        found[label] = json.loads((folder / f"{label}.json").read_text())["derivatives"]
-    for term in ("Nv", "Nr", "Nd", "Yv"):
-        assert found["wrong"][term]["value"] == pytest.approx(found["right"][term]["value"], rel=1e-3)
+        found = json.loads((folder / "unit.json").read_text())["derivatives"]
+        return {term: found[term]["value"] for term in ("Nv", "Nr", "Nd", "Yv")}
+
+    right = identified("turn25.csv", "zigzag20.csv")
+    for name, factors in REPAIRED.items():
+        wrong = [rewritten(folder, kind, f"wrong_{kind}", factors) for kind in ("turn25.csv", "zigzag20.csv")]
+        assert identified(*wrong) == pytest.approx(right, rel=1e-3), name
 
 
 def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> None:

@@ -207,7 +207,7 @@ def identify_craft(
     >>> import tank2sim as t2s
     >>> otter, folder = t2s.load("otter"), Path(tempfile.mkdtemp())
     >>> for name in ("straight:600", "spin:400", "difference:300"):
-    ...     rows = otter.simulate(name, duration_s=25).df[::40]
+    ...     rows = otter.simulate(name, duration_s=10).df[::40]
     ...     rows.to_csv(folder / f"{name.partition(':')[0]}.csv", index=False)
     >>> found = t2s.identify_craft(otter, folder)
     >>> abs(found.card.thrusters[0].ahead_Ns2 / 0.01108 - 1) < 0.05

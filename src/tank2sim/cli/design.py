@@ -14,7 +14,7 @@ from tank2sim.cli.options import page_option, plot_option, set_option
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.design.captive_design import DRAWN_SHIPS
 from tank2sim.errors import InputError
-from tank2sim.files import writable_folder
+from tank2sim.files import refuse_doubled, writable_folder
 
 
 @click.command("design", cls=TakesSeveral, several=("--figures", "--sensors"))
@@ -111,6 +111,7 @@ def command(
     Of all runs that the tank can make, those with repeats that make the figures most certain in the hours, shown next
     to the usual matrix: standard errors of the figures by both, and the hours in which a plan is as certain.
     """
+    refuse_doubled([output, template, page, plot, json_file])
     ship = load(card, values)
     tank_options: dict[str, object] = {"--hours": hours, "--tank": tank, "--carriage-length": carriage_length}
     tank_options |= {"--model-length": model_length, "--usual": usual, "--campaign": template}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
@@ -160,43 +158,33 @@ def amidships(at: dict[str, float], straightening: float, lever: float) -> np.nd
     return 0.5 * RHO * L**2 * np.array([0.0, -278e-5 * side, L * 139e-5 * side])
 
 
-LINEAR = "\n".join(
-    line for line in mariner_text().splitlines() if not re.match(r"[YN](?=\w*d)(?!dot|vdot|rdot|d )\w+ =", line)
-)
-"""The Mariner with no rudder terms above first order in Y and N."""
-
 LOADED = [(0.0, 0.0, 0.0), (0.6, 0.5, -0.8), (1.1, 0.2, -2.0)]
 
 
 @pytest.mark.parametrize("at", STATES)
 @pytest.mark.parametrize(("loading", "straightening", "lever"), LOADED)
-def test_the_loaded_rudder_of_a_linear_rudder_is_a_foil_in_the_propellers_jet(
-    at, loading, straightening, lever
+@pytest.mark.parametrize("measured", [0.0, 0.4, 1.0])
+def test_the_loaded_rudder_is_a_foil_in_the_propellers_jet_next_to_a_share_of_the_polynomial(
+    at, loading, straightening, lever, measured
 ) -> None:
-    model = ship({"loaded_rudder": {"loading": loading, "straightening": straightening, "lever": lever}}, LINEAR)
-    found = values(model, ["rudder.X", "rudder.Y", "rudder.N"], at)
-    expected = foil(at, loading, straightening, lever) - amidships(at, straightening, lever)
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize("at", STATES)
-@pytest.mark.parametrize(("loading", "straightening", "lever"), LOADED)
-def test_the_loaded_rudder_adds_to_a_measured_polynomial_what_the_loading_changes(
-    at, loading, straightening, lever
-) -> None:
+    given = {"loading": loading, "straightening": straightening, "lever": lever} | (
+        {"measured": measured} if measured else {}
+    )
     rudder = ["rudder.X", "rudder.Y", "rudder.N"]
-    model = ship({"loaded_rudder": {"loading": loading, "straightening": straightening, "lever": lever}})
-    change = foil(at, loading, straightening, lever) - foil(at, 0.0, straightening, lever)
-    np.testing.assert_allclose(values(model, rudder, at), values(ship(), rudder, at) + change, rtol=1e-9)
+    now, nominal = (foil(at, share, straightening, lever) for share in (loading, 0.0))
+    replaced = now - amidships(at, straightening, lever)
+    added = values(ship(), rudder, at) + now - nominal
+    expected = (1 - measured) * replaced + measured * added
+    np.testing.assert_allclose(values(ship({"loaded_rudder": given}), rudder, at), expected, rtol=1e-9)
 
 
-def test_the_loaded_rudder_leaves_the_linear_derivatives_of_the_hull_as_measured() -> None:
-    for card in (LINEAR, None):
-        model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8}}, card)
-        straight = {"motion.u": U0, "motion.v": 1e-4, "motion.r": 1e-6, "rudder.angle": 0.0}
-        side = values(model, ["rudder.Y", "rudder.N"], straight)
-        hard = values(model, ["rudder.Y", "rudder.N"], {**straight, "rudder.angle": 0.3})
-        assert np.all(np.abs(side) < 1e-4 * np.abs(hard))
+@pytest.mark.parametrize("measured", [0.0, 1.0])
+def test_the_loaded_rudder_leaves_the_linear_derivatives_of_the_hull_as_measured(measured: float) -> None:
+    model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8, "measured": measured}})
+    straight = {"motion.u": U0, "motion.v": 1e-4, "motion.r": 1e-6, "rudder.angle": 0.0}
+    side = values(model, ["rudder.Y", "rudder.N"], straight)
+    hard = values(model, ["rudder.Y", "rudder.N"], {**straight, "rudder.angle": 0.3})
+    assert np.all(np.abs(side) < 1e-4 * np.abs(hard))
 
 
 def test_the_loaded_rudder_stays_finite_at_rest_and_astern() -> None:
@@ -210,7 +198,7 @@ def test_the_slipstream_is_the_loaded_rudder_for_small_losses_of_speed_without_c
     """So one includes the other, and they are not sought together."""
     assert EFFECTS["loaded_rudder"].includes == ("rudder_slipstream",)
     at = {"motion.u": 0.999 * U0, "motion.v": 0.0, "motion.r": 0.0, "rudder.angle": 0.01}
-    loaded = ship({"loaded_rudder": {"loading": 0.3, "straightening": 0.0, "lever": 0.0}})
+    loaded = ship({"loaded_rudder": {"loading": 0.3, "straightening": 0.0, "lever": 0.0, "measured": 1.0}})
     slipstream = ship({"rudder_slipstream": {"gain": 0.6}})
     bare, first, second = (values(model, ["rudder.Y", "rudder.N"], at) for model in (ship(), loaded, slipstream))
     np.testing.assert_allclose(first - bare, second - bare, rtol=0.01)

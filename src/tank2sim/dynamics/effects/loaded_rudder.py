@@ -5,8 +5,6 @@ from __future__ import annotations
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.cards.terms import known_term
-from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales
 from tank2sim.dynamics.effects.rudder import RUDDER_SLIPSTREAM
@@ -15,9 +13,6 @@ from tank2sim.dynamics.model import Model
 LEAST_INFLOW = 0.05
 """The flow over the rudder is never slower than this share of u0: the formula does not hold for a propeller that turns
 astern, and must not divide by zero there (project choice)."""
-
-_HIGHER_ORDER = frozenset(name for name in ALL_TERMS if name[0] in "YN" and known_term(name).d) - {"Yd", "Nd"}
-"""Rudder terms of the polynomial of Y and N above first order."""
 
 
 def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
@@ -29,11 +24,12 @@ def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringC
     Y = 1/2 rho L^2 w^2 sin(alpha) cos(delta) Y_d, N likewise with N_d and L,
     X = 1/2 rho L^2 w^2 sin(alpha) sin(delta) X_dd.
 
-    Where the card has rudder terms above first order in Y or N, they hold what was measured at the nominal loading, and
-    the foil's forces less those at that loading (w = U) are added to them. Where it has none, the foil replaces the
-    polynomial's rudder, less 1/2 rho L^2 gamma (v + l L r) U Y_d (N likewise): to first order the force at delta = 0 at
-    the nominal loading, which is part of the card's Yv, Nv, Yr, Nr. After the rudder of the MMG model:
-    Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52, with its slipstream linear in the loading.
+    They replace the polynomial's rudder, less 1/2 rho L^2 gamma (v + l L r) U Y_d (N likewise): to first order the
+    force at delta = 0 at the nominal loading, which is part of the card's Yv, Nv, Yr, Nr. Of a polynomial that was
+    measured at the nominal loading, the share m stays; of the foil's forces, the share m of those at that loading
+    (w = U) is then subtracted in the place of their first order, so that with m = 1 what the loading changes is added.
+    After the rudder of the MMG model: Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52, with its
+    slipstream linear in the loading; m is this project's.
     """
     v, r, delta = (model.symbol(name) for name in ("motion.v", "motion.r", "rudder.effective"))
     u0, length = model.symbol("ship.speed"), model.symbol("ship.length")
@@ -41,21 +37,22 @@ def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringC
     driven = u0
     if "propeller.speed" in model:
         driven = u0 * model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
-    inflow = ca.fmax(speed + given["loading"] * (driven - speed), LEAST_INFLOW * u0)
     across = given["straightening"] * (v + given["lever"] * length * r)
-    force = scales(model, ca.SX(1)).force
-    lift = inflow**2 * ca.sin(delta + ca.atan2(across, inflow))
+
+    def lift(flow: ca.SX) -> ca.SX:
+        """w^2 sin(alpha), without the angle itself."""
+        w = ca.fmax(flow, LEAST_INFLOW * u0)
+        return w**2 * (w * ca.sin(delta) + across * ca.cos(delta)) / ca.sqrt(w**2 + across**2)
+
+    force, share = scales(model, ca.SX(1)).force, given["measured"]
     slope = {name: model.symbol(f"derivatives.{name}") for name in ("Yd", "Nd")}
     drag = model.symbol("derivatives.Xdd") if "derivatives.Xdd" in model else ca.SX(0)
-    if _HIGHER_ORDER & card.derivatives.keys():
-        kept, of_nominal_loading = 1, speed**2 * ca.sin(delta + ca.atan2(across, speed))
-        along, side = (lift - of_nominal_loading) * ca.sin(delta), (lift - of_nominal_loading) * ca.cos(delta)
-    else:
-        kept, along, side = 0, lift * ca.sin(delta), lift * ca.cos(delta) - across * speed
+    change = lift(speed + given["loading"] * (driven - speed)) - share * lift(speed)
+    side = change * ca.cos(delta) - (1 - share) * across * speed
     return (
-        model.redefine("rudder.X", lambda given: kept * given + force * along * drag)
-        .redefine("rudder.Y", lambda given: kept * given + force * side * slope["Yd"])
-        .redefine("rudder.N", lambda given: kept * given + force * length * side * slope["Nd"])
+        model.redefine("rudder.X", lambda measured: share * measured + force * change * ca.sin(delta) * drag)
+        .redefine("rudder.Y", lambda measured: share * measured + force * side * slope["Yd"])
+        .redefine("rudder.N", lambda measured: share * measured + force * length * side * slope["Nd"])
     )
 
 
@@ -81,6 +78,14 @@ LOADED_RUDDER = Effect(
             -4.0,
             0.0,
             typical=(-0.7,),
+        ),
+        EffectParameter(
+            "measured",
+            "share of the card's own rudder forces that stays, as measured at the nominal loading",
+            0.0,
+            1.0,
+            0.0,
+            spread=1.0,  # nothing says beforehand how far a polynomial holds (project choice)
         ),
     ),
     equations=_in_loaded_slipstream,
