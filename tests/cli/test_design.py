@@ -47,7 +47,7 @@ def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
 
 def test_a_trial_is_written_with_its_orders(tmp_path):
     result = tank2sim(
-        *("design", "esso-osaka", "--figures", "steady_radius_m@20", "--trial", "--minutes", "8"),
+        *("design", "mariner", "--figures", "steady_radius_m@20", "--trial", "--minutes", "8"),
         *("--sensors", "r_degps=0.02", "psi_deg=0.2", "u_mps=0.02", "-o", "trial.csv", "--orders", "orders"),
         *("--json", "d.json"),
         cwd=tmp_path,
@@ -78,7 +78,8 @@ def test_bad_options_are_refused_in_a_line(tmp_path, arguments, words):
 
 
 @pytest.mark.parametrize("option", ["--campaign", "--json"])
-def test_one_file_for_two_outputs_is_refused_and_not_written(tmp_path, option):
+def test_one_file_for_two_outputs_is_refused_before_the_work(tmp_path, option, monkeypatch):
+    monkeypatch.setattr("tank2sim.cli.design.design_campaign", None)
     result = tank2sim("design", "esso-osaka", *FAST, "--hours", "2", "-o", "p.csv", option, "p.csv", cwd=tmp_path)
     refused(result, "p.csv", "two outputs")
     assert list(tmp_path.iterdir()) == []
@@ -87,7 +88,7 @@ def test_one_file_for_two_outputs_is_refused_and_not_written(tmp_path, option):
 def test_a_plan_in_the_place_of_orders_is_refused(tmp_path):
     (tmp_path / "orders").mkdir()
     trial = ("--figures", "steady_radius_m@20", "--trial", "--minutes", "8", "--orders", "orders")
-    result = tank2sim("design", "esso-osaka", *trial, "-o", "orders/orders_01.csv", cwd=tmp_path)
+    result = tank2sim("design", "mariner", *trial, "-o", "orders/orders_01.csv", cwd=tmp_path)
     refused(result, "orders_01.csv", "two outputs")
     assert list((tmp_path / "orders").iterdir()) == []
 

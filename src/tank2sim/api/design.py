@@ -61,7 +61,7 @@ class CampaignDesignResult(PagedResult):
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("esso-osaka", figures="K_prime", draws=0)
+    >>> plan = t2s.design_campaign("mariner", figures="K_prime", draws=0)
     >>> bool((plan.figures["design"] < plan.figures["usual"]).all())
     True
     """
@@ -278,7 +278,7 @@ def design_campaign(
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("esso-osaka", figures="overshoot1_deg@10/10", hours=2, draws=0)
+    >>> plan = t2s.design_campaign("mariner", figures="overshoot1_deg@10/10", hours=2, draws=0)
     >>> float(plan.runs["tank_min"].sum()) < 2 * 60
     True
     """
@@ -322,7 +322,7 @@ class TrialDesignResult(PagedResult):
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> trial = t2s.design_trial("esso-osaka", figures="advance_m@35")
+    >>> trial = t2s.design_trial("mariner", figures="advance_m@35")
     >>> bool((trial.figures["design"] < trial.figures["before"]).all())
     True
     """
@@ -482,7 +482,7 @@ def design_trial(
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> trial = t2s.design_trial("esso-osaka", figures="advance_m@35", minutes=15)
+    >>> trial = t2s.design_trial("mariner", figures="advance_m@35", minutes=15)
     >>> trial.design.minutes_used <= 15
     True
     """

@@ -1,6 +1,8 @@
 """The helm of the steering page: telegraph, autopilot, what is ahead, members, replay by a link, gamepad, chart."""
 
 import json
+import re
+from html import escape, unescape
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from tank2sim.report.steering.members import members_of
 from tank2sim.report.steering.ship import telegraph_of
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
+from tests.report.opened_page import opened
 from tests.report.steering.sailing import in_browser, sailed
 
 SAIL = """
@@ -32,6 +35,17 @@ SAIL = """
 @pytest.fixture(scope="module")
 def kvlcc2():
     return make_steering_page(t2s.load("kvlcc2"))
+
+
+PHONE = """<script>
+const measure = () => {
+  const page = document.querySelector("iframe").contentDocument;
+  if (page?.documentElement?.dataset.ship !== "ready") return setTimeout(measure, 100);
+  const telegraph = page.getElementById("telegraph").getBoundingClientRect();
+  document.body.dataset.seen = JSON.stringify([telegraph.bottom, page.documentElement.scrollWidth]);
+};
+measure();
+</script>"""
 
 
 def within(html):
@@ -110,6 +124,13 @@ class TestInABrowser:
         assert seen["course"] == "046"
         assert "the autopilot is off" in seen["hand"]
         assert np.degrees(seen["short"]) == pytest.approx(280)
+
+    def test_the_telegraph_is_on_the_first_screen_of_a_phone(self, kvlcc2, tmp_path: Path):
+        inner = escape(kvlcc2.page())
+        html = f'<body><iframe width="400" height="850" srcdoc="{inner}"></iframe>{PHONE}</body>'
+        seen, _ = opened(html, tmp_path)
+        low, wide = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
+        assert 400 < low <= 850 and wide <= 400
 
     def test_a_link_replays_the_attempt_to_the_last_digit(self, kvlcc2, tmp_path: Path):
         steps = (
