@@ -48,7 +48,7 @@ def test_the_json_has_the_same_numbers(found):
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()
-    assert {"coefficients", "zigzag_10_10"} <= set(found.charts())
+    assert {"coefficients", "tracks"} <= set(found.charts())
     assert found.page().startswith("<!doctype html>")
 
 

@@ -138,7 +138,8 @@ def test_charts_and_a_page_that_fetches_nothing(path, tmp_path):
     plots = tmp_path / "plots"
     run(path, "--column", "r", "--plot", plots)
     pictures = {picture.name for picture in plots.glob("*.png")}
-    assert pictures == {"steps_r_density.png", "steps_r_correlation.png", "steps_r_spectrum.png"}
+    of_r = {f"steps_r_{name}.png" for name in ("density", "autocorrelation", "spectrum")}
+    assert pictures == {*of_r, "steps_histories.png"}
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
     page = (plots / "report.html").read_text()
     assert "Measured signals" in page
