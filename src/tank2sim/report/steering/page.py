@@ -63,8 +63,8 @@ _SCRIPTS = tuple(
     )
 )
 _VIEW_3D = ("three.min.js", "view3d.js")
-"""three.js (MIT licence, ``three.LICENSE``), and what is seen from the bridge with it. Its release 149 is the last with a
-single file that a plain script element takes without a warning."""
+"""three.js (MIT licence, ``three.LICENSE``), and what is seen from the bridge with it. Its release 149 is the last with
+a single file that a plain script element takes without a warning."""
 
 _BEAM = 1 / 7
 """Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
