@@ -28,7 +28,7 @@ const picture = () => {
   pen.drawImage(at("bridge-view"), 0, 0, 100, 50);
   const pixels = pen.getImageData(0, 0, 100, 50).data;
   const green = (x, y) => pixels[4 * (100 * y + x) + 1];
-  return { sky: green(3, 3), sea: green(3, 31), deck: green(50, 48) };
+  return { sky: green(3, 3), sea: green(3, 31), deck: green(50, 48), bow: green(50, 27) };
 };
 """
 
@@ -77,9 +77,9 @@ class TestInABrowser:
         seen.before = across();
         put("set-rudder.command", "20", "input"); put("factor", "20", "change"); click("run");
         const turned = () => parseFloat(at("read-motion.psi").textContent);
-        await new Promise((done) => setInterval(() => {{ if (turned() > 8 && turned() < 90) done(); }}, 20));
+        await new Promise((done) => setInterval(() => {{ if (turned() > 15 && turned() < 90) done(); }}, 20));
         click("run");
-        seen.after = across(); seen.heading = turned(); seen.looking = at("bearing").textContent;
+        seen.bow_after = picture().bow; seen.after = across(); seen.heading = turned(); seen.looking = at("bearing").textContent;
         click("reset"); press("3"); seen.starboard = view.placeOf(0, 2000)[0] / view.clientWidth;
         seen.wing = at("bearing").textContent; seen.hidden = view.placeOf(0, -2000);
         press("4"); seen.above = view.placeOf(0, 0); seen.height = view.clientHeight;
@@ -95,6 +95,7 @@ class TestInABrowser:
         assert 0.5 * seen["height"] < seen["above"][1] < seen["height"]
         assert seen["closed"] is True
         assert seen["sky"] > seen["sea"] + 40 > seen["deck"] + 50
+        assert seen["bow_after"] == pytest.approx(seen["bow"], abs=3) == pytest.approx(seen["deck"], abs=3)
 
     def test_on_a_phone_the_view_of_a_measured_trial_is_within_the_window(self, mariner, tmp_path):
         file = tmp_path / "trial.csv"

@@ -1,7 +1,7 @@
 // The view from the bridge by three.js, in place of the chart. North is -z there, east x, up y.
 
 class BridgeView {
-  static FIELD = 60; // deg, width of the picture: about what both eyes see sharply (project choice)
+  static FIELD = 60; // deg, width of the picture: own bow and a channel are in it (project choice)
   static FAR = 60; // ship lengths that are drawn
   // Heights and the place of the house, in ship lengths: those of a laden tanker, bridge aft (project choice).
   static DECK = 0.03;
