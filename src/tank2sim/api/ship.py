@@ -646,6 +646,7 @@ class Ship:
         *,
         ghost: str | Path | None = None,
         scenario: str | Path | None = None,
+        view_3d: bool = False,
     ) -> SteeringPageResult:
         """A page in which the ship is steered in a browser; it needs no network.
 
@@ -657,6 +658,8 @@ class Ship:
             A measured trial that moves next to the ship.
         scenario : path or str, optional
             Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
+        view_3d : bool
+            Whether the page also has the view from the bridge (three.js, 0.6 MB).
 
         Raises
         ------
@@ -667,7 +670,7 @@ class Ship:
         from tank2sim.api.steering_page import make_steering_page
 
         inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
-        return self._written(make_steering_page(self, ghost, scenario), path, *inputs)
+        return self._written(make_steering_page(self, ghost, scenario, view_3d), path, *inputs)
 
     def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
         """Write the page of a result to a path that is not an input, if one is given; return the result."""

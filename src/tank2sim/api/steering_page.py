@@ -39,6 +39,8 @@ class SteeringPageResult(Result):
         How the autopilot of the page was designed; empty without one.
     scenario : Scenario, optional
         Waters to steer in.
+    view_3d : bool
+        Whether the page has the view from the bridge.
     """
 
     command = "steer"
@@ -53,11 +55,13 @@ class SteeringPageResult(Result):
         members: Sequence[Mapping[str, float]] = (),
         autopilot: str = "",
         scenario: Scenario | None = None,
+        view_3d: bool = False,
     ) -> None:
         from tank2sim.report.steering.ship import NO_WASM_COMPILER
 
         self.ship, self.model, self.library, self.ghost = ship, model, library, ghost
         self.members, self.autopilot, self.scenario = tuple(members), autopilot, scenario
+        self.view_3d = view_3d
         self._page_notices = tuple(dict.fromkeys(notices))  # the page itself says first that there is no ship in it
         self.notices = self._page_notices if library else (NO_WASM_COMPILER, *self._page_notices)
 
@@ -103,7 +107,7 @@ class SteeringPageResult(Result):
             beam_m=self.ship.card.ship.beam_m,
             draught_m=self.ship.card.ship.draught_m,
         )
-        return steering_page(ship, self.ghost, self._page_notices, self.scenario)
+        return steering_page(ship, self.ghost, self._page_notices, self.scenario, self.view_3d)
 
     @property
     def _size_kB(self) -> float:
@@ -114,6 +118,7 @@ def make_steering_page(
     ship: Ship,
     ghost: str | Path | None = None,
     scenario: str | Path | None = None,
+    view_3d: bool = False,
     report: Callable[[str], None] = lambda _: None,
 ) -> SteeringPageResult:
     """Make the page, without writing it. Raises as :meth:`.Ship.steering_page`.
@@ -125,6 +130,8 @@ def make_steering_page(
         A measured trial.
     scenario : path or str, optional
         GeoJSON file of the waters, or the name of bundled ones.
+    view_3d : bool
+        Whether the page has the view from the bridge.
     report : callable
         Called before what takes long.
     """
@@ -152,7 +159,8 @@ def make_steering_page(
             report(FIRST_COMPILATION)
         library = page_ship.ship_in_page(model)
     notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
-    return SteeringPageResult(ship, model, library, shown, notices, members_of(card, model), autopilot, waters)
+    members = members_of(card, model)
+    return SteeringPageResult(ship, model, library, shown, notices, members, autopilot, waters, view_3d)
 
 
 def _with_autopilot(model: Model) -> tuple[Model, str, tuple[str, ...]]:

@@ -31,6 +31,7 @@ DEFAULT_SHIP = "esso-osaka-ship"
     help="A measured trial next to the ship.",
 )
 @click.option("--scenario", metavar="FILE", help="Waters as GeoJSON, or 'channel' or 'basin'.")
+@click.option("--view-3d", is_flag=True, help="Also the view from the bridge, 0.6 MB.")
 @set_option
 @json_option
 def command(
@@ -38,6 +39,7 @@ def command(
     page: Path,
     ghost: Path | None,
     scenario: str | None,
+    view_3d: bool,
     values: dict[str, object],
     json_file: Path | None,
 ) -> None:
@@ -48,7 +50,7 @@ def command(
     from tank2sim.api.steering_page import make_steering_page
 
     ship = load(card, values)
-    result = make_steering_page(ship, ghost, scenario, report=screen.print)
+    result = make_steering_page(ship, ghost, scenario, view_3d, report=screen.print)
     inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
     write_result(result, [Path(ship.card.source), *inputs], json_file=json_file, page=page)
     show_result(result)

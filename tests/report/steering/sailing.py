@@ -47,10 +47,10 @@ DRIVE = """<script>{{
 }}</script>"""
 
 
-def sailed(html, folder, steps):
+def sailed(html, folder, steps, *flags):
     """What the page reported after these steps, and the voyages that it saved."""
     html = html.replace("<body>", "<body>" + FRAMES).replace("</body>", DRIVE.format(steps=steps) + "</body>")
-    seen, console = opened(html, folder)
+    seen, console = opened(html, folder, *flags)
     assert console == [], console
     seen = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
     voyages = []

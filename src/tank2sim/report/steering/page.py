@@ -62,6 +62,10 @@ _SCRIPTS = tuple(
         *("pen", "view", "waters", "track", "history", "instruments", "telegraph", "gamepad", "page"),
     )
 )
+_VIEW_3D = ("three.min.js", "view3d.js")
+"""three.js (MIT licence, ``three.LICENSE``), and what is seen from the bridge with it. Its release 149 is the last with
+a single file that a plain script element takes without a warning."""
+
 _BEAM = 1 / 7
 """Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
 
@@ -110,7 +114,11 @@ class PageShip:
 
 
 def steering_page(
-    ship: PageShip, ghost: Ghost | None = None, notices: Sequence[str] = (), scenario: Scenario | None = None
+    ship: PageShip,
+    ghost: Ghost | None = None,
+    notices: Sequence[str] = (),
+    scenario: Scenario | None = None,
+    view_3d: bool = False,
 ) -> str:
     """The page as one HTML file.
 
@@ -123,6 +131,8 @@ def steering_page(
         What the user should know.
     scenario : Scenario, optional
         Waters to steer in.
+    view_3d : bool
+        Whether the page has the view from the bridge.
 
     Raises
     ------
@@ -162,10 +172,21 @@ def steering_page(
         dials=_DIALS,
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
-        style=Markup(resource_text("kit/page.css") + resource_text("steering/page.css")),
-        script=Markup("\n".join(resource_text(f"steering/{name}") for name in _SCRIPTS)),
+        view_3d=view_3d,
+        style=Markup("".join(map(resource_text, _styles(view_3d)))),
+        script=Markup("\n".join(resource_text(f"steering/{name}") for name in _scripts(view_3d))),
         data=json_in_html(_data(ship, ghost, scenario)),
     )
+
+
+def _styles(view_3d: bool) -> list[str]:
+    return ["kit/page.css", "steering/page.css", *(["steering/view3d.css"] if view_3d else [])]
+
+
+def _scripts(view_3d: bool) -> list[str]:
+    """The scripts in their order; the view from the bridge goes before the last, which makes the chart."""
+    *parts, page = _SCRIPTS
+    return [*parts, *(_VIEW_3D if view_3d else ()), page]
 
 
 def _data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
