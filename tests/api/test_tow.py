@@ -69,7 +69,7 @@ def test_a_force_is_a_number_or_a_polynomial(path):
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()
-    assert {"speeds_and_residuals", "drag_coefficient"} <= set(found.charts())
+    assert {"measured_and_computed_speeds", "drag_coefficient"} <= set(found.charts())
     assert found.page().startswith("<!doctype html>")
 
 
