@@ -184,6 +184,7 @@ class TestInABrowser:
         steps = """
         press("ArrowRight", { shiftKey: true }); press("ArrowRight"); press("ArrowLeft"); press("]");
         seen.factor = at("factor").value;
+        seen.tops = [...document.querySelectorAll(".instruments figure")].map((one) => one.getBoundingClientRect().top);
         press("z"); press("ArrowRight", { shiftKey: true });  // a hand on the rudder ends the zigzag
         seen.finish = at("finish").disabled;
         const wait = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -195,6 +196,7 @@ class TestInABrowser:
         reported, (voyage, fast) = sailed(page, tmp_path, steps)
         assert 60 < fast["t_s"][-1] < 101
         assert reported["factor"] == "10"
+        assert len(reported["tops"]) == 3 and len({*reported["tops"]}) == 1  # side by side
         assert reported["finish"] is True
         assert reported["now-rudder.command"] == "2 deg port"
         assert voyage["psi_deg"][-1] < 0
