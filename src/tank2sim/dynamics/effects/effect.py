@@ -61,6 +61,8 @@ class EffectParameter:
         it with the others; None: it stays at its default.
     worse : int
         1 if the fault is a larger value than the ship's own, -1 if a smaller one (the rate of a gear), 0 if either.
+    optional : bool
+        True if an identification leaves it at its default where the card does not state it.
     """
 
     name: str
@@ -73,6 +75,7 @@ class EffectParameter:
     typical: Values | Callable[[ManoeuvringCard], Values] = field(default=(), kw_only=True)
     spread: float | Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
     worse: int = field(default=0, kw_only=True)
+    optional: bool = field(default=False, kw_only=True)
 
     @property
     def stem(self) -> str:

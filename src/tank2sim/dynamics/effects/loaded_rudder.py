@@ -85,7 +85,7 @@ LOADED_RUDDER = Effect(
             0.0,
             1.0,
             0.0,
-            absent=0.0,
+            optional=True,
             spread=1.0,  # nothing says beforehand how far a polynomial holds (project choice)
         ),
     ),

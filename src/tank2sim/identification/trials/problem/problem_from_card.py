@@ -180,7 +180,7 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
     for entry in card.effects:
         effect = EFFECTS[entry.name]
         for parameter in effect.parameters:
-            optional = parameter.default is not None and parameter.absent is not None
+            optional = parameter.optional or (parameter.default is not None and parameter.absent is not None)
             if parameter.input_name or (optional and parameter.name not in entry.parameters):
                 continue  # an input, or a part of the effect that the card does not have
             error = entry.uncertainty.get(
