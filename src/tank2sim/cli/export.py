@@ -63,7 +63,7 @@ def command(
 ) -> None:
     """Write the FMU (Model Exchange and Co-Simulation) of CARD (a file, or the name of a bundled ship)."""
     if ssp_inputs and ssp is None:
-        raise InputError("--ssp-inputs", "", "there is no SSP package", "give --ssp too")
+        raise InputError("--ssp-inputs", "", "needs an SSP package", "give --ssp too")
     ship = load(card, values)
     with showing_stages("making the FMU") as report:
         result = make_fmu_file(

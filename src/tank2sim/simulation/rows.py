@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -62,7 +63,7 @@ _NUMPY: dict[int, Callable[..., Any]] = {
 """CasADi's scalar operations in NumPy."""
 
 _AT_ONCE = 4096
-"""Rows that pass through the operations together: more no longer fit the cache."""
+"""Rows that pass through the operations together: more no longer fit the cache (project choice)."""
 
 
 class ArrayFunction:
@@ -74,10 +75,12 @@ class ArrayFunction:
     Parameters
     ----------
     function : casadi.Function
-        Of SX expressions, with dense arguments and results; a matrix result is in CasADi's order, by columns.
+        Of scalar operations, or one that expands to them, with dense arguments and results; a matrix result is in
+        CasADi's order, by columns.
     """
 
     def __init__(self, function: ca.Function):
+        function = function if function.is_a("SXFunction") else function.expand()
         self.function = function
         self._program = []
         for k in range(function.n_instructions()):
@@ -139,10 +142,14 @@ class RowFunction:
         n = max(len(argument) for argument in arguments if argument.ndim == 2)
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
         if self._library is None:
-            return ArrayFunction(self.function)(*arrays)
+            return self._in_numpy(*arrays)
         results = [np.empty((n, self.function.numel_out(place))) for place in range(self.function.n_out())]
         self._loop(n, arrays, [array.shape[1] if array.ndim == 2 else 0 for array in arrays], results)
         return tuple(results)
+
+    @cached_property
+    def _in_numpy(self) -> ArrayFunction:
+        return ArrayFunction(self.function)
 
     def _loop(self, n: int, arrays: Sequence[Array], strides: Sequence[int], results: Sequence[Array]) -> None:
         assert self._library is not None

@@ -101,7 +101,8 @@ _UNSURE_FROM = 0.01
 choice: a shorter one moves a ship by less than its sensors show)."""
 
 _REACH = 0.02
-"""Change of the instant of an order, as a share of the interval in which it was given, for the derivative in it."""
+"""Change of the instant of an order, as a share of the interval in which it was given, for the derivative in it
+(project choice: the motion is nearly linear in it)."""
 
 _STEP_OF_ORDER = math.radians(1.0)
 """Smallest step of an order whose instant is estimated (project choice: the smallest of a helmsman)."""
@@ -144,7 +145,7 @@ class Replayer:
         self.card, self.seen = card, tuple(seen)
         self.model = driven_model(card, driven_by)
         step, constants = step_and_constants(self.model)
-        self._steps, self._constants = Chain(step), RowFunction(constants)
+        self._steps, self._constants = Chain(step), constants
         self._shown = shown_by(self.model, seen)
         ordered = driven_by == "order" and _ORDER in self.model.input_names
         self._order = self.model.input_names.index(_ORDER) if ordered else None
@@ -154,9 +155,9 @@ class Replayer:
     def states(self, record: InputRecord, start: Array, p: Array) -> Array:
         """States (n, nx) at the instants of a record's inputs; nan once out of bounds."""
         lengths, inputs, places = self._integration_steps(record)
-        (constants,) = self._constants(p[None])
+        constants = np.array(self._constants(p)).ravel()
         with np.errstate(all="ignore"):
-            states = self._steps.run(start, inputs, p, constants[0], lengths[:, None])[places]
+            states = self._steps.run(start, inputs, p, constants, lengths[:, None])[places]
             lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)
         if lost.any():
             states[int(np.argmax(lost)) :] = np.nan

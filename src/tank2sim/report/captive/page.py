@@ -86,7 +86,7 @@ def reduction_page(found: Json) -> Page:
     )
 
 
-_CERTAINTY = "A derivative whose standard error is as large as its value (red) is no more than its order of magnitude."
+_CERTAINTY = "A derivative whose standard error is as large as its value (red) shows its order of magnitude only."
 
 
 def _worst_predictions(errors: Json) -> dict[str, tuple[float, str]]:
