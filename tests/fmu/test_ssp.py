@@ -171,7 +171,7 @@ def test_every_input_may_be_a_connector(
 
 
 def test_all_connectors_are_those_of_a_package(tmp_path: Path) -> None:
-    refused(tank2sim("export", "mariner", "-o", "m.fmu", "--ssp-inputs", cwd=tmp_path), "there is no SSP package")
+    refused(tank2sim("export", "mariner", "-o", "m.fmu", "--ssp-inputs", cwd=tmp_path), "--ssp-inputs")
 
 
 @pytest.mark.slow
