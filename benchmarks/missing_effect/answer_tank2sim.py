@@ -21,7 +21,7 @@ from pathlib import Path
 import tank2sim as t2s
 from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY
 
-COLUMNS = ("case", "verdict", "effects", "confidence", "held_out_misfit", "alternatives")
+COLUMNS = ("case", "verdict", "effects", "confidence", "confidences", "held_out_misfit", "alternatives")
 
 
 def answer(folder: Path) -> dict[str, str]:
@@ -37,6 +37,7 @@ def answer(folder: Path) -> dict[str, str]:
         "verdict": "missing" if named else "outside" if gap.verdict == OUTSIDE_LIBRARY else "none",
         "effects": "+".join(effect.name for effect in gap.effects) if named else "",
         "confidence": f"{min(effect.confidence for effect in gap.effects):.4f}" if named and gap.effects else "",
+        "confidences": "+".join(f"{effect.confidence:.4f}" for effect in gap.effects) if named else "",
         "held_out_misfit": "" if misfit is None else f"{misfit:.4g}",
         "alternatives": " ".join("+".join(names) for names in gap.alternatives),
     }

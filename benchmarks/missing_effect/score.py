@@ -4,9 +4,10 @@
 
 ANSWERS.csv has the columns ``case``, ``verdict`` (``none``, ``missing``, ``outside``) and ``effects`` (names of the
 catalogue joined by ``+``; empty unless something is missing), and, if the program has them, ``confidence`` (0 to 1, of
-the names), ``alternatives`` (sets of names joined by ``+``, with blanks between, at most three) and ``held_out_misfit``
-(root mean square of simulated less measured over the noise of one reading, of the trials held out, with what was
-found). A case that is not answered counts as wrong.
+the names), ``confidences`` (of each name, joined by ``+``; used instead of ``confidence``), ``alternatives`` (sets of
+names joined by ``+``, with blanks between, at most three) and ``held_out_misfit`` (root mean square of simulated less
+measured over the noise of one reading, of the trials held out, with what was found). A case that is not answered counts
+as wrong.
 
 Printed are, with 95 % Wilson intervals: cases answered exactly (verdict and all names); precision and recall of names;
 cases with a name that is not there; for answers with a confidence, how often the names were there.
@@ -31,7 +32,7 @@ SAME = {"water_depth": "shallow_water"}
 MOST = 3
 """Alternatives that count: whoever gives all has said nothing."""
 
-BINS = (0.0, 0.5, 0.8, 0.95, 1.0)
+BINS = (0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,17 @@ class Scored:
         """Whether the answer is exact, or the truth is one of at most :data:`MOST` alternatives given with it."""
         others = (self.answer.get("alternatives") or "").split()[:MOST]
         return self.exact or any(_names(other) == self.hidden for other in others)
+
+    @property
+    def claims(self) -> list[tuple[float, bool]]:
+        """Confidence of each name, and whether it is there; empty without confidences."""
+        names = [SAME.get(name, name) for name in (self.answer.get("effects") or "").split("+") if name]
+        each = (self.answer.get("confidences") or "").split("+")
+        if each == [""]:
+            each = [self.answer.get("confidence") or ""] * len(names)
+        return [
+            (float(confidence), name in self.hidden) for name, confidence in zip(names, each, strict=True) if confidence
+        ]
 
     @property
     def misnamed(self) -> bool:
@@ -114,12 +126,7 @@ def main() -> int:
         for value in dict.fromkeys(one.truth[column] for one in scored):
             some = [one for one in scored if one.truth[column] == value]
             show(f"{value} Hz" if column == "hertz" else value, some)
-    claims = [
-        (float(one.answer["confidence"]), name in one.hidden)
-        for one in scored
-        for name in one.named
-        if one.answer.get("confidence")
-    ]
+    claims = [claim for one in scored for claim in one.claims]
     for low, high in pairwise(BINS):
         inside = [there for confidence, there in claims if low < confidence <= high]
         if inside:
