@@ -71,8 +71,8 @@ def test_7_outside_its_axes_and_8_without_block_are_refused():
 
 def test_the_table_of_theory_tells_what_reproduces():
     rows = {own.formula: own for own in theory.theory_values(theory.SHIP_MOTION_T2, 0.2618)}
-    assert rows["(9)"].remark.startswith("the paper's number reproduces")
-    assert rows["(8) braking"].remark.startswith("the paper's number does not")
+    assert rows["(9)"].remark.startswith("the published number reproduces")
+    assert rows["(8) braking"].remark.startswith("the published number does not")
     (only,) = theory.theory_values(theory.ELLIPSOID, 0.2618)
     assert only.value_kgm2 == pytest.approx(812.7e-4, rel=1e-3) and only.printed_kgm2 == pytest.approx(509.7e-4)
     deep = theory.FloatingBody(length_m=0.67, beam_m=0.1, draught_m=0.08, depth_m=0.22)

@@ -89,6 +89,7 @@ def missing() -> Gap:
         ),
         equation="kinematics",
         noise=noise,
+        waves=None,
         passed=(passed("turn35", 8.0, 1.0), passed("zigzag", 6.0, 1.0), passed("turn20", 9.0, 1.5, held_out=True)),
         figures_before=figures(1.1),
         figures_after=figures(1.01),

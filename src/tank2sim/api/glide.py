@@ -177,7 +177,9 @@ def _printed_table(found: GlideStudy) -> ResultTable:
         "not that of (7)",
         f"By lift and drag of (6) and (7) the printed glides are off balance by {printed}, those above by {right}",
     )
-    return ResultTable("The same as the paper prints it", _COLUMNS, [_row(glide) for glide in found.printed], notes)
+    return ResultTable(
+        "The same by the equations as published", _COLUMNS, [_row(glide) for glide in found.printed], notes
+    )
 
 
 def _unbalance_text(found: GlideStudy, glides: tuple[SteadyGlide, ...]) -> str:

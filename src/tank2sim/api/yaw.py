@@ -183,7 +183,7 @@ class YawResult(Result):
                 [each.formula, 1e4 * each.value_kgm2, each.printed_kgm2 and 1e4 * each.printed_kgm2, each.remark]
                 for each in self.theory
             ]
-            columns = ("", "added inertia, 1e-4 kg m2", "paper's Table 1", "remark")
+            columns = ("", "added inertia, 1e-4 kg m2", "published, Table 1", "remark")
             tables.append(ResultTable("From the form, by (7), (8) and (9) of Alyshev (2019)", columns, values))
         return tuple(tables)
 

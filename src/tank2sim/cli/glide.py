@@ -26,7 +26,7 @@ from tank2sim.errors import InputError
 @click.option("--reference-area-m2", "area", type=float, metavar="S", help="Area of the coefficients, for the card's.")
 @click.option("--programme", type=click.Path(path_type=Path), metavar="FILE",
               help="A path: CSV of steps duration_s, path_angle_deg or pitch_deg, roll_deg, buoyancy_kg.")  # fmt: skip
-@click.option("--as-printed", is_flag=True, help="Also what the paper's equations give as they are printed.")
+@click.option("--as-printed", is_flag=True, help="Also what the published equations give as they are printed.")
 @click.option("--budget-kg", type=float, metavar="B", help="Ballast to push out in all: how far it carries ...")
 @click.option("--depth-m", type=float, metavar="H", help="... between the surface and this depth.")
 @set_option

@@ -139,7 +139,7 @@ def masses_by_theory(body: TowedBody) -> tuple[MassByTheory, ...]:
 
     Lamb's k11 is exact for an ellipsoid; a real form of the same slenderness differs by a few hundredths.
     """
-    printed = mass_by_theory(body, PRINTED_K11, "k11 as in the paper")
+    printed = mass_by_theory(body, PRINTED_K11, "k11 as published")
     if body.beam_m is None:
         return (printed,)
     a, b = body.length_m / 2, body.beam_m / 2

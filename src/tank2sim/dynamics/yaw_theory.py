@@ -177,7 +177,7 @@ def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, .
         printed_value = printed.get(formula)
         if printed_value is not None:
             same = "reproduces" if abs(value / printed_value - 1) < _SAME else "does not reproduce"
-            remark = f"the paper's number {same}; {remark}"
+            remark = f"the published number {same}; {remark}"
         return TheoryValue(formula=formula, value_kgm2=value, printed_kgm2=printed_value, remark=remark)
 
     try:

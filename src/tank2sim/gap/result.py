@@ -10,6 +10,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 
 MISSING = "missing effect"
@@ -337,7 +338,9 @@ class Gap:
     equation : str
         Equation of the gap: surge, sway, yaw, actuator, kinematics or sensor.
     noise : mapping
-        Variable to (standard deviation, ``stated`` or ``estimated``), SI.
+        Variable to (standard deviation, ``stated`` or ``estimated``), SI; with the motion in waves, if any.
+    waves : WaveBand or None
+        Accelerations by waves that were found in the fitted trials.
     passed : tuple of Passed
         Of all trials.
     figures_before, figures_after : tuple of FigureComparison
@@ -365,6 +368,7 @@ class Gap:
     where: tuple[MisfitPlace, ...]
     equation: str
     noise: Mapping[str, tuple[float, str]]
+    waves: WaveBand | None
     passed: tuple[Passed, ...]
     figures_before: tuple[FigureComparison, ...]
     figures_after: tuple[FigureComparison, ...]

@@ -27,6 +27,7 @@ from tank2sim.gap.diagnosis.residuals import (
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
+from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.gap.outcome.combine import combine_passes, without_effect
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, at_rest
@@ -340,6 +341,7 @@ def _assemble_gap(
         where=places(results),
         equation=equation_of([name for name, *_ in estimated], improved, force, results),
         noise=noise,
+        waves=found.likelihood.belief.waves,
         passed=tuple(results),
         figures_before=figures(card, every, results, "before"),
         figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
@@ -348,7 +350,9 @@ def _assemble_gap(
         could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
         agreement=agreement,
         next_test=_next(card, found, decision, sigmas),
-        notices=_notices(card, replace(judged, decision=decision), agreement, (fitted, held)),
+        notices=_notices(
+            card, replace(judged, decision=decision), agreement, (fitted, held), found.likelihood.belief.waves
+        ),
     )
     return gap, proof.trials
 
@@ -645,7 +649,7 @@ def _after(every: Sequence[Trial], fitted: Measured, held: Measured, sensors: Se
 
 
 def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, tuple[float, str]]:
-    """Standard deviation of one reading of each variable: white and slow noise together, SI."""
+    """Standard deviation of one reading of each variable: white and slow noise and the motion in waves together, SI."""
     motion, noise = found.likelihood.motion, best.noise
     stated = {
         OBSERVED_SIGNALS[name]: value
@@ -653,10 +657,13 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
         for name, value in trial.noise.items()
         if name in OBSERVED_SIGNALS
     }
+    waves = found.likelihood.belief.waves
+    in_waves = waves.motion if waves else {}
     sizes = {}
     for place, name in enumerate(motion.seen):
         sigma = float(np.sqrt(noise.white[place] ** 2 * motion.fine + noise.slow[place] ** 2))
-        sizes[name] = (stated[name], "stated") if name in stated else (sigma, "estimated")
+        size, origin = (stated[name], "stated") if name in stated else (sigma, "estimated")
+        sizes[name] = float(np.hypot(size, in_waves.get(name, 0.0))), origin
     return sizes
 
 
@@ -705,10 +712,12 @@ def _notices(
     judged: _Judged,
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
+    waves: WaveBand | None,
 ) -> tuple[str, ...]:
     decision, results, withheld = judged.decision, judged.proof.results, judged.withheld
     own_surroundings = tuple(judged.proof.by_trial) if trials[1].trials else ()
     notices = [*trials[0].notices, *trials[1].notices]
+    notices += [_of_waves(waves)] if waves else []
     notices += [judged.by_simulation] if judged.by_simulation else []
     notices += [_in_words(strange) for strange in decision.strange]
     notices += [
@@ -735,6 +744,14 @@ def _notices(
         if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
             notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
     return tuple(dict.fromkeys(notices))
+
+
+def _of_waves(waves: WaveBand) -> str:
+    speed, rate = waves.motion["motion.v"], np.rad2deg(waves.motion["motion.r"])
+    return (
+        f"waves or a swell with a period of {waves.period_s:.3g} s move the ship in the fitted trials (standard "
+        f"deviation {speed:.2g} m/s in sway, {rate:.2g} deg/s in yaw): counted as noise, not as a missing effect"
+    )
 
 
 def _in_words(strange: Strange) -> str:

@@ -93,7 +93,9 @@ def read_yaw_record(path: Path | str) -> YawRecord:
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
     notes = (
-        [f"the file does not state {' and '.join(missing)} of the programme; the paper's is taken."] if missing else []
+        [f"the file does not state {' and '.join(missing)} of the programme; that of the published rig is taken."]
+        if missing
+        else []
     )
     whole = np.unwrap(angle)
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))

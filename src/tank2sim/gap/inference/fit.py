@@ -9,6 +9,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.kalman_filter import NoiseLevels
+from tank2sim.gap.inference.wave_band import WaveBand
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +72,14 @@ class Belief:
     wide : array (6,), optional
         Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at
         fault; by default :data:`.likelihood.WIDE_PRIOR` times its noise.
+    waves : WaveBand, optional
+        Unmodelled accelerations by waves, the same for every explanation.
     """
 
     logs: Array
     spread: Array
     wide: Array | None = None
+    waves: WaveBand | None = None
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@ column, and every explanation with the same noise is one small least-squares pro
     state      z = (dx of 6 states, 3 accelerations, ny sensor errors)
     dx[k+1]    = Phi dx[k] + Gamma (g a[k] + w[k] + d[k]),   d = the model's rates less the measured change
     a, e       first-order Gauss-Markov processes (white noise through a lag)
+    z_w        in waves: 3 accelerations in a narrow band and their quadratures (:mod:`.wave_band`), added to a
     y - h(x)   = H dx + e + white noise
 
 Durbin and Koopman (2012), Time Series Analysis by State Space Methods, 2nd ed., chapters 4 and 7: likelihood by
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.gap.inference import kalman_kernels
+from tank2sim.gap.inference.wave_band import WaveBand
 
 _Truths = NDArray[np.bool_]
 
@@ -123,10 +125,10 @@ class Observer:
     ----------
     linear : Linear
     noise : NoiseLevels
-    push : array (R, T - 1, 6, 3)
+    push : array (R, T - 1, 6, 3), in waves (R, T - 1, 6, 9)
         Errors of the motion by the accelerations a block before.
-    fading : array (nz - 6,)
-        Share of each acceleration and sensor error that remains a block later.
+    fading : array (3 + ny,), in waves (5 + ny,)
+        Share of each acceleration and sensor error that remains a block later; real and imaginary part of the band's.
     gain : array (R, T, nz, ny)
     white : array (R, T, ny, ny)
         Inverse of the lower Cholesky factor of the innovations' covariance.
@@ -219,26 +221,41 @@ def _pushed(noise: NoiseLevels, block_s: float) -> _Pushed:
     )
 
 
-def observer(linear: Linear, noise: NoiseLevels) -> Observer:
-    """The filter of a noise: the covariance recursion, once for all columns."""
+def observer(linear: Linear, noise: NoiseLevels, waves: WaveBand | None = None) -> Observer:
+    """The filter of a noise, and of forces of waves if any: the covariance recursion, once for all columns."""
     runs, blocks, ny, _ = linear.reading.shape
-    nz = 6 + FORCE_STATES + ny
+    slow = slice(6, 6 + FORCE_STATES + ny)
     fading = np.exp(-linear.block_s / np.concatenate([noise.force_s, noise.slow_s]))
     levels = np.concatenate([noise.force, noise.slow])
+    start = np.concatenate([linear.wide**2, levels**2, np.zeros(0) if waves is None else np.repeat(waves.level**2, 2)])
     pushed = _pushed(noise, linear.block_s)
     B = linear.spreading[..., :FORCE_STATES]
+    nz = len(start)
     Q = np.zeros((runs, blocks - 1, nz, nz))
-    Q[..., range(6, nz), range(6, nz)] = levels**2 * (1 - fading**2)
+    Q[..., range(6, slow.stop), range(6, slow.stop)] = levels**2 * (1 - fading**2)
     Q[..., :6, :6] = (B * pushed.way) @ B.swapaxes(-1, -2)
     Q[..., :6, 6:9] = B * pushed.both
-    Q[..., 6:9, :6] = Q[..., :6, 6:9].swapaxes(-1, -2)
     push = B * pushed.gain
-    start = np.concatenate([linear.wide**2, levels**2])
+    if waves is not None:
+        block = waves.over(linear.block_s)
+        band = slice(slow.stop, nz)
+        Q[..., range(band.start, nz), range(band.start, nz)] = np.repeat(block.end, 2)
+        Q[..., :6, :6] += (B * block.way) @ B.swapaxes(-1, -2)
+        Q[..., :6, band] = _in_pairs(B * block.with_value, B * block.with_quadrature)
+        push = np.concatenate([push, _in_pairs(B * block.gain.real, -B * block.gain.imag)], axis=-1)
+        fading = np.concatenate([fading, [block.fading.real, block.fading.imag]])
+    Q[..., 6:, :6] = Q[..., :6, 6:].swapaxes(-1, -2)
     seeing = linear.reading, linear.known, noise.white**2
     gain, white, filtered = kalman_kernels.covariances(start, linear.transition, push, fading, Q, seeing)
     # rows without a measurement have S = 1 on their diagonal and count nothing
     log_det = float(-2 * np.sum(np.log(white[..., range(ny), range(ny)])))
     return Observer(linear, noise, push, fading, gain, white, filtered, log_det)
+
+
+def _in_pairs(values: Array, quadratures: Array) -> Array:
+    """Columns (..., 3) of accelerations and of their quadratures in turn (..., 6)."""
+    pairs: Array = np.stack([values, quadratures], axis=-1).reshape(*values.shape[:-1], -1)
+    return pairs
 
 
 def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Array:
@@ -256,7 +273,7 @@ def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Arr
     variance, start, fading_slope, way, both, gain, white = kalman_kernels.backward(*moved, whitened, after)
     levels = np.concatenate([noise.force, noise.slow])
     times = np.concatenate([noise.force_s, noise.slow_s])
-    fading = seen.fading
+    fading = seen.fading[: len(levels)]
     by_level = 2 * levels**2 * ((1 - fading**2) * variance + start)
     # d fading/d log time = fading h/time; the driving variance is level^2 (1 - fading^2)
     by_time = (fading_slope - 2 * fading * levels**2 * variance) * fading * block_s / times

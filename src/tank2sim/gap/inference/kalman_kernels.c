@@ -1,9 +1,10 @@
 /* The loops of the filter over time: forward for covariances and for columns, backward for slopes.
 
    The equations are in kalman_filter.py; arrays, arguments and results in kalman_kernels.py. States are ordered as
-   there: 6 errors of the motion, 3 accelerations, NY sensor errors. A row of `known` that is 0 has zeros for its row of
-   the reading matrix H. Matrices are dense and by rows; columns lie next to each other, so that each innermost loop
-   runs over them. NY is defined when this is compiled. */
+   there: 6 errors of the motion, 3 accelerations, NY sensor errors, and with WAVES 3 accelerations of a narrow band, each
+   with its quadrature. A row of `known` that is 0 has zeros for its row of the reading matrix H. Matrices are dense and
+   by rows; columns lie next to each other, so that each innermost loop runs over them. NY and WAVES (0 or 1) are
+   defined when this is compiled. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,10 +15,11 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { MOTION = 6, FORCES = 3, SHORT = MOTION + FORCES, NZ = SHORT + NY, SLOW = NZ - MOTION };
+enum { MOTION = 6, FORCES = 3, SHORT = MOTION + FORCES, SLOW = FORCES + NY, BAND = 2 * FORCES * WAVES };
+enum { BAND_AT = MOTION + SLOW, NZ = BAND_AT + BAND, PUSHED = FORCES + BAND };
 
 /* What a step is made of: transition, spreading, push (MOTION rows each), and the share of each slow process that
-   remains. */
+   remains, followed with WAVES by real and imaginary part of that of the band. */
 typedef struct {
   const double *phi, *spreading, *push, *fading;
 } Step;
@@ -39,22 +41,38 @@ static void advance(double *restrict moved, const double *restrict z, Step step,
   for (int i = 0; i < MOTION; ++i) {
     for (int j = 0; j < MOTION; ++j)
       if (step.phi[i * MOTION + j] != 0.0) add(moved + i * count, step.phi[i * MOTION + j], z + j * count, count);
-    for (int j = 0; j < FORCES; ++j) add(moved + i * count, step.push[i * FORCES + j], z + (MOTION + j) * count, count);
+    for (int j = 0; j < FORCES; ++j) add(moved + i * count, step.push[i * PUSHED + j], z + (MOTION + j) * count, count);
+    for (int j = 0; j < BAND; ++j)
+      add(moved + i * count, step.push[i * PUSHED + FORCES + j], z + (BAND_AT + j) * count, count);
   }
-  for (int i = MOTION; i < NZ; ++i)
+  for (int i = MOTION; i < BAND_AT; ++i)
     for (int c = 0; c < count; ++c) moved[i * count + c] = step.fading[i - MOTION] * z[i * count + c];
+  for (int i = BAND_AT; i < NZ; i += 2)
+    for (int c = 0; c < count; ++c) {
+      const double value = z[i * count + c], quadrature = z[(i + 1) * count + c];
+      moved[i * count + c] = step.fading[SLOW] * value - step.fading[SLOW + 1] * quadrature;
+      moved[(i + 1) * count + c] = step.fading[SLOW + 1] * value + step.fading[SLOW] * quadrature;
+    }
 }
 
 /* F' r. */
 static void carry_back(double *restrict earlier, const double *restrict r, Step step, int count) {
   memset(earlier, 0, sizeof(double) * SHORT * count);
-  for (int i = MOTION; i < NZ; ++i)
+  for (int i = MOTION; i < BAND_AT; ++i)
     for (int c = 0; c < count; ++c) earlier[i * count + c] = step.fading[i - MOTION] * r[i * count + c];
+  for (int i = BAND_AT; i < NZ; i += 2)
+    for (int c = 0; c < count; ++c) {
+      const double value = r[i * count + c], quadrature = r[(i + 1) * count + c];
+      earlier[i * count + c] = step.fading[SLOW] * value + step.fading[SLOW + 1] * quadrature;
+      earlier[(i + 1) * count + c] = step.fading[SLOW] * quadrature - step.fading[SLOW + 1] * value;
+    }
   for (int i = 0; i < MOTION; ++i) {
     for (int j = 0; j < MOTION; ++j)
       if (step.phi[i * MOTION + j] != 0.0) add(earlier + j * count, step.phi[i * MOTION + j], r + i * count, count);
     for (int j = 0; j < FORCES; ++j)
-      add(earlier + (MOTION + j) * count, step.push[i * FORCES + j], r + i * count, count);
+      add(earlier + (MOTION + j) * count, step.push[i * PUSHED + j], r + i * count, count);
+    for (int j = 0; j < BAND; ++j)
+      add(earlier + (BAND_AT + j) * count, step.push[i * PUSHED + FORCES + j], r + i * count, count);
   }
 }
 
@@ -135,7 +153,7 @@ EXPORT void covariances(long runs, long blocks, const double *start, const doubl
       memcpy(filtered + at * NZ * NZ, P, sizeof P);
       if (k + 1 < blocks) {
         const long step_at = run * (blocks - 1) + k;
-        const Step step = {transition + step_at * MOTION * MOTION, NULL, push + step_at * MOTION * FORCES, fading};
+        const Step step = {transition + step_at * MOTION * MOTION, NULL, push + step_at * MOTION * PUSHED, fading};
         const double *Q = added + step_at * NZ * NZ;
         advance(FP, P, step, NZ);
         transpose(turned, FP);
@@ -181,7 +199,7 @@ EXPORT int run_filter(long runs, long blocks, int count, const double *reading, 
       if (k + 1 < blocks) {
         const long step_at = run * (blocks - 1) + k;
         const double *spread = spreading + step_at * MOTION * MOTION, *d = driving + step_at * MOTION * count;
-        const Step step = {transition + step_at * MOTION * MOTION, spread, push + step_at * MOTION * FORCES, fading};
+        const Step step = {transition + step_at * MOTION * MOTION, spread, push + step_at * MOTION * PUSHED, fading};
         advance(moved, z, step, count);
         for (int i = 0; i < MOTION; ++i)
           for (int j = 0; j < MOTION; ++j)
@@ -226,7 +244,7 @@ EXPORT int smooth_backward(long runs, long blocks, int count, const double *read
       const long at = run * blocks + k, step_at = run * (blocks - 1) + k;
       memset(later, 0, sizeof(double) * NZ * count);
       if (k + 1 < blocks) {
-        const Step step = {transition + step_at * MOTION * MOTION, NULL, push + step_at * MOTION * FORCES, fading};
+        const Step step = {transition + step_at * MOTION * MOTION, NULL, push + step_at * MOTION * PUSHED, fading};
         carry_back(later, r, step, count);
       }
       for (int a = 0; a < NZ; ++a)
@@ -337,7 +355,7 @@ EXPORT int backward(long runs, long blocks, int count, const double *reading, co
       memset(later, 0, sizeof(double) * NZ * count);
       if (k + 1 < blocks) {
         const double *spread = spreading + step_at * MOTION * MOTION;
-        const Step step = {transition + step_at * MOTION * MOTION, spread, push + step_at * MOTION * FORCES, fading};
+        const Step step = {transition + step_at * MOTION * MOTION, spread, push + step_at * MOTION * PUSHED, fading};
         carry_back(FN, N, step, NZ);
         transpose(NF, FN); /* N is symmetric */
         carry_back(later, r, step, count);

@@ -1,9 +1,10 @@
 """The loops of the filter over time, in machine code: forward for covariances and for columns, backward for slopes.
 
 Their equations are in :mod:`.kalman_filter`, their loops in ``kalman_kernels.c``: over small, mostly sparse matrices,
-for which the overhead of NumPy calls dominates. They are compiled once on a machine for each number of sensors, in a
-second. States are ordered as in :mod:`.kalman_filter`: 6 errors of the motion, 3 accelerations, ny sensor errors. A row
-of `known` that is False has zeros for its row of the reading matrix H.
+for which the overhead of NumPy calls dominates. They are compiled once on a machine for each number of sensors, and
+once more with waves, in a second. States are ordered as in :mod:`.kalman_filter`: 6 errors of the motion, 3
+accelerations, ny sensor errors, and in waves 3 accelerations of a narrow band, each with its quadrature: nz = 9 + ny or
+15 + ny. A row of `known` that is False has zeros for its row of the reading matrix H.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ _FLAGS = (
     "-fassociative-math",
 )
 
-_OTHER_STATES = 9
-"""Errors of the motion and accelerations."""
+_FORCES = 3
+"""Accelerations that push the motion; with waves, as many of the narrow band and their quadratures come after them."""
 
 
 def covariances(
@@ -47,10 +48,10 @@ def covariances(
     start : array (nz,)
         Variances at the beginning.
     transition : array (R, T - 1, 6, 6)
-    push : array (R, T - 1, 6, 3)
+    push : array (R, T - 1, 6, 3) or, in waves, (R, T - 1, 6, 9)
         Errors of the motion by accelerations a step before.
-    fading : array (nz - 6,)
-        Share of accelerations and sensor errors that remains a step later.
+    fading : array (3 + ny,) or (5 + ny,)
+        Share of accelerations and sensor errors that remains a step later; real and imaginary part of that of the band.
     added : array (R, T - 1, nz, nz)
         Covariance of the process noise.
     seeing : arrays (R, T, ny, 6), (R, T, ny), (ny,)
@@ -65,11 +66,11 @@ def covariances(
     """
     reading, known, white_noise = seeing
     runs, blocks, ny, _ = reading.shape
-    nz = _OTHER_STATES + ny
+    nz = len(start)
     gain, white = np.empty((runs, blocks, nz, ny)), np.empty((runs, blocks, ny, ny))
     filtered = np.empty((runs, blocks, nz, nz))
     given = start, transition, push, fading, added, reading, known, white_noise
-    _library(ny).covariances(*_sizes(runs, blocks), *_places(*given, gain, white, filtered))
+    _library(ny, _waves(push)).covariances(*_sizes(runs, blocks), *_places(*given, gain, white, filtered))
     return gain, white, filtered
 
 
@@ -85,7 +86,7 @@ def run_filter(
     Parameters
     ----------
     seeing : arrays (R, T, ny, 6), (R, T, ny)
-    moving : arrays (R, T - 1, 6, 6), (R, T - 1, 6, 6), (R, T - 1, 6, 3), (nz - 6,)
+    moving : arrays (R, T - 1, 6, 6), (R, T - 1, 6, 6), (R, T - 1, 6, 3 or 9), (3 + ny or 5 + ny,)
         Transition, spreading, push and fading.
     filtering : arrays (R, T, nz, ny), (R, T, ny, ny)
         Gains and inverse roots.
@@ -96,9 +97,9 @@ def run_filter(
     """
     runs, blocks, ny, count = columns[1].shape
     whitened = np.empty((runs, blocks, ny, count))
-    after = np.empty((runs if keep else 0, blocks if keep else 0, _OTHER_STATES + ny, count))
+    after = np.empty((runs if keep else 0, blocks if keep else 0, filtering[0].shape[2], count))
     given = _places(*seeing, *moving, *filtering, *columns)
-    run = _library(ny).run_filter
+    run = _library(ny, _waves(moving[2])).run_filter
     _need_memory(run(*_sizes(runs, blocks), count, *given, int(keep), *_places(whitened, after)))
     return whitened, after
 
@@ -116,7 +117,7 @@ def smooth_backward(
     transition, _, push, fading = moving
     states = np.empty(after.shape)
     given = _places(*seeing, transition, push, fading, *filtering, whitened, after, states)
-    _need_memory(_library(ny).smooth_backward(*_sizes(runs, blocks), count, *given))
+    _need_memory(_library(ny, _waves(push)).smooth_backward(*_sizes(runs, blocks), count, *given))
     return states
 
 
@@ -131,7 +132,7 @@ def backward(
 
     Returns
     -------
-    variance, start, fading : arrays (nz - 6,)
+    variance, start, fading : arrays (3 + ny,)
         By the variance of each slow process's driving noise, by that of its beginning, by its fading.
     way, both, gain : arrays (3,)
         By the variances and the gain of a force over a block.
@@ -143,14 +144,19 @@ def backward(
     way, both, gain, white = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(ny)
     sums = variance, start, fading, way, both, gain, white
     given = _places(*seeing, *moving, *filtering, whitened, after, *sums)
-    _need_memory(_library(ny).backward(*_sizes(runs, blocks), count, *given))
+    _need_memory(_library(ny, _waves(moving[2])).backward(*_sizes(runs, blocks), count, *given))
     return sums
 
 
+def _waves(push: Array) -> bool:
+    """Whether the states hold accelerations of waves."""
+    return push.shape[-1] > _FORCES
+
+
 @cache
-def _library(ny: int) -> ctypes.CDLL:
+def _library(ny: int, waves: bool) -> ctypes.CDLL:
     """The compiled loops for a number of sensors."""
-    flags = (*_FLAGS, *FLAGS_OF_LANES.get(widest_lanes(), ()), f"-DNY={ny}")
+    flags = (*_FLAGS, *FLAGS_OF_LANES.get(widest_lanes(), ()), f"-DNY={ny}", f"-DWAVES={int(waves)}")
     return ctypes.CDLL(str(cached_library({_SOURCE.name: _SOURCE.read_text(encoding="utf-8")}, flags=flags)))
 
 

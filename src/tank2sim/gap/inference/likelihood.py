@@ -20,7 +20,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from tank2sim.arrays import Array
-from tank2sim.gap.inference.batch import MeasuredBatch
+from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
 from tank2sim.gap.inference.fit import (
     Belief,
     CoefficientEstimates,
@@ -31,6 +31,7 @@ from tank2sim.gap.inference.fit import (
 from tank2sim.gap.inference.form_error import Forms
 from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES, Linear, Observer, linear_filter, observer, slopes
+from tank2sim.gap.inference.wave_band import WaveBand
 
 COUNTED = 20.0
 """Measurements that count as one independent measurement in the penalty k log(n/20) of a parameter: noise is
@@ -212,17 +213,21 @@ class Likelihood:
     def about(self, fit: ExplanationFit) -> Likelihood:
         """The same likelihood, linearised about the smoothed motion of an explanation.
 
-        The smoothed measurements are rounded where the rudder kicks; the smoother's motion follows the model there.
+        The smoothed measurements are rounded where the rudder kicks; the smoother's motion follows the model there. It
+        is that without the waves: what they add within a block is not resolved, and small enough to be linear.
         """
         motion, hypothesis, theta = self.motion, fit.hypothesis, fit.theta
         seen, columns = self._seen(fit)
         by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
         states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        slow, waves, band = states[..., :6], self.belief.waves, states[..., -2 * FORCE_STATES :]
+        if waves is not None:
+            slow = slow - waves.moved(band, motion.middles[..., MEASURED_STATES.index("motion.psi")])
         added = by_coefficients.copy()
         added[..., :FORCE_STATES] += motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES]
         added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
-        moved = motion.shift(states[..., :6], seen.linear.transition, between, added)
+        moved = motion.shift(slow, seen.linear.transition, between, added)
         return Likelihood(moved, self.none, self.coefficients, self.belief, self.scale)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
@@ -258,10 +263,13 @@ class Likelihood:
         """Innovations of an explanation, each over its standard deviation (R, T, ny), 0 where nothing was measured."""
         return self.whiten(fit)[1]
 
+    def _observer(self, linear: Linear, fit: ExplanationFit) -> Observer:
+        return observer(linear, fit.noise, self.belief.waves)
+
     def _seen(self, fit: ExplanationFit) -> tuple[Observer, FilterColumns]:
         hypothesis, theta = fit.hypothesis, fit.theta
         columns = self.columns(hypothesis, theta, self.of_coefficients(hypothesis, theta)).scaled(fit.width)
-        return observer(self.linear(hypothesis, theta), fit.noise), columns
+        return self._observer(self.linear(hypothesis, theta), fit), columns
 
     # -- the best parameters and the best noise ----------------------------------------------------------------------
 
@@ -307,7 +315,7 @@ class Likelihood:
         columns = self.columns(fit.hypothesis, fit.theta, coefficients)
 
         def score(noisy: ExplanationFit) -> float:
-            seen = observer(linear, noisy.noise)
+            seen = self._observer(linear, noisy)
             solved = self._solved(fit.hypothesis, fit.theta, seen, columns.scaled(noisy.width), free=True)
             return self._score(noisy, seen, solved)
 
@@ -317,7 +325,7 @@ class Likelihood:
         """Gauss-Newton in the parameters at one noise."""
         hypothesis, theta = fit.hypothesis, fit.theta
         low, high = hypothesis.bounds
-        seen = observer(linear, fit.noise)
+        seen = self._observer(linear, fit)
         best: ExplanationFit | None = None
         for _ in range(steps if len(theta) else 1):
             columns = self.columns(hypothesis, theta, coefficients).scaled(fit.width)
@@ -382,6 +390,12 @@ class Likelihood:
         other.scale = scale
         return other
 
+    def with_waves(self, waves: WaveBand | None) -> Likelihood:
+        """The same likelihood, with other unmodelled accelerations by waves."""
+        other = copy(self)
+        other.belief = replace(self.belief, waves=waves)
+        return other
+
     def _cost_of_noise(
         self, fit: ExplanationFit, linear: Linear, coefficients: Array
     ) -> Callable[[Array], tuple[float, Array]]:
@@ -392,7 +406,7 @@ class Likelihood:
 
         def cost(logs: Array) -> tuple[float, Array]:
             noisy = replace(fit, logs=logs)
-            seen = observer(linear, noisy.noise)
+            seen = self._observer(linear, noisy)
             wide = columns.scaled(noisy.width)
             solved = self._solved(fit.hypothesis, fit.theta, seen, wide, free=free)
             counted = (_mixed(part, solved.weights) for part in (wide.driving, wide.shown, solved.whitened))
@@ -412,7 +426,7 @@ class Likelihood:
 
         A rotation of the combinations leaves them as independent beforehand as the coefficients were.
         """
-        seen, k = observer(linear, fit.noise), columns.parameter_count
+        seen, k = self._observer(linear, fit), columns.parameter_count
         flat = seen.whiten(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])[:, 1 + k :]
         gram, count = flat.T @ flat, columns.coefficient_count
         information, directions = np.linalg.eigh(gram[:count, :count] * fit.width**2)

@@ -12,6 +12,7 @@ import numpy as np
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.files import plain_json
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
+from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.gap.outcome.lacking import missing_as_json
 from tank2sim.gap.proof.cross_check import proof_cautions
 from tank2sim.gap.result import Gap, Named, NextTest, Passed, Refitted
@@ -246,11 +247,20 @@ def _misfit(gap: Gap) -> dict[str, object]:
     return {
         "noise": noise,
         "noise_floor": NOISE_FLOOR,
+        **({"waves": _waves(gap.waves)} if gap.waves else {}),
         **{
             version: {word: _finite(gap.misfit(version, held_out=held)) for word, held in sets.items()}
             for version in ("before", "after", "black_box")
         },
         **({"effect_alone": {key: _finite(value) for key, value in alone.items()}} if alone else {}),
+    }
+
+
+def _waves(waves: WaveBand) -> dict[str, object]:
+    moved = {signal_display_name(variable): sigma for variable, sigma in waves.motion.items()}
+    return {
+        "period_s": _finite(waves.period_s),
+        "motion": {name.file: _finite(name.factor * sigma) for name, sigma in moved.items()},
     }
 
 

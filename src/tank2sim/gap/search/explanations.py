@@ -19,6 +19,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, StageReport, refit, thetas_of
+from tank2sim.gap.inference.fit_waves import fit_waves
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import candidate_explanations
@@ -27,6 +28,9 @@ from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
 FIRST_SINGLES, FIRST_PAIRS = 6, 2
 SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 8, 3, 3, 2
 """Number of proposals of each screen that are fitted (project choice)."""
+
+WAVES_WITH_NONE = 2
+"""Times that waves are fitted with the card as it is, the noise after each: the one takes its share from the other."""
 
 COMPARABLE = 0.5
 """Share of the largest gain in the screen from which a single effect is fitted (project choice): a gain is linear in
@@ -104,6 +108,12 @@ def search(
     believed = likelihood.belief.logs
     rough = Fitting(likelihood, hypotheses, progress, executor)
     rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
+    for _ in range(WAVES_WITH_NONE):
+        likelihood = likelihood.with_waves(fit_waves(likelihood, rough.best()))
+        if likelihood.belief.waves is None:
+            break
+        rough = Fitting(likelihood, hypotheses, progress, executor)
+        rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
     likelihood = likelihood.with_scale(likelihood.noise_scale(rough.best()))
     rough = Fitting(likelihood, hypotheses, progress, executor, rough.found)
     chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
@@ -114,7 +124,8 @@ def search(
     rough.fit(_proposals(rough, proposed, [none.logs, believed], least=2))
     best = rough.best()
     # Again about the motion of the best: its residual is small, and "none" is scored about the same motion.
-    fitting = Fitting(likelihood.about(best), hypotheses, progress, executor)
+    about_best = likelihood.about(best)
+    fitting = Fitting(about_best.with_waves(fit_waves(about_best, best)), hypotheses, progress, executor)
     again = [fit for fit in rough.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     fitting.fit(
         [Proposal({}, [best.logs, none.logs, believed], ROUNDS_OF_NONE)]

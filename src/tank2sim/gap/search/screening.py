@@ -154,7 +154,7 @@ class Screen:
         self.every = tuple(variant for variant in every if variant.effect not in base.hypothesis.effects)
         assumed = base.hypothesis
         linear = likelihood.linear(assumed, base.theta) if assumed.effects else likelihood.base
-        seen = observer(linear, base.noise)
+        seen = observer(linear, base.noise, likelihood.belief.waves)
         columns = likelihood.columns(assumed, base.theta, likelihood.coefficient_columns).scaled(base.width)
         driving = np.concatenate([columns.driving, *(variant.driving for variant in self.every)], axis=-1)
         shown = np.concatenate([columns.shown, *(-variant.shown for variant in self.every)], axis=-1)

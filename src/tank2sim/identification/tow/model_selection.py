@@ -210,7 +210,7 @@ def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degr
         return ()
     ways: list[tuple[str, tuple[str, ...], TowEstimator]] = [
         (
-            f"paper: {', '.join(('M', *terms))}",
+            f"as published: {', '.join(('M', *terms))}",
             ("M", *terms),
             lambda tow: _by_paper(tow, force, terms, speed_degree),
         )

@@ -246,7 +246,7 @@ def _continued(study: TowStudy) -> Iterator[str]:
         speed = fit_mean_speed(single, len(result.speed_polynomial) - 1).polynomial
         problem = discretise(speed, tows.time_s, result.terms, result.force)
         yield (
-            f"Tow {number + 1} ends at {single.time_s[-1]:g} s: over that time the paper's method gives M "
+            f"Tow {number + 1} ends at {single.time_s[-1]:g} s: over that time the published method gives M "
             f"{alone[0]:.0f} kg; with its polynomial continued to the {tows.time_s[-1]:g} s of the other tows, "
             f"{solve_by_qr(problem)[0]:.0f} kg."
         )

@@ -354,7 +354,8 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
     (stated,) = constants
     if stated is not None:
         return stated, []
-    note = f"No record states the torque constant: that of the paper's motor, {TORQUE_CONSTANT_NMPA:g} N m/A, is taken."
+    taken = f"that of the published rig's motor, {TORQUE_CONSTANT_NMPA:g} N m/A, is taken."
+    note = f"No record states the torque constant: {taken}"
     return TORQUE_CONSTANT_NMPA, [note]
 
 
