@@ -29,11 +29,12 @@ from tank2sim.simulation.manoeuvres import (
     Turn,
     Zigzag,
 )
-from tank2sim.simulation.rows import RowFunction
+from tank2sim.simulation.rows import ArrayFunction, RowFunction
 from tank2sim.simulation.run import simulate
 
-_HALVINGS = 60
-"""Halvings of a step in the search of a crossing: to rounding."""
+_TRIES, _ROUNDED = 60, 1e-14
+"""Most tries in the search of a crossing, by Newton's method or by halving where that leaves the step; and the change,
+in steps, below which it ends, less than the rounding of times (project choices)."""
 
 NEAR_STEADY = 0.9
 """Share of :data:`tank2sim.simulation.figures.STEADY_SHARE` above which a turn is near the limit of a steady one: with
@@ -121,7 +122,7 @@ class LaneManoeuvres:
             raise NoLanesError("the model is not that of a ship")
         if "motion.phi" in model.state_names:
             raise NoLanesError("the heel of a ship that rolls is not a figure of lanes")
-        self._runner = LaneRunner(model, lanes)
+        self._runner, self._start = LaneRunner(model, lanes), ArrayFunction(model.initial)
         arguments = [model.x, model.u, model.p]
         self._read = {
             name: RowFunction(ca.Function("read", arguments, [model.expand(model.symbol(name))], {"cse": True}))
@@ -157,7 +158,7 @@ class LaneManoeuvres:
         """
         u = self.model.input_values(inputs)
         p = np.ascontiguousarray(p, dtype=float)
-        starts = np.ascontiguousarray(np.array(self.model.initial(p.T)).T)
+        (starts,) = self._start(p)
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
         ends = self._longest * ship_times if duration_s is None else np.full(len(p), duration_s)
@@ -268,8 +269,9 @@ class LaneManoeuvres:
         side, length = math.copysign(1.0, zigzag.rudder), p[:, self.model.parameter_names.index("ship.length")]
         course = self._column(starts, "motion.psi")
         # The change at which a run ends is of no order any more.
-        changes = np.minimum(found.orders - (found.orders == limit), CROSSINGS)
-        executes = np.where(np.arange(CROSSINGS) < changes[:, None], found.order_times, np.nan)
+        kept = found.order_times.shape[1]
+        changes = np.minimum(found.orders - (found.orders == limit), kept)
+        executes = np.where(np.arange(kept) < changes[:, None], found.order_times, np.nan)
         windows = found.windows[..., 2:]
         offset = self._column(windows[:, 0], "motion.psi") - course[:, None, None]
         returns = _crossing(found.windows[:, 0, ..., 0], offset, self._column(windows[:, 0], "motion.r"))
@@ -339,13 +341,19 @@ def _crossing(times: Array, offset: Array, slope: Array) -> Array:
     square = (3 * rise - 2 * slope[..., 1] - slope[..., 2]) / step
     cube = (slope[..., 1] + slope[..., 2] - 2 * rise) / step**2
     before, after = np.zeros_like(step), step.copy()
-    below = low < 0
-    for _ in range(_HALVINGS):
-        middle = (before + after) / 2
-        value = low + middle * (slope[..., 1] + middle * (square + middle * cube))
-        same = (value < 0) == below
-        before, after = np.where(same, middle, before), np.where(same, after, middle)
-    found: Array = begin + (before + after) / 2
+    below, near = low < 0, _ROUNDED * step
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = low * step / (low - high)
+        for _ in range(_TRIES):
+            value = low + root * (slope[..., 1] + root * (square + root * cube))
+            same = (value < 0) == below
+            before, after = np.where(same, root, before), np.where(same, after, root)
+            moved = root - value / (slope[..., 1] + root * (2 * square + 3 * root * cube))
+            moved = np.where((moved > before) & (moved < after) | (value == 0), moved, (before + after) / 2)
+            change, root = np.abs(moved - root), moved
+            if not (change > near).any():
+                break
+    found: Array = begin + root
     return found
 
 

@@ -43,10 +43,10 @@ approach speed, two lengths at a tenth of it (project choice)."""
 # See Running.run_until and bracketed_root for the steps to an event. A lane that has ended takes steps of zero length.
 _RUNS = """
 enum {{ NX = {nx}, NU = {nu}, NP = {np}, NC = {nc}, PSI = {psi}, R = {r}, RUDDER = {rudder} }};
-enum {{ CROSSINGS = {crossings}, SAMPLES = {samples}, REMEMBERED = {remembered}, ROW = 2 + NX }};
+enum {{ SAMPLES = {samples}, REMEMBERED = {remembered}, ROW = 2 + NX }};
 typedef struct {{
   double h, first, second, heading;
-  long limit, watches, most, times;
+  long limit, kept, watches, most, times;
   const double *inputs, *limits, *at;
 }} Plan;
 typedef struct {{
@@ -188,10 +188,10 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
             continue;
           }}
           if (LANE(event, l)) {{
-            if (events[l] < CROSSINGS) {{
-              found->order_times[k * CROSSINGS + events[l]] = t_next;
-              for (int i = 0; i < NX; ++i)
-                found->order_states[(k * CROSSINGS + events[l]) * NX + i] = LANE(g.next[i], l);
+            if (events[l] < plan->kept) {{
+              const long row = k * plan->kept + events[l];
+              found->order_times[row] = t_next;
+              for (int i = 0; i < NX; ++i) found->order_states[row * NX + i] = LANE(g.next[i], l);
             }} else found->ended[k] = {unknown};
             events[l] += 1;
             finished |= events[l] == plan->limit;
@@ -204,7 +204,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           LANE(waiting, l) = 0;
           for (int w = 0; w < plan->watches; ++w) {{
             int *count = found->crossings + k * plan->watches + w;
-            double *windows = found->windows + (k * plan->watches + w) * CROSSINGS * SAMPLES * ROW;
+            double *windows = found->windows + (k * plan->watches + w) * plan->most * SAMPLES * ROW;
             if (open[l][w][0]) {{
               keep_sample(windows + ((open[l][w][1] * SAMPLES) + 3) * ROW, t_next, LANE(g.u[RUDDER], l), g.next, l);
               open[l][w][0] = 0;
@@ -259,7 +259,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
 class _Plan(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_double) for name in ("h", "first", "second", "heading")),
-        *((name, ctypes.c_long) for name in ("limit", "watches", "most", "times")),
+        *((name, ctypes.c_long) for name in ("limit", "kept", "watches", "most", "times")),
         *((name, ctypes.c_void_p) for name in ("inputs", "limits", "at")),
     )
 
@@ -333,9 +333,9 @@ class LaneResults:
         First, lowest, highest and last speed, m/s.
     left : array (n,)
         Time at which the card's range (the output ``validity``) was first left, s; inf if it was not.
-    order_times, order_states : arrays (n, :data:`CROSSINGS`), (n, :data:`CROSSINGS`, nx)
-        Times and states at the changes of order.
-    windows : array (n, watches, :data:`CROSSINGS`, :data:`SAMPLES`, 2 + nx)
+    order_times, order_states : arrays (n, orders), (n, orders, nx)
+        Times and states at the changes of order, at most :data:`CROSSINGS`.
+    windows : array (n, watches, most, :data:`SAMPLES`, 2 + nx)
         Time, rudder order from then on, and states about each crossing.
     states : array (n, times, nx)
         At the requested times.
@@ -398,16 +398,16 @@ class LaneRunner:
         first, second = plan.orders
         watched = np.array([model.state_names.index(name) for name in plan.watched], dtype=np.int32)
         limit = np.iinfo(np.int32).max if plan.limit < 0 else plan.limit
-        shape = (n, len(watched))
+        shape, kept = (n, len(watched)), min(limit, CROSSINGS)
         found = LaneResults(
             end=np.full(n, np.nan),
             last=np.full((n, nx), np.nan),
             then=np.full((n, 2), np.nan),
             speeds=np.full((n, 4), np.nan),
             left=np.full(n, np.nan),
-            order_times=np.full((n, CROSSINGS), np.nan),
-            order_states=np.full((n, CROSSINGS, nx), np.nan),
-            windows=np.full((*shape, CROSSINGS, SAMPLES, 2 + nx), np.nan),
+            order_times=np.full((n, kept), np.nan),
+            order_states=np.full((n, kept, nx), np.nan),
+            windows=np.full((*shape, plan.most, SAMPLES, 2 + nx), np.nan),
             states=np.full((n, len(at), nx), np.nan),
             ended=np.zeros(n, dtype=np.int32),
             orders=np.zeros(n, dtype=np.int32),
@@ -421,6 +421,7 @@ class LaneRunner:
             second,
             plan.heading,
             limit,
+            kept,
             len(watched),
             plan.most,
             len(at),
@@ -428,8 +429,8 @@ class LaneRunner:
             limits.ctypes.data,
             at.ctypes.data,
         )
-        kept = _Found(*(getattr(found, name).ctypes.data for name in _FOUND))
-        self._run(n, asked, *(values.ctypes.data for values in numbers), watched.ctypes.data, kept)
+        results = _Found(*(getattr(found, name).ctypes.data for name in _FOUND))
+        self._run(n, asked, *(values.ctypes.data for values in numbers), watched.ctypes.data, results)
         return found
 
     def _compiled(self) -> ctypes._NamedFuncPointer:
@@ -452,7 +453,6 @@ class LaneRunner:
             psi=model.state_names.index("motion.psi"),
             r=model.state_names.index("motion.r"),
             rudder=model.input_names.index("rudder.command"),
-            crossings=CROSSINGS,
             samples=SAMPLES,
             remembered=_REMEMBERED,
             runaway=RUNAWAY_LANE,
