@@ -6,8 +6,8 @@ lanes of vector registers, figures read off, histories kept for their bands; nex
 runs, as they are made where there are no lanes, and 10/10 zigzags. All run by turns in one process; then an ensemble of
 10 000 with all its bands on the processors of this machine, and the memory that it takes. Rates are by processor time:
 what else the machine does is no part of them. The members' last speeds must agree, to the single precision in which
-histories are kept. With ``--steps`` it prints instead what longer integration steps change of the figures of 4000
-members after the first 2000.
+histories are kept. With ``--steps`` it prints instead what longer integration steps and single precision change of
+the figures of 4000 members after the first 2000.
 
     python benchmarks/ensemble.py [--members N] [--rounds N] [--steps]
 """
@@ -32,7 +32,7 @@ import numpy as np
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfManoeuvre, ShipText
 from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
-from tank2sim.analysis.ensemble.steps import largest_step_factor
+from tank2sim.analysis.ensemble.steps import fastest_pace
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.executors import executing
@@ -99,7 +99,7 @@ def hand_on_all(library: ctypes.CDLL, ships: np.ndarray, h: float) -> float:
 def on_all(question: OfManoeuvre, draws: Draws, members: int) -> tuple[Ensemble, float, float]:
     """An ensemble with its bands on processes that begin with it, and the time that passes and that processors work."""
     begun, worked = time.perf_counter(), seconds_of_processors()
-    question = replace(question, step_factor=largest_step_factor(question, draws))
+    question = replace(question, pace=fastest_pace(question, draws))
     with executing() as executor:
         found = ensemble(question, draws, members, executor)
     figure_bands(found)
@@ -119,20 +119,24 @@ def single_runs(card: ManoeuvringCard, draws: Draws, members: int) -> float:
     return (time.process_time() - begun) / members
 
 
-def longer_steps() -> None:
-    """The largest change of a figure by the chosen step, and figures that it gives to ships or takes from them."""
+def other_paces() -> None:
+    """The largest change of a figure by the chosen pace, and figures that it gives to ships or takes from them."""
+    ten = float(np.radians(10.0))
     for name in ("mariner", "kvlcc2", "esso-osaka-ship"):
         card = read_card(name)
         assert isinstance(card, ManoeuvringCard)
         draws, _ = draws_of(card, SEED)
-        usual = OfManoeuvre(ShipText.of(card), Turn(float(RUDDER)), None, np.zeros(0))
-        factor = largest_step_factor(usual, draws)
-        own, other = (ensemble(one, draws, 6000).figures for one in (usual, replace(usual, step_factor=factor)))
-        flips = sum(int(np.sum(np.isnan(own[figure]) != np.isnan(other[figure]))) for figure in own)
-        worst = max(float(np.nanmax(np.abs(other[figure] / own[figure] - 1))) for figure in own)
-        print(
-            f"{name}: {factor} times the step; figures change by at most {worst:.1e} of themselves, {flips} come or go"
-        )
+        for told, manoeuvre in (("turn", Turn(float(RUDDER))), ("10/10 zigzag", Zigzag(ten, ten))):
+            usual = OfManoeuvre(ShipText.of(card), manoeuvre, None, np.zeros(0))
+            pace = fastest_pace(usual, draws)
+            own, other = (ensemble(one, draws, 6000).figures for one in (usual, replace(usual, pace=pace)))
+            flips = sum(int(np.sum(np.isnan(own[figure]) != np.isnan(other[figure]))) for figure in own)
+            worst = max(float(np.nanmax(np.abs(other[figure] / own[figure] - 1))) for figure in own)
+            precision = "single" if pace.single else "double"
+            print(
+                f"{name}, {told}: {pace.step_factor} times the step, {precision} precision; figures change by at most "
+                f"{worst:.1e} of themselves, {flips} come or go"
+            )
 
 
 def bands_of_readme(card: ManoeuvringCard) -> None:
@@ -155,7 +159,7 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     asked = arguments()
     if asked.steps:
-        longer_steps()
+        other_paces()
         return 0
     card = read_card("mariner")
     assert isinstance(card, ManoeuvringCard)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -44,6 +45,18 @@ from it half a percent smaller (project choice)."""
 _BEGINS = "motion.x", "motion.y", "motion.psi"
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How ships are integrated: length of a step over the model's, and whether in single precision."""
+
+    step_factor: int = 1
+    single: bool = False
+
+
+USUAL_PACE = Pace()
+"""The model's step in double precision."""
+
+
 @dataclass(frozen=True, eq=False)
 class LaneFigures:
     """Figures of n ships in a manoeuvre.
@@ -60,7 +73,7 @@ class LaneFigures:
     left_s : array (n,)
         Time at which a ship first left the range of its card, s; inf if it did not, nan if it is not `fine`.
     doubtful : array (n,)
-        True for a ship whose figures a longer integration step may turn into none, or none into a figure: one is none,
+        True for a ship whose figures another :class:`Pace` may turn into none, or none into a figure: one is none,
         the turn is near the limit of a steady one (:data:`NEAR_STEADY`), or the ship left the range of its card.
     """
 
@@ -122,12 +135,16 @@ class LaneManoeuvres:
             raise NoLanesError("the model is not that of a ship")
         if "motion.phi" in model.state_names:
             raise NoLanesError("the heel of a ship that rolls is not a figure of lanes")
-        self._runner, self._start = LaneRunner(model, lanes), ArrayFunction(model.initial)
+        self._lanes, self._runner, self._start = lanes, LaneRunner(model, lanes), ArrayFunction(model.initial)
         arguments = [model.x, model.u, model.p]
         self._read = {
             name: RowFunction(ca.Function("read", arguments, [model.expand(model.symbol(name))], {"cse": True}))
             for name in ("motion.beta", "motion.rdot")
         }
+
+    @cached_property
+    def _single(self) -> LaneRunner:
+        return LaneRunner(self.model, self._lanes, single=True)
 
     def run(
         self,
@@ -136,7 +153,7 @@ class LaneManoeuvres:
         duration_s: float | None = None,
         times: Sequence[float] | Array = (),
         inputs: Mapping[str, float] | None = None,
-        step_factor: int = 1,
+        pace: Pace = USUAL_PACE,
     ) -> LaneFigures:
         """Figures of ships with parameters `p` (n, np), and their states at `times`.
 
@@ -152,9 +169,8 @@ class LaneManoeuvres:
             Times at which states are kept, s.
         inputs : mapping, optional
             Values in place of the model's, by name.
-        step_factor : int
-            Length of an integration step over the model's. Ships that are `doubtful` with longer steps than the
-            model's are run again with these.
+        pace : Pace
+            Step and precision. Ships that are `doubtful` are run again with the model's step in double precision.
         """
         u = self.model.input_values(inputs)
         p = np.ascontiguousarray(p, dtype=float)
@@ -162,14 +178,14 @@ class LaneManoeuvres:
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
         ends = self._longest * ship_times if duration_s is None else np.full(len(p), duration_s)
-        plan = replace(_plan(manoeuvre, u, times, timed=duration_s is not None), step_factor=step_factor)
+        plan = replace(_plan(manoeuvre, u, times, timed=duration_s is not None), step_factor=pace.step_factor)
         side = math.copysign(1.0, manoeuvre.rudder)
         heading = starts[:, [self.model.state_names.index("motion.psi")]]
         if isinstance(manoeuvre, Turn):
             levels = heading + side * np.array([math.pi / 2, math.pi])
         else:
             levels = np.hstack([heading, np.zeros_like(heading)])
-        found = self._runner.runs(plan, p, starts, ends, levels)
+        found = (self._single if pace.single else self._runner).runs(plan, p, starts, ends, levels)
         if isinstance(manoeuvre, Turn):
             figures = self._turn(found, (u, p), starts, manoeuvre)
         else:
@@ -184,7 +200,7 @@ class LaneManoeuvres:
         if isinstance(manoeuvre, Turn):
             doubtful |= self._unsteadiness(found) >= NEAR_STEADY * STEADY_SHARE
         runs = LaneFigures(figures, found.states, fine, left, doubtful)
-        if step_factor == 1 or not doubtful.any():
+        if pace == USUAL_PACE or not doubtful.any():
             return runs
         return runs.replaced(np.flatnonzero(doubtful), self.run(manoeuvre, p[doubtful], duration_s, times, inputs))
 
