@@ -12,9 +12,10 @@ the figures of 4000 members after the first 2000.
 With ``--peers`` it prints what a turn takes in other programs, all by turns in one process: the loop by hand, the same
 equations in JAX and in diffrax, and shipmmg's turn of the KVLCC2 at its default tolerance (of its own equations; it has
 no Mariner), next to the ensemble with the model's step and at the fastest pace. One that is not installed is skipped.
-With ``--dask`` it prints how much faster two workers of a Dask cluster are than one.
+With ``--dask`` it prints how much faster two workers of a Dask cluster are than one; with ``--users`` what a member of
+each kind of ensemble takes in lanes and by single runs.
 
-    python benchmarks/ensemble.py [--members N] [--rounds N] [--steps | --peers | --dask]
+    python benchmarks/ensemble.py [--members N] [--rounds N] [--steps | --peers | --dask | --users]
 """
 
 from __future__ import annotations
@@ -34,11 +35,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
+from tank2sim.analysis.ensemble import questions
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
 from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
 from tank2sim.analysis.ensemble.steps import fastest_pace
 from tank2sim.cards import ManoeuvringCard, read_card
@@ -47,7 +50,7 @@ from tank2sim.executors import executing
 from tank2sim.native.compiler import FLAGS, SHARED_SUFFIX, require_compiler
 from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.bands import figure_bands, history_bands
-from tank2sim.simulation.ensemble import KEPT, AskTogether, Draws, Ensemble, ensemble
+from tank2sim.simulation.ensemble import KEPT, AskTogether, Draws, Ensemble, Question, _prepared, ensemble
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
@@ -238,6 +241,35 @@ def on_dask(members: int) -> bool:
     return same
 
 
+def users(rounds: int, together: int = 256, alone: int = 4) -> None:
+    """Processor time of a member of the ensembles of each command, in lanes and by single runs."""
+    card = read_card("mariner")
+    assert isinstance(card, ManoeuvringCard)
+    draws, _ = draws_of(card, SEED)
+    ship, ten, none = ShipText.of(card), float(np.radians(10.0)), np.zeros(0)
+    asked: dict[str, Question] = {
+        "simulate --ensemble, turn:35": OfManoeuvre(ship, Turn(float(RUDDER)), None, none),
+        "simulate --ensemble, zigzag:10/10": OfManoeuvre(ship, Zigzag(ten, ten), None, none),
+        "stability --ensemble, all IMO criteria": OfCriteria(ship),
+        "influence --ensemble, advance and overshoot": OfFigures(ship, ("advance_m@35", "overshoot1_deg@10/10")),
+    }
+    usual = questions.lanes_of
+    print(f"processor time of a member, {together} in lanes, {alone} by single runs, medians of {rounds} rounds")
+    for told, question in asked.items():
+        fast: list[float] = []
+        slow: list[float] = []
+        for _ in range(rounds + 1):  # in the first one things are loaded and compiled
+            for lanes_of, count, taken in ((usual, together, fast), (lambda _: None, alone, slow)):
+                with patch.object(questions, "lanes_of", lanes_of):
+                    _prepared.cache_clear()
+                    ensemble(question, draws, 1)  # the model is built before the time
+                    begun = time.process_time()
+                    ensemble(question, draws, count)
+                    taken.append((time.process_time() - begun) / count)
+        one, other = 1e3 * statistics.median(fast[1:]), 1e3 * statistics.median(slow[1:])
+        print(f"  {told:45} {one:7.3f} and {other:7.2f} ms, {other / one:.1f} times")
+
+
 def bands_of_readme(card: ManoeuvringCard) -> None:
     """The bands of the manual for ``tank2sim simulate mariner --manoeuvre turn:35 --ensemble 100 --seed 3``."""
     turn, asked = Turn(float(RUDDER)), EnsembleRequest(100, 3)
@@ -251,7 +283,7 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     parser.add_argument("--members", type=int, default=10_000)
     parser.add_argument("--rounds", type=int, default=15)
-    for other in ("--steps", "--peers", "--dask"):
+    for other in ("--steps", "--peers", "--dask", "--users"):
         parser.add_argument(other, action="store_true")
     return parser.parse_args()
 
@@ -317,6 +349,8 @@ def main() -> int:
         other_paces()
     elif asked.peers:
         peers(asked.rounds)
+    elif asked.users:
+        users(asked.rounds)
     elif asked.dask:
         return 0 if on_dask(asked.members) else 1
     else:

@@ -94,10 +94,10 @@ static double beyond_after(Group *g, V *to, int lane, double length, double side
   take(g, to);
   return side * (LANE(to[PSI], lane) - goal);
 }}
-/* The step to a goal, by the method of Ridders, as bracketed_root. */
+/* The step to a goal within the step that was tried, by the method of Ridders, as bracketed_root. */
 static double step_to(Group *g, V *to, int lane, double high, double side, double goal) {{
-  double low = 0.0, best = INFINITY, f_low = beyond_after(g, to, lane, low, side, goal);
-  double f_high = beyond_after(g, to, lane, high, side, goal);
+  double low = 0.0, best = INFINITY, f_low = side * (LANE(g->x[PSI], lane) - goal);
+  double f_high = side * (LANE(g->next[PSI], lane) - goal);
   if (f_low == 0) return low;
   if (f_high == 0) return high;
   for (int k = 0; k < 200; ++k) {{
