@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card as pose_problem
 from tank2sim.simulation.ensemble import ensemble
+from tank2sim.simulation.lane_figures import Pace
 from tank2sim.simulation.manoeuvres import Turn
 from tests.dask_cluster import Killing, LoopbackCluster, loopback_cluster
 from tests.identification.trials import made_up_ship
@@ -78,6 +80,19 @@ def test_an_ensemble_is_the_local_one_to_the_bit_when_a_worker_is_lost(mariner_c
     assert two.workers[0].wait(10) != 0, "the worker was killed"
     np.testing.assert_array_equal(there.figures["advance_m"], here.figures["advance_m"])
     assert set(there.figures) == set(here.figures) and there.unusable == here.unusable
+    np.testing.assert_array_equal(there.histories, here.histories)
+
+
+def test_tasks_of_thousands_of_ships_at_the_fastest_pace_are_the_local_ones_to_the_bit(mariner_card, two) -> None:
+    draws, _ = draws_of(mariner_card, 12)
+    usual = OfManoeuvre(ShipText.of(mariner_card), Turn(np.radians(35.0)), 150.0, np.linspace(0, 150, 4))
+    question = replace(usual, pace=Pace(6, single=True))
+    here = ensemble(question, draws, 6500)
+    with executing(two.option) as executor:
+        there = ensemble(question, draws, 6500, executor, batch=2048)
+    assert set(there.figures) == set(here.figures) and np.isfinite(here.figures["advance_m"]).all()
+    for name, values in here.figures.items():
+        np.testing.assert_array_equal(there.figures[name], values, err_msg=name)
     np.testing.assert_array_equal(there.histories, here.histories)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
@@ -106,6 +106,26 @@ def test_what_is_drawn_beyond_a_bound_is_drawn_again_as_a_whole_and_reported() -
     assert found.redrawn.members == first > 40 and found.redrawn.beyond == {"a": first}
     assert f"{first} of 200 members" in found.notices[0] and f"(a {first})" in found.notices[0]
     assert not found.unusable and ensemble(Linear(), DRAWS, 5).notices == []
+
+
+def test_members_drawn_together_are_those_drawn_by_themselves_to_the_bit() -> None:
+    rng = np.random.default_rng(8)
+    root, bounds = rng.normal(size=(45, 45)), np.full(45, 16.0)
+    usual = Draws(tuple(map(str, range(45))), rng.normal(size=45), root, -bounds, bounds, 3)
+    sampled = replace(usual, samples=rng.normal(size=(9, 2)), sampled=np.array([1, 40]))
+    own = {field.name: getattr(usual, field.name) for field in fields(Draws)}
+    mixture = module.MixtureDraws(**own, centres=np.zeros((2, 45)), shares=np.array([0.5, 0.5]), round=1)
+    for draws in (usual, sampled, mixture):
+        together, single = draws.members(250, 12), [draws.drawn(number) for number in range(250, 262)]
+        np.testing.assert_array_equal(together.values, [list(draw.values.values()) for draw in single])
+        assert together.beyond == {250 + row: draw.beyond for row, draw in enumerate(single) if draw.beyond}
+        assert together.troubles == [draw.trouble for draw in single]
+    assert usual.members(250, 12).beyond and any(mixture.members(250, 12).troubles)
+
+
+@pytest.mark.parametrize(("members", "batches"), [(256, 1), (10_000, 40), (100_000, 64), (1_000_000, 489)])
+def test_batches_of_large_ensembles_are_larger(members: int, batches: int) -> None:
+    assert -(-members // module._batch(256, members)) == batches
 
 
 def test_a_member_that_no_draw_brings_within_its_bounds_cannot_be_used() -> None:

@@ -19,7 +19,7 @@ from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_fu
 from tank2sim.native.library import cached_library
 from tank2sim.simulation import lane_runs
 from tank2sim.simulation.card_range import single_figures
-from tank2sim.simulation.lane_figures import LaneManoeuvres, runs_in_lanes
+from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import PullOut, Turn, Zigzag
 from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.run import simulate
@@ -105,7 +105,7 @@ def test_ships_that_are_doubtful_with_longer_steps_are_run_with_the_usual_ones(m
     narrow = build(revised(mariner_card, {}, {"model.valid_speed_mps": [float(slowest), 20.0]}))
     _, p = ships(mariner_card, narrow, 24)
     lanes = LaneManoeuvres(narrow)
-    usual, longer = (lanes.run(Turn(TWENTY), p, step_factor=factor) for factor in (1, 3))
+    usual, longer = (lanes.run(Turn(TWENTY), p, pace=Pace(factor)) for factor in (1, 3))
     np.testing.assert_array_equal(longer.doubtful, np.isfinite(usual.left_s))
     assert 0 < longer.doubtful.sum() < len(p)
     np.testing.assert_array_equal(longer.left_s, usual.left_s)
@@ -116,10 +116,39 @@ def test_ships_that_are_doubtful_with_longer_steps_are_run_with_the_usual_ones(m
     np.testing.assert_array_equal(same, longer.doubtful)
 
 
+SINGLE = Pace(1, single=True)
+
+
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+@pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])
+def test_figures_in_single_precision_are_those_of_single_runs(name: str, manoeuvre) -> None:
+    card = read_card(name)
+    assert isinstance(card, ManoeuvringCard)
+    model = build(card)
+    members, p = ships(card, model, 2)
+    found = LaneManoeuvres(model).run(manoeuvre, p, 900.0, pace=SINGLE)
+    for number, member in enumerate(members):
+        expected = single_figures(simulate(model, manoeuvre, duration_s=900.0, parameters=member).figures)
+        assert {name for name, values in found.figures.items() if np.isfinite(values[number])} == set(expected)
+        for figure, value in expected.items():
+            assert found.figures[figure][number] == pytest.approx(value, rel=3e-6), figure
+
+
+@pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])
+def test_no_bit_in_single_precision_depends_on_lanes_or_neighbours(mariner_card, mariner, manoeuvre) -> None:
+    _, p = ships(mariner_card, mariner, 19)
+    results = [LaneManoeuvres(mariner, lanes).run(manoeuvre, p, pace=SINGLE) for lanes in WIDTHS]
+    part = LaneManoeuvres(mariner).run(manoeuvre, p[3:8], pace=SINGLE)
+    for figure, values in results[0].figures.items():
+        for result in results[1:]:
+            np.testing.assert_array_equal(result.figures[figure], values, err_msg=figure)
+        np.testing.assert_array_equal(part.figures[figure], values[3:8], err_msg=figure)
+
+
 def test_a_turn_near_the_limit_of_a_steady_one_is_doubtful() -> None:
     model = build(read_card("kvlcc2"))
     lanes, ends = LaneManoeuvres(model), np.arange(595.0, 630.0, 5.0)  # it becomes steady at some 603 s
-    runs = [lanes.run(Turn(LARGE), model.parameter_values()[None], end, step_factor=3) for end in ends.tolist()]
+    runs = [lanes.run(Turn(LARGE), model.parameter_values()[None], end, pace=Pace(3)) for end in ends.tolist()]
     steady = np.array([np.isfinite(run.figures["steady_speed_mps"][0]) for run in runs])
     doubtful = np.array([run.doubtful[0] for run in runs])
     assert doubtful[~steady].all() and not steady.all()
@@ -159,8 +188,9 @@ def test_what_lanes_do_not_have_is_left_to_single_runs(mariner) -> None:
         lane_function(ca.Function("f", [x], [x]), "f")
 
 
-def evaluated(function: ca.Function, columns: list[Array], lanes: int) -> Array:
+def evaluated(function: ca.Function, columns: list[Array], lanes: int, *, single: bool = False) -> Array:
     """A function of scalars at each row (n,) of its arguments, in lanes; its outputs (n_out, n)."""
+    numbers = 2 * lanes if single and lanes > 1 else lanes
     loop = f"""
 {EXPORT}void each(long n, const double *in, double *out) {{
   for (long k = 0; k < n; k += LANES) {{
@@ -177,7 +207,7 @@ def evaluated(function: ca.Function, columns: list[Array], lanes: int) -> Array:
   }}
 }}
 """
-    source = f"#define LANES {lanes}\n{VECTORS}{lane_function(function, 'f')}{loop}"
+    source = f"#define LANES {numbers}\n#define SINGLE {int(single)}\n{VECTORS}{lane_function(function, 'f')}{loop}"
     library = ctypes.CDLL(str(cached_library({"f.c": source}, flags=FLAGS_OF_LANES[lanes])))
     given = np.ascontiguousarray(columns)
     found = np.empty((function.n_out(), given.shape[1]))
@@ -198,6 +228,20 @@ def test_sine_and_cosine_are_exact_to_the_last_places(lanes: int) -> None:
         for values, expected in ((sine, np.sin(angles)), (cosine, np.cos(angles))):
             # Absolute: near a multiple of pi the last bit is of the reduced angle.
             np.testing.assert_allclose(values, expected, rtol=4e-16, atol=2e-16)
+
+
+@pytest.mark.parametrize("lanes", WIDTHS)
+def test_angles_in_single_precision_are_exact_to_its_last_places(lanes: int) -> None:
+    rng = np.random.default_rng(2)
+    angles = np.concatenate([rng.uniform(-r, r, 4000) for r in (1.0, 10.0, 1e3, 8e3, 1e5)] + [np.zeros(16)])
+    angles = angles.astype(np.float32).astype(float)
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    sine, cosine = evaluated(ca.Function("f", [x], [ca.sin(x), ca.cos(x)]), [angles], lanes, single=True)
+    np.testing.assert_allclose(sine, np.sin(angles), rtol=0, atol=1.5e-7)
+    np.testing.assert_allclose(cosine, np.cos(angles), rtol=0, atol=1.5e-7)
+    a, b = rng.normal(size=(2, 4000)) * 10.0 ** rng.integers(-8, 8, size=(2, 4000))
+    (found,) = evaluated(ca.Function("f", [x, y], [ca.atan2(x, y)]), [a, b], lanes, single=True)
+    np.testing.assert_allclose(found, np.arctan2(a, b), rtol=4e-7, atol=0)
 
 
 @pytest.mark.parametrize("lanes", WIDTHS)

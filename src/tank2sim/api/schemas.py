@@ -71,9 +71,10 @@ class EnsembleKeys(_Part):
 
 class ManoeuvreEnsembleKeys(EnsembleKeys):
     """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track; integration steps of
-    the first members and of later ones."""
+    the first members and of later ones, and whether these are in single precision."""
 
     steps_s: list[Number]
+    single_precision: bool
 
     t_s: list[Number]
     histories: dict[str, Columns]

@@ -2,7 +2,7 @@
 
 Every operation acts on all lanes by itself and in the order of the function, without fused operations, and sine, cosine
 and atan2 are polynomials of this file: a lane has the same bits for any number of lanes, on any processor. Conditions
-are masks.
+are masks. Lanes are of double precision, or of single precision (``SINGLE`` defined as 1), twice as many.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.library import cached_library
 
-FLAGS_OF_LANES = {8: ("-mavx512f", "-mavx512dq"), 4: ("-mavx2",), 2: (), 1: ()}
-"""Flags of the compiler for a number of lanes: AVX-512, AVX2, SSE2 or NEON, plain C."""
+FLAGS_OF_LANES: dict[int, tuple[str, ...]] = {8: ("-mavx512f", "-mavx512dq"), 4: ("-mavx2",), 2: (), 1: ()}
+"""Flags of the compiler for a number of lanes of double precision: AVX-512, AVX2, SSE2 or NEON, plain C."""
 
 # The widest vectors of doubles that processor and operating system offer, asked when run: a cache of libraries may be
 # shared by machines.
@@ -43,13 +43,33 @@ int widest(void) {
 
 # Sine, cosine and atan2 are those of fdlibm (Sun Microsystems 1993, k_sin.c, k_cos.c, e_rem_pio2.c, s_atan.c: their
 # coefficients and the three parts of pi/2), within 1e-15 of the exact ones where the reduction is exact, and the C
-# library's beyond.
+# library's beyond. Sine and cosine in single precision are those of Cephes (Moshier 1992, sinf.c), within 1e-7.
 VECTORS = """
 #include <math.h>
 #include <string.h>
+#ifndef SINGLE
+#define SINGLE 0
+#endif
+#if SINGLE
+typedef float Real;
+typedef int Whole;
+#define SIGN_BIT 31
+#define ROUNDING 12582912.0f /* 1.5 * 2^23: adding it rounds to an integer, in the lowest bits */
+#define EXACT_ANGLE 8192.0 /* beyond it the reduction of an angle is not exact */
+#define LARGE_SIDE 1e30
+#define SMALL_SIDE 1e-30
+#else
+typedef double Real;
+typedef long long Whole;
+#define SIGN_BIT 63
+#define ROUNDING 6755399441055744.0 /* 1.5 * 2^52 */
+#define EXACT_ANGLE 1e5
+#define LARGE_SIDE 1e300
+#define SMALL_SIDE 1e-290
+#endif
 #if LANES > 1
-typedef double V __attribute__((vector_size(8 * LANES), may_alias));
-typedef long long M __attribute__((vector_size(8 * LANES), may_alias));
+typedef Real V __attribute__((vector_size(sizeof(Real) * LANES), may_alias));
+typedef Whole M __attribute__((vector_size(sizeof(Real) * LANES), may_alias));
 #if defined(__AVX512F__) || defined(__AVX__) || defined(__SSE2__)
 #include <immintrin.h>
 #elif defined(__ARM_NEON)
@@ -57,15 +77,23 @@ typedef long long M __attribute__((vector_size(8 * LANES), may_alias));
 #endif
 #define BITS(x) ((M) (x))
 #define REALS(m) ((V) (m))
-static inline V all(double x) { V v; for (int i = 0; i < LANES; ++i) v[i] = x; return v; }
+static inline V all(Real x) { V v; for (int i = 0; i < LANES; ++i) v[i] = x; return v; }
 static inline V lane_sqrt(V x) {
-#if LANES == 8 && defined(__AVX512F__)
+#if SINGLE && LANES == 16 && defined(__AVX512F__)
+  return (V) _mm512_sqrt_ps((__m512) x);
+#elif SINGLE && LANES == 8 && defined(__AVX__)
+  return (V) _mm256_sqrt_ps((__m256) x);
+#elif SINGLE && LANES == 4 && defined(__SSE2__)
+  return (V) _mm_sqrt_ps((__m128) x);
+#elif SINGLE && LANES == 4 && defined(__ARM_NEON)
+  return (V) vsqrtq_f32((float32x4_t) x);
+#elif !SINGLE && LANES == 8 && defined(__AVX512F__)
   return (V) _mm512_sqrt_pd((__m512d) x);
-#elif LANES == 4 && defined(__AVX__)
+#elif !SINGLE && LANES == 4 && defined(__AVX__)
   return (V) _mm256_sqrt_pd((__m256d) x);
-#elif LANES == 2 && defined(__SSE2__)
+#elif !SINGLE && LANES == 2 && defined(__SSE2__)
   return (V) _mm_sqrt_pd((__m128d) x);
-#elif LANES == 2 && defined(__ARM_NEON)
+#elif !SINGLE && LANES == 2 && defined(__ARM_NEON)
   return (V) vsqrtq_f64((float64x2_t) x);
 #else
   V y;
@@ -73,14 +101,14 @@ static inline V lane_sqrt(V x) {
   return y;
 #endif
 }
-static inline int some(M m) { long long any = 0; for (int i = 0; i < LANES; ++i) any |= m[i]; return any != 0; }
+static inline int some(M m) { Whole any = 0; for (int i = 0; i < LANES; ++i) any |= m[i]; return any != 0; }
 #define LANE(x, i) ((x)[i])
 #else
-typedef double V;
-typedef long long M;
+typedef Real V;
+typedef Whole M;
 static inline M BITS(V x) { M m; memcpy(&m, &x, sizeof m); return m; }
 static inline V REALS(M m) { V x; memcpy(&x, &m, sizeof x); return x; }
-static inline V all(double x) { return x; }
+static inline V all(Real x) { return x; }
 static inline V lane_sqrt(V x) { return sqrt(x); }
 static inline int some(M m) { return m != 0; }
 #define LANE(x, i) (*(&(x) + (i)))
@@ -125,9 +153,15 @@ EACH(expm1, expm1) EACH(asinh, asinh) EACH(acosh, acosh) EACH(atanh, atanh)
 EACH_OF_TWO(pow, pow) EACH_OF_TWO(fmod, fmod) EACH_OF_TWO(hypot, hypot)
 EACH_OF_TWO(copysign, copysign)
 static inline void lane_sincos(V x, V *sine, V *cosine) {
-  const V shift = all(6755399441055744.0); /* 1.5 * 2^52: adding it rounds to an integer, in the lowest bits */
-  const V shifted = x * all(6.36619772367581382433e-01) + shift;
-  const V n = shifted - shift;
+  const V shifted = x * all(6.36619772367581382433e-01) + all(ROUNDING);
+  const V n = shifted - all(ROUNDING);
+#if SINGLE
+  const V r = ((x - n * all(1.5703125)) - n * all(4.837512969970703125e-4)) - n * all(7.549789948768648e-8);
+  const V z = r * r;
+  const V s = r + r * z * (all(-1.6666654611e-1) + z * (all(8.3321608736e-3) + z * all(-1.9515295891e-4)));
+  const V c = all(1.0) - all(0.5) * z + z * z * (all(4.166664568298827e-2)
+      + z * (all(-1.388731625493765e-3) + z * all(2.443315711809948e-5)));
+#else
   const V r = ((x - n * all(1.57079632673412561417e+00)) - n * all(6.07710050630396597660e-11))
       - n * all(2.02226624871116645580e-21);
   const V z = r * r;
@@ -139,14 +173,15 @@ static inline void lane_sincos(V x, V *sine, V *cosine) {
       + z * (all(2.08757232129817482790e-09) + z * all(-1.13596475577881948265e-11))))));
   const V half = all(0.5) * z, w = all(1.0) - half;
   const V c = w + (((all(1.0) - w) - half) + z * p);
+#endif
   const M one = BITS(all(0.0)) - (-1), quadrant = BITS(shifted);
   const M odd = -(quadrant & one), low = (quadrant >> 1) & one, up = ((quadrant + one) >> 1) & one;
-  *sine = REALS(BITS(WHERE(odd, c, s)) ^ (low << 63));
-  *cosine = REALS(BITS(WHERE(odd, s, c)) ^ (up << 63));
-  const M far = ~LE(lane_fabs(x), all(1e5)); /* beyond it the reduction is not exact; so for nan */
+  *sine = REALS(BITS(WHERE(odd, c, s)) ^ (low << SIGN_BIT));
+  *cosine = REALS(BITS(WHERE(odd, s, c)) ^ (up << SIGN_BIT));
+  const M far = ~LE(lane_fabs(x), all(EXACT_ANGLE)); /* so for nan */
   if (some(far))
     for (int i = 0; i < LANES; ++i)
-      if (!(fabs(LANE(x, i)) <= 1e5)) { LANE(*sine, i) = sin(LANE(x, i)); LANE(*cosine, i) = cos(LANE(x, i)); }
+      if (!(fabs(LANE(x, i)) <= EXACT_ANGLE)) { LANE(*sine, i) = sin(LANE(x, i)); LANE(*cosine, i) = cos(LANE(x, i)); }
 }
 /* After s_atan.c: of the smaller over the larger side, reduced by atan(1/2) or atan(1). */
 static inline V lane_atan2(V y, V x) {
@@ -171,16 +206,16 @@ static inline V lane_atan2(V y, V x) {
       WHERE0(middle, all(2.26987774529616870924e-17))));
   V angle = first - ((t * (odd + even) - last) - t);
   angle = WHERE(steep, all(1.57079632679489655800e+00) - (angle - all(6.12323399573676603587e-17)), angle);
-  const M sign = BITS(all(-0.0)), back = -((BITS(x) >> 63) & 1);
+  const M sign = BITS(all(-0.0)), back = -((BITS(x) >> SIGN_BIT) & 1);
   angle = WHERE(back, all(3.14159265358979311600e+00) - (angle - all(1.22464679914735317720e-16)), angle);
   angle = REALS((BITS(angle) & ~sign) | (BITS(y) & sign));
-  const M far = ~(LE(ay, all(1e300)) & LE(ax, all(1e300))) | (LT(high, all(1e-290)) & none_equal);
+  const M far = ~(LE(ay, all(LARGE_SIDE)) & LE(ax, all(LARGE_SIDE))) | (LT(high, all(SMALL_SIDE)) & none_equal);
   if (some(far))
     for (int i = 0; i < LANES; ++i) if (LANE(far, i)) LANE(angle, i) = atan2(LANE(y, i), LANE(x, i));
   return angle;
 }
 """
-"""C of vectors of LANES doubles (``V``), their masks (``M``), and the functions of them."""
+"""C of vectors of LANES numbers (``V``), their masks (``M``), and the functions of them."""
 
 _OF_TWO = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARISONS = {ca.OP_LT: "LT", ca.OP_LE: "LE", ca.OP_EQ: "EQ", ca.OP_NE: "NE"}

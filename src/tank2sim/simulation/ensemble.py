@@ -25,6 +25,10 @@ Histories = NDArray[np.float32]
 BATCH = 32
 """Members of a batch: large against the cost of its transfer, small against the whole (project choice)."""
 
+LARGE_BATCHES, BATCHES = 8, 64
+"""Most times the usual number of members in a batch, and the number of batches from which on they are larger: many for
+each processor of a machine, so that none waits long for the last, and few against what each costs (project choice)."""
+
 KEPT = 2000
 """Number of members, the first, whose histories are kept for bands of tracks, 4 bytes a sample. The share below a
 quantile is known to 0.5 %; figures are those of all members (project choice)."""
@@ -89,6 +93,30 @@ class Draws:
         held = np.clip(values, self.lowest, self.highest)
         return Drawn(dict(zip(self.names, held.tolist(), strict=True)), beyond, trouble=NOT_WITHIN, standard=standard)
 
+    def members(self, first: int, count: int) -> DrawnMembers:
+        """The members from `first` on, the same as by :meth:`drawn`."""
+        names = len(self.names)
+        values, products = np.empty((count, names)), np.empty_like(self.root)
+        for row in range(count):
+            stream = member_stream(self.seed, first + row)
+            np.multiply(self.root, stream.standard_normal(names), out=products)
+            np.add(self.mean, products.sum(axis=1), out=values[row])
+            if self.samples is not None:
+                values[row, self.sampled] = self.samples[stream.integers(len(self.samples))]
+        again = np.flatnonzero(((values < self.lowest) | (values > self.highest)).any(axis=1))
+        return self._by_themselves(first, values, again)
+
+    def _by_themselves(self, first: int, values: Array, rows: NDArray[np.intp]) -> DrawnMembers:
+        """Members with `values` (n, k), those of `rows` drawn one by one."""
+        beyond: dict[int, tuple[str, ...]] = {}
+        troubles = [""] * len(values)
+        for row in rows.tolist():
+            draw = self.drawn(first + row)
+            values[row], troubles[row] = list(draw.values.values()), draw.trouble
+            if draw.beyond:
+                beyond[first + row] = draw.beyond
+        return DrawnMembers(values, beyond, troubles)
+
     def at(self, standard: Array) -> Array:
         """Parameters (k,) at standard normal values (k,)."""
         values: Array = self.mean + (self.root * standard).sum(axis=1)
@@ -103,6 +131,15 @@ class Drawn(NamedTuple):
     beyond: tuple[str, ...] = ()
     trouble: str = ""
     standard: Array | None = None
+
+
+class DrawnMembers(NamedTuple):
+    """Parameters of n members (n, k); names beyond a bound in the first draw, by the member's number; and the reason
+    that each is unusable, empty for others."""
+
+    values: Array
+    beyond: Mapping[int, tuple[str, ...]]
+    troubles: list[str]
 
 
 OUT_OF_BOUNDS = "a number is beyond its bounds"
@@ -138,6 +175,10 @@ class MixtureDraws(Draws):
         held = np.clip(values, self.lowest, self.highest).tolist()
         trouble = "" if within else OUT_OF_BOUNDS
         return Drawn(dict(zip(self.names, held, strict=True)), (), trouble, standard)
+
+    def members(self, first: int, count: int) -> DrawnMembers:
+        """The members from `first` on, the same as by :meth:`drawn`."""
+        return self._by_themselves(first, np.empty((count, len(self.names))), np.arange(count))
 
     def weights(self, standard: Array) -> Array:
         """Density of the card's distribution over that of this mixture (n,), at standard normal values (n, k)."""
@@ -187,7 +228,8 @@ class AskTogether:
 class Question(Protocol):
     """Evaluation of every member; it is sent to other processes.
 
-    It may have an attribute ``batch``, the number of members of a batch if not :data:`BATCH`.
+    It may have an attribute ``batch``, the number of members of a batch if not :data:`BATCH`; of a large ensemble there
+    are more, up to :data:`LARGE_BATCHES` times as many.
     """
 
     def prepared(self) -> Ask | AskTogether:
@@ -262,7 +304,7 @@ def ensemble(
 ) -> Ensemble:
     """Evaluate `members` ships in batches of `batch`, in this process or by an executor, with the same result."""
     sent = pickle.dumps(question)
-    size = batch or int(getattr(question, "batch", BATCH))
+    size = batch or _batch(int(getattr(question, "batch", BATCH)), members)
     tasks = [_Task(sent, draws, first, min(size, members - first)) for first in range(0, members, size)]
     figures: dict[str, Array] = {}
     histories: Histories | None = None
@@ -286,6 +328,11 @@ def ensemble(
     return Ensemble(members, draws.seed, figures, histories, dict(sorted(unusable.items())), redrawn, bad)
 
 
+def _batch(usual: int, members: int) -> int:
+    """Members of a batch: the usual number, more if there were more than :data:`BATCHES` of them."""
+    return max(usual, min(-(-members // BATCHES), LARGE_BATCHES * usual))
+
+
 @dataclass(frozen=True, eq=False)
 class _Task:
     """A batch of members, with the data for another process."""
@@ -302,20 +349,19 @@ def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterable[BatchRe
 
 def _answers(task: _Task) -> BatchResult:
     ask, kept = _prepared(task.question), min(max(KEPT - task.first, 0), task.count)
-    drawn = [task.draws.drawn(number) for number in range(task.first, task.first + task.count)]
+    names, drawn = task.draws.names, task.draws.members(task.first, task.count)
     if isinstance(ask, AskTogether):
-        values = np.array([list(draw.values.values()) for draw in drawn]).reshape(task.count, len(task.draws.names))
-        answer = ask.function(task.count, dict(zip(task.draws.names, values.T, strict=True)), kept)
+        answer = ask.function(task.count, dict(zip(names, drawn.values.T, strict=True)), kept)
     else:
-        answer = gathered(ask([draw.values for draw in drawn]), kept=kept > 0)
-    outside = [number for number, draw in enumerate(drawn) if draw.trouble]
-    troubles = [draw.trouble or trouble for draw, trouble in zip(drawn, answer.troubles, strict=True)]
+        members = [dict(zip(names, row, strict=True)) for row in drawn.values.tolist()]
+        answer = gathered(ask(members), kept=kept > 0)
+    outside = [number for number, trouble in enumerate(drawn.troubles) if trouble]
+    troubles = [first or other for first, other in zip(drawn.troubles, answer.troubles, strict=True)]
     for figure in answer.figures.values():
         figure[outside] = np.nan
     if answer.histories is not None:
         answer.histories[[number for number in outside if number < len(answer.histories)]] = np.nan
-    beyond = {task.first + number: draw.beyond for number, draw in enumerate(drawn) if draw.beyond}
-    return answer._replace(troubles=troubles, beyond=beyond)
+    return answer._replace(troubles=troubles, beyond=drawn.beyond)
 
 
 def gathered(answers: Sequence[MemberResult], *, kept: bool = False) -> BatchResult:

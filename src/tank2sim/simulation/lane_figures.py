@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -29,11 +30,12 @@ from tank2sim.simulation.manoeuvres import (
     Turn,
     Zigzag,
 )
-from tank2sim.simulation.rows import RowFunction
+from tank2sim.simulation.rows import ArrayFunction, RowFunction
 from tank2sim.simulation.run import simulate
 
-_HALVINGS = 60
-"""Halvings of a step in the search of a crossing: to rounding."""
+_TRIES, _ROUNDED = 60, 1e-14
+"""Most tries in the search of a crossing, by Newton's method or by halving where that leaves the step; and the change,
+in steps, below which it ends, less than the rounding of times (project choices)."""
 
 NEAR_STEADY = 0.9
 """Share of :data:`tank2sim.simulation.figures.STEADY_SHARE` above which a turn is near the limit of a steady one: with
@@ -41,6 +43,18 @@ steps three times as long, the sample two lengths before the end is at most two 
 from it half a percent smaller (project choice)."""
 
 _BEGINS = "motion.x", "motion.y", "motion.psi"
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How ships are integrated: length of a step over the model's, and whether in single precision."""
+
+    step_factor: int = 1
+    single: bool = False
+
+
+USUAL_PACE = Pace()
+"""The model's step in double precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +73,7 @@ class LaneFigures:
     left_s : array (n,)
         Time at which a ship first left the range of its card, s; inf if it did not, nan if it is not `fine`.
     doubtful : array (n,)
-        True for a ship whose figures a longer integration step may turn into none, or none into a figure: one is none,
+        True for a ship whose figures another :class:`Pace` may turn into none, or none into a figure: one is none,
         the turn is near the limit of a steady one (:data:`NEAR_STEADY`), or the ship left the range of its card.
     """
 
@@ -121,12 +135,16 @@ class LaneManoeuvres:
             raise NoLanesError("the model is not that of a ship")
         if "motion.phi" in model.state_names:
             raise NoLanesError("the heel of a ship that rolls is not a figure of lanes")
-        self._runner = LaneRunner(model, lanes)
+        self._lanes, self._runner, self._start = lanes, LaneRunner(model, lanes), ArrayFunction(model.initial)
         arguments = [model.x, model.u, model.p]
         self._read = {
             name: RowFunction(ca.Function("read", arguments, [model.expand(model.symbol(name))], {"cse": True}))
             for name in ("motion.beta", "motion.rdot")
         }
+
+    @cached_property
+    def _single(self) -> LaneRunner:
+        return LaneRunner(self.model, self._lanes, single=True)
 
     def run(
         self,
@@ -135,7 +153,7 @@ class LaneManoeuvres:
         duration_s: float | None = None,
         times: Sequence[float] | Array = (),
         inputs: Mapping[str, float] | None = None,
-        step_factor: int = 1,
+        pace: Pace = USUAL_PACE,
     ) -> LaneFigures:
         """Figures of ships with parameters `p` (n, np), and their states at `times`.
 
@@ -151,24 +169,23 @@ class LaneManoeuvres:
             Times at which states are kept, s.
         inputs : mapping, optional
             Values in place of the model's, by name.
-        step_factor : int
-            Length of an integration step over the model's. Ships that are `doubtful` with longer steps than the
-            model's are run again with these.
+        pace : Pace
+            Step and precision. Ships that are `doubtful` are run again with the model's step in double precision.
         """
         u = self.model.input_values(inputs)
         p = np.ascontiguousarray(p, dtype=float)
-        starts = np.ascontiguousarray(np.array(self.model.initial(p.T)).T)
+        (starts,) = self._start(p)
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
         ends = self._longest * ship_times if duration_s is None else np.full(len(p), duration_s)
-        plan = replace(_plan(manoeuvre, u, times, timed=duration_s is not None), step_factor=step_factor)
+        plan = replace(_plan(manoeuvre, u, times, timed=duration_s is not None), step_factor=pace.step_factor)
         side = math.copysign(1.0, manoeuvre.rudder)
         heading = starts[:, [self.model.state_names.index("motion.psi")]]
         if isinstance(manoeuvre, Turn):
             levels = heading + side * np.array([math.pi / 2, math.pi])
         else:
             levels = np.hstack([heading, np.zeros_like(heading)])
-        found = self._runner.runs(plan, p, starts, ends, levels)
+        found = (self._single if pace.single else self._runner).runs(plan, p, starts, ends, levels)
         if isinstance(manoeuvre, Turn):
             figures = self._turn(found, (u, p), starts, manoeuvre)
         else:
@@ -183,7 +200,7 @@ class LaneManoeuvres:
         if isinstance(manoeuvre, Turn):
             doubtful |= self._unsteadiness(found) >= NEAR_STEADY * STEADY_SHARE
         runs = LaneFigures(figures, found.states, fine, left, doubtful)
-        if step_factor == 1 or not doubtful.any():
+        if pace == USUAL_PACE or not doubtful.any():
             return runs
         return runs.replaced(np.flatnonzero(doubtful), self.run(manoeuvre, p[doubtful], duration_s, times, inputs))
 
@@ -268,8 +285,9 @@ class LaneManoeuvres:
         side, length = math.copysign(1.0, zigzag.rudder), p[:, self.model.parameter_names.index("ship.length")]
         course = self._column(starts, "motion.psi")
         # The change at which a run ends is of no order any more.
-        changes = np.minimum(found.orders - (found.orders == limit), CROSSINGS)
-        executes = np.where(np.arange(CROSSINGS) < changes[:, None], found.order_times, np.nan)
+        kept = found.order_times.shape[1]
+        changes = np.minimum(found.orders - (found.orders == limit), kept)
+        executes = np.where(np.arange(kept) < changes[:, None], found.order_times, np.nan)
         windows = found.windows[..., 2:]
         offset = self._column(windows[:, 0], "motion.psi") - course[:, None, None]
         returns = _crossing(found.windows[:, 0, ..., 0], offset, self._column(windows[:, 0], "motion.r"))
@@ -339,13 +357,19 @@ def _crossing(times: Array, offset: Array, slope: Array) -> Array:
     square = (3 * rise - 2 * slope[..., 1] - slope[..., 2]) / step
     cube = (slope[..., 1] + slope[..., 2] - 2 * rise) / step**2
     before, after = np.zeros_like(step), step.copy()
-    below = low < 0
-    for _ in range(_HALVINGS):
-        middle = (before + after) / 2
-        value = low + middle * (slope[..., 1] + middle * (square + middle * cube))
-        same = (value < 0) == below
-        before, after = np.where(same, middle, before), np.where(same, after, middle)
-    found: Array = begin + (before + after) / 2
+    below, near = low < 0, _ROUNDED * step
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = low * step / (low - high)
+        for _ in range(_TRIES):
+            value = low + root * (slope[..., 1] + root * (square + root * cube))
+            same = (value < 0) == below
+            before, after = np.where(same, root, before), np.where(same, after, root)
+            moved = root - value / (slope[..., 1] + root * (2 * square + 3 * root * cube))
+            moved = np.where((moved > before) & (moved < after) | (value == 0), moved, (before + after) / 2)
+            change, root = np.abs(moved - root), moved
+            if not (change > near).any():
+                break
+    found: Array = begin + root
     return found
 
 

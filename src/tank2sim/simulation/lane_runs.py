@@ -43,10 +43,20 @@ approach speed, two lengths at a tenth of it (project choice)."""
 # See Running.run_until and bracketed_root for the steps to an event. A lane that has ended takes steps of zero length.
 _RUNS = """
 enum {{ NX = {nx}, NU = {nu}, NP = {np}, NC = {nc}, PSI = {psi}, R = {r}, RUDDER = {rudder} }};
-enum {{ CROSSINGS = {crossings}, SAMPLES = {samples}, REMEMBERED = {remembered}, ROW = 2 + NX }};
+enum {{ SAMPLES = {samples}, REMEMBERED = {remembered}, ROW = 2 + NX }};
+#if SINGLE
+/* After the states, what their rounding has lost (Kahan 1965); shares of a step: of a time's rounding, of a root. */
+enum {{ KEPT = 2 * NX }};
+#define SAME_TIME 1e-4
+#define SAME_ROOT 1e-7
+#else
+enum {{ KEPT = NX }};
+#define SAME_TIME 1e-9
+#define SAME_ROOT 1e-13
+#endif
 typedef struct {{
   double h, first, second, heading;
-  long limit, watches, most, times;
+  long limit, kept, watches, most, times;
   const double *inputs, *limits, *at;
 }} Plan;
 typedef struct {{
@@ -54,12 +64,23 @@ typedef struct {{
   int *ended, *orders, *crossings;
 }} Found;
 typedef struct {{
-  V states[3][NX], *before, *x, *next, u[NU], p[NP], c[NC], h[1], t_before, t, t_next;
+  V states[3][KEPT], *before, *x, *next, u[NU], p[NP], c[NC], h[1], t_before, t, t_next;
 }} Group;
 static void take(Group *g, V *to) {{
   const V *const arg[5] = {{g->x, g->u, g->p, g->c, g->h}};
+#if SINGLE
+  V change[NX];
+  V *const res[1] = {{change}};
+  step(arg, res);
+  for (int i = 0; i < NX; ++i) {{
+    const V part = change[i] - g->x[NX + i];
+    to[i] = g->x[i] + part;
+    to[NX + i] = (to[i] - g->x[i]) - part;
+  }}
+#else
   V *const res[1] = {{to}};
   step(arg, res);
+#endif
 }}
 /* The speed, and 1 within the card's range. */
 static void look(const Group *g, const V *x, V *speed, V *valid) {{
@@ -73,10 +94,10 @@ static double beyond_after(Group *g, V *to, int lane, double length, double side
   take(g, to);
   return side * (LANE(to[PSI], lane) - goal);
 }}
-/* The step to a goal, by the method of Ridders, as bracketed_root. */
+/* The step to a goal within the step that was tried, by the method of Ridders, as bracketed_root. */
 static double step_to(Group *g, V *to, int lane, double high, double side, double goal) {{
-  double low = 0.0, best = INFINITY, f_low = beyond_after(g, to, lane, low, side, goal);
-  double f_high = beyond_after(g, to, lane, high, side, goal);
+  double low = 0.0, best = INFINITY, f_low = side * (LANE(g->x[PSI], lane) - goal);
+  double f_high = side * (LANE(g->next[PSI], lane) - goal);
   if (f_low == 0) return low;
   if (f_high == 0) return high;
   for (int k = 0; k < 200; ++k) {{
@@ -85,13 +106,13 @@ static double step_to(Group *g, V *to, int lane, double high, double side, doubl
     if (!(root != 0)) return middle;
     best = middle + (middle - low) * copysign(1.0, f_low - f_high) * f_middle / root;
     const double f_best = beyond_after(g, to, lane, best, side, goal);
-    if (f_best == 0 || fabs(best - before) <= 1e-13) return best;
+    if (f_best == 0 || fabs(best - before) <= SAME_ROOT) return best;
     double x[4] = {{low, middle, best, high}}, f[4] = {{f_low, f_middle, f_best, f_high}};
     if (best < middle) {{ x[1] = best; f[1] = f_best; x[2] = middle; f[2] = f_middle; }}
     int at = 0;
     while (at < 2 && !(f[at] * f[at + 1] <= 0)) ++at;
     low = x[at]; f_low = f[at]; high = x[at + 1]; f_high = f[at + 1];
-    if (fabs(high - low) <= 1e-13) return (low + high) / 2;
+    if (fabs(high - low) <= SAME_ROOT) return (low + high) / 2;
   }}
   return best;
 }}
@@ -104,7 +125,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
     const double *levels, const double *lengths, const int *watched, const Found *found) {{
   static const M none = {{0}};
   V rates[REMEMBERED], velocities[REMEMBERED];
-  const double h = plan->h, tolerance = 1e-9 * h, side = plan->first < 0 ? -1.0 : 1.0;
+  const double h = plan->h, tolerance = SAME_TIME * h, side = plan->first < 0 ? -1.0 : 1.0;
   for (long begin = 0; begin < members; begin += LANES) {{
     Group g;
     long member[LANES], due[LANES], events[LANES], open[LANES][2][2];
@@ -118,7 +139,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       member[l] = k; due[l] = events[l] = 0;
       open[l][0][0] = open[l][0][1] = open[l][1][0] = open[l][1][1] = 0;
       for (int i = 0; i < NP; ++i) LANE(g.p[i], l) = p[k * NP + i];
-      for (int i = 0; i < NX; ++i) LANE(g.x[i], l) = starts[k * NX + i];
+      for (int i = 0; i < KEPT; ++i) LANE(g.x[i], l) = i < NX ? starts[k * NX + i] : 0.0;
       LANE(end, l) = ends[k];
       for (int w = 0; w < plan->watches; ++w) LANE(level[w], l) = levels[k * plan->watches + w];
       if (plan->times) LANE(soon, l) = plan->at[0];
@@ -146,14 +167,14 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       if (plan->limit) {{
         event = active & LE(all(0), sides * (g.next[PSI] - goal));
         if (some(event)) {{
-          V to[NX];
+          V to[KEPT];
           const V tried = g.h[0];
           for (int l = 0; l < LANES; ++l) {{
             if (!LANE(event, l)) continue;
             const double direction = LANE(sides, l), aim = LANE(goal, l);
             const double length = step_to(&g, to, l, LANE(tried, l), direction, aim);
             beyond_after(&g, to, l, length, direction, aim);
-            for (int i = 0; i < NX; ++i) LANE(g.next[i], l) = LANE(to[i], l);
+            for (int i = 0; i < KEPT; ++i) LANE(g.next[i], l) = LANE(to[i], l);
             LANE(g.t_next, l) = LANE(g.t, l) + length;
             LANE(after, l) = LANE(steps, l);
           }}
@@ -188,10 +209,10 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
             continue;
           }}
           if (LANE(event, l)) {{
-            if (events[l] < CROSSINGS) {{
-              found->order_times[k * CROSSINGS + events[l]] = t_next;
-              for (int i = 0; i < NX; ++i)
-                found->order_states[(k * CROSSINGS + events[l]) * NX + i] = LANE(g.next[i], l);
+            if (events[l] < plan->kept) {{
+              const long row = k * plan->kept + events[l];
+              found->order_times[row] = t_next;
+              for (int i = 0; i < NX; ++i) found->order_states[row * NX + i] = LANE(g.next[i], l);
             }} else found->ended[k] = {unknown};
             events[l] += 1;
             finished |= events[l] == plan->limit;
@@ -204,7 +225,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           LANE(waiting, l) = 0;
           for (int w = 0; w < plan->watches; ++w) {{
             int *count = found->crossings + k * plan->watches + w;
-            double *windows = found->windows + (k * plan->watches + w) * CROSSINGS * SAMPLES * ROW;
+            double *windows = found->windows + (k * plan->watches + w) * plan->most * SAMPLES * ROW;
             if (open[l][w][0]) {{
               keep_sample(windows + ((open[l][w][1] * SAMPLES) + 3) * ROW, t_next, LANE(g.u[RUDDER], l), g.next, l);
               open[l][w][0] = 0;
@@ -259,7 +280,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
 class _Plan(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_double) for name in ("h", "first", "second", "heading")),
-        *((name, ctypes.c_long) for name in ("limit", "watches", "most", "times")),
+        *((name, ctypes.c_long) for name in ("limit", "kept", "watches", "most", "times")),
         *((name, ctypes.c_void_p) for name in ("inputs", "limits", "at")),
     )
 
@@ -333,9 +354,9 @@ class LaneResults:
         First, lowest, highest and last speed, m/s.
     left : array (n,)
         Time at which the card's range (the output ``validity``) was first left, s; inf if it was not.
-    order_times, order_states : arrays (n, :data:`CROSSINGS`), (n, :data:`CROSSINGS`, nx)
-        Times and states at the changes of order.
-    windows : array (n, watches, :data:`CROSSINGS`, :data:`SAMPLES`, 2 + nx)
+    order_times, order_states : arrays (n, orders), (n, orders, nx)
+        Times and states at the changes of order, at most :data:`CROSSINGS`.
+    windows : array (n, watches, most, :data:`SAMPLES`, 2 + nx)
         Time, rudder order from then on, and states about each crossing.
     states : array (n, times, nx)
         At the requested times.
@@ -369,7 +390,10 @@ class LaneRunner:
     model : Model
         A ship.
     lanes : int, optional
-        Ships at a time: 8, 4, 2 or 1; by default what this machine's vectors hold. No result depends on it.
+        Numbers of double precision in a vector: 8, 4, 2 or 1; by default what this machine's vectors hold. No result
+        depends on it.
+    single : bool
+        In single precision, with compensated sums of the states.
 
     Raises
     ------
@@ -378,8 +402,8 @@ class LaneRunner:
         the states of a ship.
     """
 
-    def __init__(self, model: Model, lanes: int | None = None):
-        self.model = model
+    def __init__(self, model: Model, lanes: int | None = None, *, single: bool = False):
+        self.model, self.single = model, single
         self.lanes = widest_lanes() if lanes is None else lanes
         needed = {"motion.psi", "motion.r", "rudder.angle"} - set(model.state_names)
         if not self.lanes or needed or "rudder.command" not in model.input_names:
@@ -398,16 +422,16 @@ class LaneRunner:
         first, second = plan.orders
         watched = np.array([model.state_names.index(name) for name in plan.watched], dtype=np.int32)
         limit = np.iinfo(np.int32).max if plan.limit < 0 else plan.limit
-        shape = (n, len(watched))
+        shape, kept = (n, len(watched)), min(limit, CROSSINGS)
         found = LaneResults(
             end=np.full(n, np.nan),
             last=np.full((n, nx), np.nan),
             then=np.full((n, 2), np.nan),
             speeds=np.full((n, 4), np.nan),
             left=np.full(n, np.nan),
-            order_times=np.full((n, CROSSINGS), np.nan),
-            order_states=np.full((n, CROSSINGS, nx), np.nan),
-            windows=np.full((*shape, CROSSINGS, SAMPLES, 2 + nx), np.nan),
+            order_times=np.full((n, kept), np.nan),
+            order_states=np.full((n, kept, nx), np.nan),
+            windows=np.full((*shape, plan.most, SAMPLES, 2 + nx), np.nan),
             states=np.full((n, len(at), nx), np.nan),
             ended=np.zeros(n, dtype=np.int32),
             orders=np.zeros(n, dtype=np.int32),
@@ -421,6 +445,7 @@ class LaneRunner:
             second,
             plan.heading,
             limit,
+            kept,
             len(watched),
             plan.most,
             len(at),
@@ -428,13 +453,13 @@ class LaneRunner:
             limits.ctypes.data,
             at.ctypes.data,
         )
-        kept = _Found(*(getattr(found, name).ctypes.data for name in _FOUND))
-        self._run(n, asked, *(values.ctypes.data for values in numbers), watched.ctypes.data, kept)
+        results = _Found(*(getattr(found, name).ctypes.data for name in _FOUND))
+        self._run(n, asked, *(values.ctypes.data for values in numbers), watched.ctypes.data, results)
         return found
 
     def _compiled(self) -> ctypes._NamedFuncPointer:
         model = self.model
-        step, constants = step_and_constants(model)
+        step, constants = step_and_constants(model, change=self.single)
         arguments = [model.x, model.u, model.p]
         valid = model.expand(model.symbol("validity")) if "validity" in model else ca.SX(1.0)
         seen = [model.expand(model.symbol("motion.speed")), valid]
@@ -452,7 +477,6 @@ class LaneRunner:
             psi=model.state_names.index("motion.psi"),
             r=model.state_names.index("motion.r"),
             rudder=model.input_names.index("rudder.command"),
-            crossings=CROSSINGS,
             samples=SAMPLES,
             remembered=_REMEMBERED,
             runaway=RUNAWAY_LANE,
@@ -460,7 +484,7 @@ class LaneRunner:
             inside=INSIDE,
         )
         try:
-            library = _library([VECTORS, *codes, runs], self.lanes)
+            library = _library([VECTORS, *codes, runs], self.lanes, single=self.single)
         except (InputError, OSError) as error:  # a compiler that does not work, or compiles for another machine
             raise NoLanesError(str(error)) from error
         pointers = [ctypes.c_void_p] * 5
@@ -471,12 +495,13 @@ class LaneRunner:
         return function
 
 
-def _library(parts: Sequence[str], lanes: int) -> ctypes.CDLL:
-    """The compiled library; plain C where the compiler has no vectors."""
+def _library(parts: Sequence[str], lanes: int, *, single: bool) -> ctypes.CDLL:
+    """The compiled library for vectors of `lanes` doubles; plain C where the compiler has no vectors."""
     try:
-        source = "\n".join([f"#define LANES {lanes}", *parts])
+        numbers = 2 * lanes if single and lanes > 1 else lanes
+        source = "\n".join([f"#define LANES {numbers}", f"#define SINGLE {int(single)}", *parts])
         return ctypes.CDLL(str(cached_library({"lanes.c": source}, flags=FLAGS_OF_LANES[lanes])))
     except RuntimeError:
         if lanes == 1:
             raise
-        return _library(parts, 1)
+        return _library(parts, 1, single=single)

@@ -18,6 +18,12 @@ def runge_kutta_step(model: Model) -> ca.Function:
     as hand-written code.
     """
     h = ca.SX.sym("h")
+    names = ["x", "u", "p", "h"], ["x_next"]
+    return ca.Function("step", [model.x, model.u, model.p, h], [model.x + _increment(model, h)], *names, {"cse": True})
+
+
+def _increment(model: Model, h: ca.SX) -> ca.SX:
+    """Change of the states over a step of `h` seconds."""
 
     def rate(x: ca.SX) -> ca.SX:
         return ca.substitute(model.rates, model.x, x)
@@ -26,19 +32,18 @@ def runge_kutta_step(model: Model) -> ca.Function:
     k2 = rate(model.x + h / 2 * k1)
     k3 = rate(model.x + h / 2 * k2)
     k4 = rate(model.x + h * k3)
-    following = model.x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    names = ["x", "u", "p", "h"], ["x_next"]
-    return ca.Function("step", [model.x, model.u, model.p, h], [following], *names, {"cse": True})
+    return h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
-def step_and_constants(model: Model) -> tuple[ca.Function, ca.Function]:
+def step_and_constants(model: Model, *, change: bool = False) -> tuple[ca.Function, ca.Function]:
     """``step(x, u, p, c, h) -> x_next`` and ``constants(p) -> c``: :func:`runge_kutta_step` to the last bit.
 
     Terms that depend on p alone (masses and their determinant, scales) are computed when a parameter is set and not in
-    every step, by the same operations.
+    every step, by the same operations. With `change` the step's result is ``x_next - x``, before it is added to x.
     """
     arguments = [model.x, model.u, model.p, ca.SX.sym("h")]
-    shorter, symbols, values = ca.extract_parametric(runge_kutta_step(model)(*arguments), model.p)
+    wanted = _increment(model, arguments[3]) if change else runge_kutta_step(model)(*arguments)
+    shorter, symbols, values = ca.extract_parametric(wanted, model.p)
     none = ca.SX(0, 1)
     x, u, p, h = arguments
     inputs = [x, u, p, ca.vertcat(none, *symbols), h]

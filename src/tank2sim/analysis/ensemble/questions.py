@@ -32,7 +32,7 @@ from tank2sim.simulation.card_range import Numbers, single_figures
 from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult, gathered
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.lane_figures import LaneManoeuvres, runs_in_lanes
+from tank2sim.simulation.lane_figures import USUAL_PACE, LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
@@ -100,15 +100,15 @@ class ShipText:
 class OfManoeuvre:
     """Figures of a manoeuvre, and :func:`signals_with_bands` at `times` (n,), s.
 
-    Members whose histories are not kept are integrated, in lanes, with `step_factor` times the model's step
-    (:func:`tank2sim.analysis.ensemble.steps.largest_step_factor`).
+    Members whose histories are not kept are integrated, in lanes, at a `pace` of their own
+    (:func:`tank2sim.analysis.ensemble.steps.fastest_pace`).
     """
 
     ship: ShipText
     manoeuvre: Manoeuvre
     duration_s: float | None
     times: Array
-    step_factor: int = 1
+    pace: Pace = USUAL_PACE
 
     @property
     def batch(self) -> int:
@@ -151,7 +151,7 @@ class OfManoeuvre:
             p, troubles = ships_of(model, count, values)
             runs = [lanes.run(manoeuvre, p[:kept], self.duration_s, self.times)] if kept else []
             if kept < count:
-                runs.append(lanes.run(manoeuvre, p[kept:], self.duration_s, step_factor=self.step_factor))
+                runs.append(lanes.run(manoeuvre, p[kept:], self.duration_s, pace=self.pace))
             troubles = _with_runaways(troubles, np.concatenate([part.fine for part in runs]))
             answer = _usable(_joined([(part.figures, len(part.fine)) for part in runs]), troubles)
             if not kept:

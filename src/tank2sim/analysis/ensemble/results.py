@@ -19,7 +19,7 @@ from tank2sim.analysis.ensemble.questions import (
     signals_with_bands,
 )
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
-from tank2sim.analysis.ensemble.steps import STEP_TOLERANCE, TRIED_MEMBERS, largest_step_factor
+from tank2sim.analysis.ensemble.steps import STEP_TOLERANCE, TRIED_MEMBERS, fastest_pace
 from tank2sim.analysis.ensemble.tails import Tail, tails
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
@@ -29,6 +29,7 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, Ensemble, ensemble
+from tank2sim.simulation.lane_figures import USUAL_PACE
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.units import in_words
 
@@ -81,7 +82,7 @@ class ManoeuvreBands:
     """Bands of a manoeuvre: of its figures, of signals at `times_s` (n,), and of the track.
 
     `steps_s` are the integration steps of the first :data:`tank2sim.simulation.ensemble.KEPT` members, whose histories
-    are kept, and of all later ones.
+    are kept, and of all later ones, `single_precision` whether these are integrated in single precision.
     """
 
     asked: Members
@@ -90,12 +91,14 @@ class ManoeuvreBands:
     histories: Mapping[str, BandOverTime]
     track: TrackBand | None
     steps_s: tuple[float, float]
+    single_precision: bool
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
         return {
             **self.asked.as_json(),
             "steps_s": self.steps_s,
+            "single_precision": self.single_precision,
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "t_s": self.times_s,
             "histories": {name: band.as_json() for name, band in self.histories.items()},
@@ -233,12 +236,13 @@ def manoeuvre_bands(
     model = build(card)
     if request.members > KEPT:
         notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
-        question = replace(question, step_factor=largest_step_factor(question, draws))
-    steps = model.step_s, question.step_factor * model.step_s
-    if question.step_factor > 1:
+        question = replace(question, pace=fastest_pace(question, draws))
+    steps = model.step_s, question.pace.step_factor * model.step_s
+    if question.pace != USUAL_PACE:
+        single = " in single precision" if question.pace.single else ""
         notices.append(
-            f"integration steps are {steps[0]:.3g} s for the first {KEPT} members and {steps[1]:.3g} s for the others: "
-            f"no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
+            f"integration steps are {steps[0]:.3g} s for the first {KEPT} members and {steps[1]:.3g} s{single} for the "
+            f"others: no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
         )
     found = ensemble(question, draws, request.members, executor)
     shown, histories, track = history_bands(found, times, tuple(signals_with_bands(model)))
@@ -249,7 +253,9 @@ def manoeuvre_bands(
         last = shown[track.count - 1]
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it")
-    return ManoeuvreBands(_members(found, notices), figure_bands(found), shown, histories, track, steps)
+    return ManoeuvreBands(
+        _members(found, notices), figure_bands(found), shown, histories, track, steps, question.pace.single
+    )
 
 
 def stability_bands(
