@@ -232,6 +232,27 @@ class StabilityKeys(_Keys):
     ensemble: NotRequired[StabilityEnsembleKeys]
 
 
+class DifferenceTurnKeys(_Part):
+    """A steady turn of a craft; difference, yaw rate and drift positive in a turn to starboard."""
+
+    difference_rpm: float
+    speed_mps: float
+    yaw_rate_degps: float
+    drift_deg: float
+    diameter_m: float
+
+
+class CraftStabilityKeys(_Keys):
+    """Straight-line stability, surge and turning of a craft with thrusters."""
+
+    ship: str
+    straight_run: dict[str, Any]
+    speeds: list[dict[str, Any]]
+    highest_speed_mps: float
+    difference_turns: list[DifferenceTurnKeys]
+    notices: list[str]
+
+
 class ExportKeys(_Keys):
     """An FMU that was made."""
 
@@ -1171,7 +1192,7 @@ KEYS: dict[str, Any] = {
     "ships": ShipsKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,
-    "stability": StabilityKeys,
+    "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
     "tow": TowKeys,
     "validate": ValidateKeys,
