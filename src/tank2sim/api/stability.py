@@ -222,7 +222,13 @@ def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:
 
 
 def rounded(rows: Iterable[Sequence[object]]) -> list[list[object]]:
-    """Numbers of four digits, for which the tables have room on a screen of 80 columns."""
+    """Numbers of four digits, for which the tables have room on a screen of 80 columns.
+
+    Parameters
+    ----------
+    rows : iterable of sequences
+        Cells of each row; what is not a number stays.
+    """
     return [[float(f"{cell:.4g}") if isinstance(cell, float) else cell for cell in row] for row in rows]
 
 

@@ -45,7 +45,7 @@ _WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 FASTEST_APPROACH = 2.0
 """Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
 
-PREDICTED_S = (60, 120, 180, 240, 300, 360), 180
+SHIP_PREDICTED_S = (60, 120, 180, 240, 300, 360), 180
 """Times ahead that the page of a ship predicts, and the one at first, s. Project choice."""
 
 CRAFT_PREDICTED_S = (5, 10, 20, 30, 60, 120), 10
@@ -197,7 +197,7 @@ def steering_page(
         no_members=NO_COVARIANCE,
         autopilot=ship.autopilot,
         scenario=scenario,
-        ahead=_predicted(CRAFT_PREDICTED_S if levers else PREDICTED_S),
+        ahead=_predicted(CRAFT_PREDICTED_S if levers else SHIP_PREDICTED_S),
         dials=_DIALS,
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
