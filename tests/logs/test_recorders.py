@@ -11,7 +11,7 @@ import pytest
 from tank2sim.api.log import log
 from tank2sim.errors import InputError
 from tank2sim.logs.reading import read_log
-from tests.logs.made_logs import frame, voyage
+from tests.logs.made_logs import frame, nmea_lines, sentence, voyage
 
 GPS_COLUMNS = "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U"
 GPS_FORMAT = "QBBIHBcLLeffffB"
@@ -125,3 +125,30 @@ def test_a_time_that_cannot_be_read_is_named(tmp_path) -> None:
     table.to_csv(tmp_path / "odd.csv", index=False)
     with pytest.raises(InputError, match="column"):
         read_log(tmp_path / "odd.csv")
+
+
+class TestSentences:
+    @pytest.fixture(autouse=True)
+    def _library(self) -> None:
+        pytest.importorskip("pynmea2")
+
+    def test_a_log_without_checksums_is_read_and_says_so(self, tmp_path) -> None:
+        lines = nmea_lines()
+        for name, text in (("with", lines), ("without", [line.split("*")[0] for line in lines])):
+            (tmp_path / f"{name}.nmea").write_text("\n".join(text) + "\n", encoding="ascii")
+        checked, unchecked = (read_log(tmp_path / f"{name}.nmea") for name in ("with", "without"))
+        assert unchecked.counts["corrupted"] == 0
+        assert any("checksum" in finding.text for finding in unchecked.findings)
+        for one, other in zip(checked.streams, unchecked.streams, strict=True):
+            np.testing.assert_array_equal(one.values, other.values)
+
+    def test_a_true_heading_with_a_status_is_a_heading(self, tmp_path) -> None:
+        lines = []
+        for line in nmea_lines():
+            words = line.split("*")[0].split(",")
+            status = "V" if len(lines) < 100 else "A"
+            lines.append(sentence(f"HETHS,{words[1]},{status}") if words[0].endswith("HDT") else line)
+        (tmp_path / "ths.nmea").write_text("\n".join(lines) + "\n", encoding="ascii")
+        (heading,) = (stream for stream in read_log(tmp_path / "ths.nmea").streams if stream.quantity == "heading")
+        valid = [line.split(",")[1] for line in lines[100:] if "THS" in line]
+        np.testing.assert_array_equal(heading.values, np.array(valid, dtype=float))

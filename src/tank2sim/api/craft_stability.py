@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tank2sim.analysis.stability.craft import CraftStability, StraightRun, craft_stability
+from tank2sim.analysis.stability.craft import CraftAtSpeed, CraftStability, craft_stability
 from tank2sim.api.result import Result, ResultTable
-from tank2sim.api.stability import rounded
+from tank2sim.api.stability import four_digits
 from tank2sim.cards import CraftCard
 from tank2sim.units import from_si
 
@@ -98,17 +98,17 @@ class CraftStabilityResult(Result):
         eigenvalues = ResultTable(
             "Eigenvalues of surge, sway and yaw",
             ("real (1/s)", "imaginary (1/s)", "time constant (s)"),
-            rounded([value.real, value.imag, -1 / value.real if value.real else None] for value in run.eigenvalues),
+            four_digits([value.real, value.imag, -1 / value.real if value.real else None] for value in run.eigenvalues),
         )
         by_speed = ResultTable(
             "By speed; K: deg/s by 100 rpm of port less starboard, times in s",
             ("m/s", "rpm", "stable", "surge", "K", "T", "T1", "T2", "T3"),
-            rounded(_row(one) for one in sorted((run, *study.speeds), key=lambda one: one.speed_mps)),
+            four_digits(_row(one) for one in sorted((run, *study.speeds), key=lambda one: one.speed_mps)),
         )
         turns = ResultTable(
             f"Steady turns about {from_si('n_rpm', run.revolutions_radps):.4g} rpm",
             ("difference (rpm)", "yaw rate (deg/s)", "speed (m/s)", "drift (deg)", "diameter (m)"),
-            rounded(
+            four_digits(
                 [
                     from_si("n_rpm", turn.difference_radps),
                     math.degrees(turn.yaw_rate_radps),
@@ -122,7 +122,7 @@ class CraftStabilityResult(Result):
         return eigenvalues, by_speed, turns
 
 
-def _row(run: StraightRun) -> list[object]:
+def _row(run: CraftAtSpeed) -> list[object]:
     per_100_rpm = math.degrees(run.K) * 100 / from_si("n_rpm", 1.0)
     times = (run.T_s, run.T1_s, run.T2_s, run.T3_s)
     return [

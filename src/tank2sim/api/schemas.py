@@ -463,6 +463,17 @@ class CandidateTrialKeys(_Part):
     determines: list[str]
 
 
+class OrderResponseKeys(_Part):
+    """How a thruster follows its orders; the dead band is None where no order left the propeller at rest."""
+
+    lag_s: float
+    lag_error_s: float
+    dead_band_rpm: float | None
+    dead_band_error_rpm: float | None
+    rest_rpm: float
+    turning_rpm: float
+
+
 class CraftIdentifyKeys(_Keys):
     """Coefficients and thrust curves of a craft with thrusters."""
 
@@ -473,6 +484,7 @@ class CraftIdentifyKeys(_Keys):
     noise: dict[str, float]
     determination: dict[str, Number] | None
     driven_by: str
+    order_responses: dict[str, OrderResponseKeys]
     held_out: list[str]
     next_trials: list[CandidateTrialKeys]
     notices: list[str]

@@ -45,7 +45,7 @@ _SMALL = 1e-6
 
 
 @dataclass(frozen=True)
-class StraightRun:
+class CraftAtSpeed:
     """A craft at a speed.
 
     Parameters
@@ -88,7 +88,7 @@ class StraightRun:
 
 
 @dataclass(frozen=True)
-class DifferenceTurn:
+class SteadyCraftTurn:
     """A steady turn: revolutions at port less at starboard (rad/s), and the motion in m/s, rad/s, rad, m."""
 
     difference_radps: float
@@ -105,21 +105,21 @@ class CraftStability:
     Parameters
     ----------
     name : str
-    run : StraightRun
+    run : CraftAtSpeed
         At the requested speed.
-    speeds : tuple of StraightRun
+    speeds : tuple of CraftAtSpeed
         At :data:`SPEED_SHARES` of the highest speed.
     highest_speed_mps : float
         That the thrusters hold.
-    turns : tuple of DifferenceTurn
+    turns : tuple of SteadyCraftTurn
         To starboard, about the revolutions of `run`.
     """
 
     name: str
-    run: StraightRun
-    speeds: tuple[StraightRun, ...]
+    run: CraftAtSpeed
+    speeds: tuple[CraftAtSpeed, ...]
     highest_speed_mps: float
-    turns: tuple[DifferenceTurn, ...]
+    turns: tuple[SteadyCraftTurn, ...]
 
 
 def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStability:
@@ -200,7 +200,7 @@ class _Craft:
         )
         return float(ahead[0])
 
-    def straight(self, speed: float) -> StraightRun:
+    def straight(self, speed: float) -> CraftAtSpeed:
         """The straight run at a speed, m/s."""
         mean, difference, sway = self._solved(
             lambda z: self.rates(np.array([speed, z[2], 0.0]), z[0], z[1]), np.array([0.5 * self.high, 0.0, 0.0])
@@ -214,7 +214,7 @@ class _Craft:
         )
         real = total**2 >= 4 * product
         T1 = 0.5 * (total + math.copysign(math.sqrt(total**2 - 4 * product), total)) if real else None
-        return StraightRun(
+        return CraftAtSpeed(
             speed_mps=speed,
             revolutions_radps=float(mean),
             eigenvalues=_sorted(np.linalg.eigvals(A)),
@@ -227,7 +227,7 @@ class _Craft:
             T3_s=T3,
         )
 
-    def turns(self, run: StraightRun) -> list[DifferenceTurn]:
+    def turns(self, run: CraftAtSpeed) -> list[SteadyCraftTurn]:
         """Steady turns to starboard about the revolutions of a straight run that are stable.
 
         A craft that is unstable on a straight course turns without a difference, too: that turn is the first.
@@ -238,7 +238,7 @@ class _Craft:
         found = [self._turn(run, share * most) for share in shares]
         return [turn for turn in found if turn is not None]
 
-    def _turn(self, run: StraightRun, difference: float) -> DifferenceTurn | None:
+    def _turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
         mean = run.revolutions_radps
         for curvature in _CURVATURES:
             rate = curvature * run.speed_mps / self.p[self.model.parameter_names.index("ship.length")]
@@ -250,7 +250,7 @@ class _Craft:
             A, _ = jacobians(self.model, self.point(solved.x, mean, difference), _RATES, _MOTION, [])
             if np.linalg.eigvals(A).real.max() < 0:
                 speed = math.hypot(u, v)
-                return DifferenceTurn(difference, speed, r, -math.asin(v / speed), 2 * speed / r)
+                return SteadyCraftTurn(difference, speed, r, -math.asin(v / speed), 2 * speed / r)
         return None
 
     def _solved(self, rates: Callable[[Array], Array], start: Array) -> Array:
