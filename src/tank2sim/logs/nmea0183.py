@@ -27,7 +27,7 @@ from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_lib
 _LINE = re.compile(rb"^(?P<stamp>.*?)(?P<body>[$!][^*$!]*)(?:\*(?P<sum>[0-9A-Fa-f]{2}))?\s*$")
 _LINE_WITH_SUM = re.compile(rb"[$!][^*]*\*[0-9A-Fa-f]{2}\s*$")
 _HEAD_BYTES = 65536
-"""Bytes by which a log with checksums is told from one without. Project choice: some thousand sentences."""
+"""Bytes in which a log that has checksums shows one. Project choice: some thousand sentences."""
 
 _TAG_TIME = re.compile(rb"\\(?:[^\\]*,)?c:(\d+)[,*]")
 _EPOCH = re.compile(rb"(?<![\d.])(\d{10}(?:\.\d+)?|\d{13})(?![\d.])")
