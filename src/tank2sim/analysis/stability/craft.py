@@ -13,9 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import root
 
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
@@ -268,5 +270,5 @@ class _Craft:
         return np.asarray(found.x, dtype=float)
 
 
-def _sorted(values: Array) -> tuple[complex, ...]:
+def _sorted(values: npt.NDArray[Any]) -> tuple[complex, ...]:
     return tuple(complex(value) for value in sorted(values, key=lambda value: -value.real))

@@ -168,7 +168,8 @@ def steering_page(
     )
     names = [thruster.name for thruster in thrusters]
     found = _controls(model, ghost)
-    rudder, *controls_left = [None, *found] if thrusters else found
+    rudder = None if thrusters else found[0]
+    controls_left = found if thrusters else found[1:]
     levers = levers_of(model)
     engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
     set_by_hand = [control for control in controls_left if control is not engine and control.name not in names]
@@ -185,7 +186,7 @@ def steering_page(
         engine=engine,
         levers=levers,
         thrusters=[control for control in found if control.name in names],
-        zigzag=round(CRAFT_ZIGZAG * levers[1].maximum, -1) if levers else 20,
+        zigzag=round(CRAFT_ZIGZAG * (levers[1].maximum or 0.0), -1) if levers else 20,
         zigzag_most=levers[1].maximum if levers else 89,
         pace=CRAFT_PACE if levers else PACE,
         speed_unit=_speed_unit(model),

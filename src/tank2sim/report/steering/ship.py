@@ -6,6 +6,7 @@ import base64
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, SHARES
 from tank2sim.dynamics.autopilot_loop import AUTOPILOT_ORDER
@@ -124,7 +125,7 @@ def levers_of(model: Model) -> list[Control]:
         return []
     rpm = from_si("n_rpm", 1.0)
     low, high = max(one.minimum for one in thrusters) * rpm, min(one.maximum for one in thrusters) * rpm
-    shared = {"unit": "rpm", "factor": rpm, "step": _SMALL["rpm"], "start": 0.0}
+    shared: dict[str, Any] = {"unit": "rpm", "factor": rpm, "step": _SMALL["rpm"], "start": 0.0}
     return [
         Control(name="surge", label="Both thrusters", minimum=low, maximum=high, **shared),
         Control(name="turn", label="Turn", minimum=low - high, maximum=high - low, **shared),
