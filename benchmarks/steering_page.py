@@ -52,7 +52,7 @@ MEASURE = """<script>{
     clearInterval(ready);
     const at = (name) => document.getElementById(name);
     at("factor").value = "PACE";
-    at("ahead").value = "6";
+    at("ahead").value = "360";
     at("course").value = "000";
     at("autopilot").click();
     at("view-3d")?.click();

@@ -24,10 +24,12 @@ from tank2sim.identification.craft.fit import (
     predict_free,
 )
 from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
+from tank2sim.identification.craft.order_response import OrderResponse, order_responses
 from tank2sim.identification.craft.problem import craft_driven_by, craft_problem
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.marks import CHECK
 from tank2sim.records.craft_trials import read_craft_trial
+from tank2sim.units import from_si
 
 CraftTrialPaths = str | Path | Sequence[str | Path]
 """Trials: a file, a folder with CSV files, or several of them."""
@@ -47,6 +49,8 @@ class CraftIdentificationResult(Result):
         Names of the held-out trials, those that are too short to be predicted with them.
     driven_by : str
         ``revolutions`` of the thrusters, or their ``orders``.
+    responses : mapping, optional
+        Thruster to its response to orders, where the trials hold them next to the revolutions.
     """
 
     command = "identify"
@@ -58,11 +62,12 @@ class CraftIdentificationResult(Result):
         predictions: Sequence[FreePrediction],
         held: Sequence[str] = (),
         driven_by: str = "revolutions",
+        responses: Mapping[str, OrderResponse] | None = None,
     ) -> None:
         assert isinstance(before.card, CraftCard)
         self.before, self.fit, self.predictions, self.held = before, fit, list(predictions), list(held)
-        self.driven_by = driven_by
-        self.card = identified_craft(before.card, fit)
+        self.driven_by, self.responses = driven_by, dict(responses or {})
+        self.card = identified_craft(before.card, fit, self.responses)
         self.notices = tuple(self._notices())
 
     def _notices(self) -> list[str]:
@@ -82,10 +87,32 @@ class CraftIdentificationResult(Result):
             notices.append(
                 "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
             )
+        notices += self._dead_band_notices()
         notices.append(
             "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
             "mass is one of all forces, in the same share"
         )
+        return notices
+
+    def _dead_band_notices(self) -> list[str]:
+        card = self.before.card
+        assert isinstance(card, CraftCard)
+        if not self.responses:
+            words = "orders" if self.driven_by == "orders" else "revolutions"
+            other = "revolutions" if self.driven_by == "orders" else "orders"
+            return [f"dead bands are those of the card: the trials have {words}, and need {other} next to them"]
+        notices = []
+        for thruster in card.thrusters:
+            response = self.responses.get(thruster.name)
+            if response is None or response.dead_band is not None:
+                continue
+            least = from_si("n_rpm", response.turning_radps)
+            text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
+            if thruster.dead_band_radps >= response.turning_radps:
+                text = f"{CHECK} {text}, and one of {least:.3g} rpm, within it, turned it"
+            else:
+                text += f"; one of {least:.3g} rpm turned it"
+            notices.append(text)
         return notices
 
     @property
@@ -138,6 +165,10 @@ class CraftIdentificationResult(Result):
             "noise": dict(self.fit.estimate.measurement_noise),
             "determination": self.determination,
             "driven_by": self.driven_by,
+            "order_responses": {
+                name: dict(zip(_RESPONSE_KEYS, _response_row(response), strict=True))
+                for name, response in self.responses.items()
+            },
             "held_out": self.held,
             "next_trials": [candidate.as_json() for candidate in self.next_trials],
             "notices": list(self.notices),
@@ -166,10 +197,24 @@ class CraftIdentificationResult(Result):
         """Coefficients with their verdict, and the next trials."""
         heads = ("SI", "value", "standard error", "card", "its error", "verdict", "mostly by")
         found = [ResultTable("Coefficients", heads, self._rows())]
+        if self.responses:
+            heads = ("thruster", "lag (s)", "its error", "dead band (rpm)", "its error", "rested at", "turned at")
+            responses = [[name, *_response_row(response)] for name, response in self.responses.items()]
+            found.append(ResultTable("Response to orders", heads, responses))
         rows = [[entry.words, ", ".join(entry.determines) or None] for entry in self.next_trials]
         if rows:
             found.append(ResultTable("Next five minutes", ("orders", "would determine"), rows))
         return tuple(found)
+
+
+_RESPONSE_KEYS = ("lag_s", "lag_error_s", "dead_band_rpm", "dead_band_error_rpm", "rest_rpm", "turning_rpm")
+
+
+def _response_row(response: OrderResponse) -> list[object]:
+    band, error = response.dead_band or (None, None)
+    speeds = (band, error, response.rest_radps, response.turning_radps)
+    rpm = [None if speed is None else float(from_si("n_rpm", speed)) for speed in speeds]
+    return [response.lag_s, response.lag_error_s, *rpm]
 
 
 def identify_craft(
@@ -232,7 +277,9 @@ def identify_craft(
         remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
         raise InputError(ship.card.source, "", "does not move as the trials do, not even roughly", remedy) from None
     predictions = predict_free(fit, runs[len(fitted) :]) if held else []
-    return CraftIdentificationResult(ship, fit, predictions, [run.name for run in runs[len(fitted) :]], driven_by)
+    responses = order_responses(ship.card, read[: len(fitted)])
+    names = [run.name for run in runs[len(fitted) :]]
+    return CraftIdentificationResult(ship, fit, predictions, names, driven_by, responses)
 
 
 def craft_trial_files(paths: CraftTrialPaths) -> list[Path]:

@@ -233,6 +233,27 @@ class StabilityKeys(_Keys):
     ensemble: NotRequired[StabilityEnsembleKeys]
 
 
+class DifferenceTurnKeys(_Part):
+    """A steady turn of a craft; difference, yaw rate and drift positive in a turn to starboard."""
+
+    difference_rpm: float
+    speed_mps: float
+    yaw_rate_degps: float
+    drift_deg: float
+    diameter_m: float
+
+
+class CraftStabilityKeys(_Keys):
+    """Straight-line stability, surge and turning of a craft with thrusters."""
+
+    ship: str
+    straight_run: dict[str, Any]
+    speeds: list[dict[str, Any]]
+    highest_speed_mps: float
+    difference_turns: list[DifferenceTurnKeys]
+    notices: list[str]
+
+
 class ExportKeys(_Keys):
     """An FMU that was made."""
 
@@ -443,6 +464,17 @@ class CandidateTrialKeys(_Part):
     determines: list[str]
 
 
+class OrderResponseKeys(_Part):
+    """How a thruster follows its orders; the dead band is None where no order left the propeller at rest."""
+
+    lag_s: float
+    lag_error_s: float
+    dead_band_rpm: float | None
+    dead_band_error_rpm: float | None
+    rest_rpm: float
+    turning_rpm: float
+
+
 class CraftIdentifyKeys(_Keys):
     """Coefficients and thrust curves of a craft with thrusters."""
 
@@ -453,6 +485,7 @@ class CraftIdentifyKeys(_Keys):
     noise: dict[str, float]
     determination: dict[str, Number] | None
     driven_by: str
+    order_responses: dict[str, OrderResponseKeys]
     held_out: list[str]
     next_trials: list[CandidateTrialKeys]
     notices: list[str]
@@ -1172,7 +1205,7 @@ KEYS: dict[str, Any] = {
     "ships": ShipsKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,
-    "stability": StabilityKeys,
+    "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
     "tow": TowKeys,
     "validate": ValidateKeys,

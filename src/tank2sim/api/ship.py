@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tank2sim.api.autopilot import AutopilotResult
     from tank2sim.api.bridge import PilotCardResult, PosterResult
     from tank2sim.api.craft_autopilot import CraftAutopilotResult
+    from tank2sim.api.craft_stability import CraftStabilityResult
     from tank2sim.api.fmu import ExportResult
     from tank2sim.api.glide import GlideResult
     from tank2sim.api.influence import InfluenceResult, TuningResult
@@ -309,8 +310,8 @@ class Ship:
         members: int = 0,
         seed: int = 0,
         executor: str = PROCESSES,
-    ) -> StabilityResult:
-        """Straight-line stability, steady turning and the IMO criteria.
+    ) -> StabilityResult | CraftStabilityResult:
+        """Straight-line stability, steady turning and the IMO criteria; of a craft what is not of a rudder.
 
         Parameters
         ----------
@@ -324,8 +325,15 @@ class Ship:
         Raises
         ------
         InputError
-            The ship holds no straight course.
+            The ship holds no straight course; an ensemble of a craft.
         """
+        if isinstance(self.card, CraftCard):
+            from tank2sim.api.craft_stability import judge_craft_stability
+
+            if members:
+                problem = "is of the IMO criteria, which a craft without a rudder has not"
+                raise InputError("--ensemble", "", problem, "leave it out")
+            return judge_craft_stability(self, speed_mps)
         from tank2sim.api.stability import judge_stability
 
         return judge_stability(self, speed_mps, spirals=spirals, ensemble=EnsembleOptions(members, seed, executor))

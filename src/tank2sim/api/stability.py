@@ -112,17 +112,19 @@ class StabilityResult(PagedResult):
         eigenvalues = ResultTable(
             f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in found.effect_states)}",
             ("real (1/s)", "imaginary (1/s)", "time constant (s)"),
-            _rounded([value.real, value.imag, -1 / value.real if value.real else None] for value in found.eigenvalues),
+            four_digits(
+                [value.real, value.imag, -1 / value.real if value.real else None] for value in found.eigenvalues
+            ),
         )
         nomoto = ResultTable(
             f"Nomoto{' (slow motions)' if found.effect_states else ''}",
             ("", "K", "T", "T1", "T2", "T3"),
-            _rounded([["1/s and s", *vars(found.nomoto).values()], ["prime", *vars(found.nomoto_prime).values()]]),
+            four_digits([["1/s and s", *vars(found.nomoto).values()], ["prime", *vars(found.nomoto_prime).values()]]),
         )
         influences = ResultTable(
             "Largest influences on C'",
             ("coefficient", "C' for 10 % more (%)", "change to neutral (%)"),
-            _rounded(
+            four_digits(
                 [influence.short_name, influence.percent, influence.neutral_percent]
                 for influence in margin.influences[:STRONGEST]
             ),
@@ -218,11 +220,17 @@ def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:
         rows.append([criterion.name + number, criterion.found, criterion.allowed, criterion.unit, met, margin])
     columns = ("criterion", "found", "allowed", "unit", "met", "margin (%)")
     notes = tuple(f"({number}) {text}" for number, text in enumerate(remarks, 1))
-    return ResultTable("IMO MSC.137(76), worse side", columns, _rounded(rows), notes)
+    return ResultTable("IMO MSC.137(76), worse side", columns, four_digits(rows), notes)
 
 
-def _rounded(rows: Iterable[Sequence[object]]) -> list[list[object]]:
-    """Numbers of four digits, for which the tables have room on a screen of 80 columns."""
+def four_digits(rows: Iterable[Sequence[object]]) -> list[list[object]]:
+    """Numbers of four digits, for which the tables have room on a screen of 80 columns.
+
+    Parameters
+    ----------
+    rows : iterable of sequences
+        Cells of each row; what is not a number stays.
+    """
     return [[float(f"{cell:.4g}") if isinstance(cell, float) else cell for cell in row] for row in rows]
 
 

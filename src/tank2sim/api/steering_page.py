@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship
-from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -136,15 +136,34 @@ def make_steering_page(
         Called before what takes long.
     """
     from tank2sim.identification.trials.problem.prepare_trials import measured
-    from tank2sim.native.cross import has_compiled
     from tank2sim.report.steering import ship as page_ship
     from tank2sim.report.steering.ghost import ghost_of
     from tank2sim.report.steering.members import members_of
     from tank2sim.report.steering.scenario import read_scenario
 
     card, model = ship.card, ship.model
+    if isinstance(card, CraftCard):
+        if ghost:
+            raise InputError(
+                "--ghost", "", "is a trial with a rudder, and a craft with thrusters has none", "leave it out"
+            )
+        library = _compiled(model, report)
+        return SteeringPageResult(
+            ship,
+            model,
+            library,
+            None,
+            model.notices,
+            scenario=read_scenario(scenario) if scenario else None,
+            view_3d=view_3d,
+        )
     if not isinstance(card, ManoeuvringCard):
-        raise InputError(card.source, "", "has no rudder", "only a ship (kind linear, abkowitz or mmg) can be steered")
+        raise InputError(
+            card.source,
+            "",
+            "has no rudder",
+            "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered",
+        )
     if ghost and scenario:
         raise InputError("--scenario", "", "goes not with --ghost", "both say where the ship starts: leave one out")
     waters = read_scenario(scenario) if scenario else None
@@ -153,14 +172,22 @@ def make_steering_page(
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)
     model, autopilot, no_autopilot = _with_autopilot(model)
-    library = None
-    if page_ship.has_compiler():
-        if not has_compiled(page_ship.WEB):
-            report(FIRST_COMPILATION)
-        library = page_ship.ship_in_page(model)
+    library = _compiled(model, report)
     notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
     members = members_of(card, model)
     return SteeringPageResult(ship, model, library, shown, notices, members, autopilot, waters, view_3d)
+
+
+def _compiled(model: Model, report: Callable[[str], None]) -> str | None:
+    """The library of a model; None without the compiler."""
+    from tank2sim.native.cross import has_compiled
+    from tank2sim.report.steering import ship as page_ship
+
+    if not page_ship.has_compiler():
+        return None
+    if not has_compiled(page_ship.WEB):
+        report(FIRST_COMPILATION)
+    return page_ship.ship_in_page(model)
 
 
 def _with_autopilot(model: Model) -> tuple[Model, str, tuple[str, ...]]:

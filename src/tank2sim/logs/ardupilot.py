@@ -44,11 +44,13 @@ _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
         "DirTrue": ("deg", "wind_direction"),
         "SpdTrue": ("m/s", "wind_speed"),
     },
-    "RPM": {"RPM": ("rpm", "rpm")},
+    "RPM": {"RPM": ("rpm", "rpm"), "rpm1": ("rpm", "rpm"), "rpm2": ("rpm", "rpm")},
+    "ESC": {"RPM": ("rpm", "rpm")},
 }
+_FIELDS["GPS2"] = _FIELDS["GPS"]
 """Fields of dataflash messages: ardupilot.org, "Onboard message log messages" of Rover."""
 
-_INSTANCES = ("I", "C", "Inst")
+_INSTANCES = ("I", "C", "Inst", "Instance")
 _COMMONEST = 3
 """Status of a GPS fix in three dimensions (GPS_STATUS of ArduPilot); less is not a fix, except 2, a fix in two."""
 
@@ -74,33 +76,39 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     except Exception as error:  # the library lets errors of struct through
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
         raise InputError(path, "", problem, "give a whole dataflash log") from None
-    gps = tables.get(("GPS", 0))
-    if gps is None or not {"GWk", "GMS"} <= set(gps) or not (gps["GWk"] > 0).any():
-        raise InputError(path, "", "holds no time of a GPS", "log GPS messages, or export the log with UTC")
+    receivers = [
+        table for (kind, _), table in tables.items() if kind.startswith("GPS") and {"GWk", "GMS"} <= set(table)
+    ]
+    gps = next((table for table in receivers if _has_fix(table).any()), None)
+    if gps is None:
+        raise InputError(
+            path, "", "holds no fix of a GPS with its time", "log GPS messages, or export the log with UTC"
+        )
     utc = GPS_EPOCH_S + _WEEK_S * gps["GWk"] + gps["GMS"] / 1000 - LEAP_SECONDS
-    fixed = (gps["GWk"] > 0) & (gps.get("Status", np.full(len(utc), _COMMONEST)) >= 2)
+    lag = (gps["TimeUS"] * 1e-6 - utc)[_has_fix(gps)]
     # The message is written after the fix was measured: the least difference has the least delay.
-    boot = float(np.min(gps["TimeUS"][fixed] * 1e-6 - utc[fixed]))
+    boot = float(np.min(lag))
     findings: list[LogFinding] = []
-    if (spread := float(np.ptp(gps["TimeUS"][fixed] * 1e-6 - utc[fixed]))) > 1.0:
+    if (spread := float(np.ptp(lag))) > 1.0:
+        boot = float(np.median(lag))
         text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
         findings.append(LogFinding("fault", text, "GPS"))
     streams = []
     for (kind, instance), table in tables.items():
         time = table["TimeUS"] * 1e-6 - boot
-        label = kind if instance in (0, None) and (kind, 1) not in tables else f"{kind}[{instance}]"
+        label = kind if instance in (0, None) and (kind, 1) not in tables else f"{kind}[{instance:.0f}]"
         for field, (unit, quantity) in _FIELDS.get(kind, {}).items():
             if field not in table or (kind == "XKF1" and instance):
                 continue
             values, stamps = table[field], time
-            if kind == "GPS":
+            if kind in ("GPS", "GPS2") and {"GWk", "GMS"} <= set(table):
                 at = GPS_EPOCH_S + _WEEK_S * table["GWk"] + table["GMS"] / 1000 - LEAP_SECONDS
                 stamps = at if not findings else time
                 values = np.where(table.get("Status", np.full(len(at), _COMMONEST)) >= 2, values, np.nan)
             stated = unit_of_text(units.get((kind, field), "")) or unit
             meaning = (quantity, "format")
-            if kind == "RPM" and ("RPM", 1) in tables:  # a guess, which the turn confirms or not
-                meaning = ("rpm_port" if instance == 0 else "rpm_starboard", "")
+            if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
+                meaning = _shaft(field, instance, table, sum(other == kind for other, _ in tables))
             streams.append(LogStream(f"{label}.{field}", stamps, values, stated, *meaning))
         if kind == "RCOU":
             streams += list(_servo_orders(time, table, params))
@@ -108,6 +116,25 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
         raise InputError(path, "", "no message of it is understood", "log GPS, ATT, IMU and RCOU")
     counts = {"messages": sum(len(table["TimeUS"]) for table in tables.values())}
     return VesselLog(path, "ArduPilot dataflash", tuple(streams), counts, tuple(findings))
+
+
+def _has_fix(table: Mapping[str, Array]) -> Array:
+    """Where a table of a GPS (n,) has a time, and a fix in two or three dimensions."""
+    return np.asarray((table["GWk"] > 0) & (table.get("Status", np.full(len(table["GWk"]), _COMMONEST)) >= 2))
+
+
+def _shaft(field: str, instance: Any, table: Mapping[str, Array], instances: int) -> tuple[str, str]:
+    """Quantity of revolutions, and by what it is known: of the only one by the format, of two it is a guess.
+
+    ``rpm2`` of a single sensor is -1 throughout.
+    """
+    second = table.get("rpm2")
+    if field in ("rpm1", "rpm2") and second is not None and np.nanmax(np.abs(second), initial=0.0) <= 1:
+        return ("rpm", "format") if field == "rpm1" else ("", "")
+    if field not in ("rpm1", "rpm2") and instances == 1:
+        return "rpm", "format"
+    number = int(field[-1]) - 1 if field in ("rpm1", "rpm2") else instance
+    return {0: "rpm_port", 1: "rpm_starboard"}.get(number, ""), ""
 
 
 _Tables = dict[tuple[str, Any], dict[str, Array]]

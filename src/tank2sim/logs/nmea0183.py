@@ -25,6 +25,10 @@ from tank2sim.logs.clock import continued_clock
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
 
 _LINE = re.compile(rb"^(?P<stamp>.*?)(?P<body>[$!][^*$!]*)(?:\*(?P<sum>[0-9A-Fa-f]{2}))?\s*$")
+_LINE_WITH_SUM = re.compile(rb"[$!][^*]*\*[0-9A-Fa-f]{2}\s*$")
+_HEAD_BYTES = 65536
+"""Bytes in which a log that has checksums shows one. Project choice: some thousand sentences."""
+
 _TAG_TIME = re.compile(rb"\\(?:[^\\]*,)?c:(\d+)[,*]")
 _EPOCH = re.compile(rb"(?<![\d.])(\d{10}(?:\.\d+)?|\d{13})(?![\d.])")
 _ISO = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?)Z?")
@@ -83,10 +87,11 @@ def looks_like_nmea0183(head: bytes) -> bool:
 
 
 def read_nmea0183(path: Path) -> VesselLog:
-    """Read the sentences RMC, GGA, VTG, HDT, HDG, HDM, ROT, RSA, RPM, VBW, VHW, MWV of a log of NMEA 0183.
+    """Read the sentences RMC, GGA, VTG, HDT, THS, HDG, HDM, ROT, RSA, RPM, VBW, VHW, MWV of a log of NMEA 0183.
 
-    Sentences with a wrong checksum are left out and counted, as are those of other ships (AIS). Sentences that name no
-    valid fix, rate, rudder or speed (status V) hold no value. A talker that takes over from another (GP, then GN) is
+    Sentences with a wrong checksum, or without one in a log that has them, are left out and counted, as are those of
+    other ships (AIS). Sentences that name no valid fix, rate, rudder or speed (status V) hold no value. A talker that
+    takes over from another (GP, then GN) is
     the same instrument; talkers that send at the same time are two, and have streams of their own.
 
     Raises
@@ -97,6 +102,8 @@ def read_nmea0183(path: Path) -> VesselLog:
     reader = _Reader(path)
     try:
         with path.open("rb") as file:
+            reader.checked = any(_LINE_WITH_SUM.search(line) for line in file.read(_HEAD_BYTES).splitlines())
+            file.seek(0)
             for number, line in enumerate(file):
                 reader.take(number, line)
     except OSError as error:
@@ -109,6 +116,7 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.checked = True
         self.counts: Counter[str] = Counter()
         self.kinds: Counter[str] = Counter()
         self.series: dict[tuple[str, str], dict[str, _Series]] = defaultdict(lambda: defaultdict(_Series))
@@ -128,6 +136,7 @@ class _Reader:
             "RPM": self._rpm,
             "MWV": self._mwv,
             "ZDA": self._zda,
+            "THS": self._ths,
         }
 
     def take(self, number: int, raw: bytes) -> None:
@@ -135,7 +144,7 @@ class _Reader:
             return
         self.counts["lines"] += 1
         match = _LINE.match(raw.rstrip())
-        if match is None or match["sum"] is None or reduce(xor, match["body"][1:], 0) != int(match["sum"], 16):
+        if match is None or not self._intact(match["body"], match["sum"]):
             self.counts["corrupted"] += 1
             return
         body = match["body"]
@@ -154,6 +163,11 @@ class _Reader:
                 self._plain(number, talker, kind, cells[1:])
         except (ValueError, IndexError):
             self.counts["malformed"] += 1
+
+    def _intact(self, body: bytes, total: bytes | None) -> bool:
+        if total is None:
+            return not self.checked
+        return reduce(xor, body[1:], 0) == int(total, 16)
 
     def _add(self, number: int, talker: str, name: str, value: float, stated: tuple[str, str]) -> None:
         series = self.series[name.partition(".")[0], talker][name]
@@ -209,6 +223,10 @@ class _Reader:
         quantity = "rpm" if shaft == 0 else "rpm_starboard" if shaft % 2 else "rpm_port"
         self._add(number, talker, f"RPM.{cells[0]}{shaft}", float(cells[2]), ("rpm", quantity))
 
+    def _ths(self, number: int, talker: str, cells: list[str]) -> None:
+        if cells[0] and cells[1][:1] in ("A", "E"):  # by a compass, or estimated; not by hand, simulated, or not valid
+            self._add(number, talker, "THS.heading", float(cells[0]), ("deg", "heading"))
+
     def _mwv(self, number: int, talker: str, cells: list[str]) -> None:
         if cells[4] != "A":
             return
@@ -239,6 +257,8 @@ class _Reader:
         counts = {"lines": self.counts["lines"], "corrupted": self.counts["corrupted"]}
         counts |= {key: self.counts[key] for key in ("malformed", "ais", "proprietary") if self.counts[key]}
         counts["dropped"] = sum(_lost(stream.time_s) for stream in streams if stream.name.startswith("HDT"))
+        if not self.checked:
+            findings.append(LogFinding("note", "no sentence has a checksum, so that none is tested for errors"))
         if spoilt := self.counts["corrupted"] + self.counts["malformed"]:
             text = f"{spoilt} of {self.counts['lines']} lines are corrupted (wrong checksum or cut) and left out"
             findings.append(LogFinding("note", text, evidence={"share": spoilt / self.counts["lines"]}))

@@ -37,6 +37,7 @@ _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
 down."""
 _FIELDS["vehicle_gps_position"] = _FIELDS["sensor_gps"]
 
+_RECEIVERS = ("sensor_gps", "vehicle_gps_position")
 _AIRFRAME_ROVER_DIFFERENTIAL = 6
 """CA_AIRFRAME of two motors that steer by their difference (docs.px4.io, parameter reference)."""
 
@@ -60,8 +61,11 @@ def read_px4_ulog(path: Path) -> VesselLog:
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
         raise InputError(path, "", problem, "give a whole ULog") from None
     topics = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
-    gps = next((data for (name, _), data in topics.items() if name in ("sensor_gps", "vehicle_gps_position")), None)
-    if gps is None or not (gps.get("time_utc_usec", np.zeros(1)) > 0).any():
+    if any(name == "vehicle_gps_position" for name, _ in topics):  # the same fixes, or those of all receivers as one
+        topics = {(name, instance): data for (name, instance), data in topics.items() if name != "sensor_gps"}
+    receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
+    gps = next((data for data in receivers if _utc_of(data).any()), None)
+    if gps is None:
         raise InputError(path, "", "holds no UTC of a GPS", "log sensor_gps")
     boot, findings = _boot(gps)
     airframe = int(log.initial_parameters.get("CA_AIRFRAME", -1))
@@ -74,6 +78,11 @@ def read_px4_ulog(path: Path) -> VesselLog:
     if lost := sum(dropout.duration for dropout in log.dropouts):
         findings.append(LogFinding("note", f"{len(log.dropouts)} dropouts of the logger, {lost / 1000:.3g} s in all"))
     return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings))
+
+
+def _utc_of(data: dict[str, Any]) -> Array:
+    """UTC of the fixes of a receiver (n,), us since 1970; 0 where it is not known."""
+    return np.asarray(data.get("time_utc_usec", np.zeros(len(data["timestamp"]))))
 
 
 def _boot(gps: dict[str, Any]) -> tuple[float, list[LogFinding]]:
@@ -90,8 +99,8 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
     for (name, instance), data in topics.items():
         time = data["timestamp"] * 1e-6 - boot
         label = name if instance == 0 and (name, 1) not in topics else f"{name}[{instance}]"
-        if name in ("sensor_gps", "vehicle_gps_position") and (data["time_utc_usec"] > 0).all():
-            utc = data["time_utc_usec"] * 1e-6
+        if name in _RECEIVERS and (_utc_of(data) > 0).all():
+            utc = _utc_of(data) * 1e-6
             time = utc if np.ptp(data["timestamp"] * 1e-6 - utc) <= 1.0 else time
         for field, (unit, quantity) in _FIELDS.get(name, {}).items():
             if field in data:
@@ -106,8 +115,19 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
             roll, _, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
             yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
             yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
+        if name == "esc_status":
+            yield from _speeds(label, time, data)
         if name in ("actuator_motors", "actuator_servos"):
             yield from _orders(name, time, data, airframe)
+
+
+def _speeds(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    """Revolutions that speed controllers report; of two, PX4 numbers the right one first, which the turn confirms."""
+    keys = [key for key in data if key.endswith(".esc_rpm") and np.abs(data[key].astype(float)).max() > 0]
+    quantities = ("rpm",) if len(keys) == 1 else ("rpm_starboard", "rpm_port")
+    for place, key in enumerate(sorted(keys)):
+        quantity = quantities[place] if place < len(quantities) else ""
+        yield LogStream(f"{label}.{key}", time, data[key].astype(float), "rpm", quantity, "")
 
 
 def _orders(name: str, time: Array, data: dict[str, Any], airframe: int) -> Iterator[LogStream]:

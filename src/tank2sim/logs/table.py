@@ -86,6 +86,11 @@ def read_table_log(path: Path) -> VesselLog:
             LogFinding("note", f"rows have cells beyond the {len(layout.names)} columns; they are not read")
         )
     time, dated, used = _time(path, frame, findings)
+    if not np.isfinite(time).any():
+        name = sorted(used, key=list(frame.columns).index)[-1]
+        first = next((str(value) for value in frame[name].dropna()[:1]), "")
+        remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
+        raise InputError(path, f"column {name}", f"holds no time that can be read, as {first[:40]!r}", remedy)
     streams = [
         _stream(name, unit, time, values)
         for name, unit in zip(layout.names, layout.units, strict=True)
@@ -204,9 +209,19 @@ def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
         )
     year = parts[order[0]].where(parts[order[0]].str.len() == 4, "20" + parts[order[0]])
     joined = year + "-" + parts[order[1]].str.zfill(2) + "-" + parts[order[2]].str.zfill(2)
-    clock = parts[3].fillna("")
+    clock = _of_24_hours(parts[3].fillna(""))
     joined = joined.where(clock == "", joined + "T" + clock)
     return pd.to_datetime(joined, format="ISO8601", utc=True, errors="coerce")
+
+
+def _of_24_hours(clock: pd.Series[Any]) -> pd.Series[Any]:
+    """Times of day of which some may end with AM or PM."""
+    import pandas as pd
+
+    parts = clock.str.extract(r"^\s*(\d{1,2})(:\S*)\s*([AaPp])\.?\s?[Mm]\.?\s*$")
+    hours = pd.to_numeric(parts[0], errors="coerce") % 12 + 12 * parts[2].str.lower().eq("p")
+    halved = hours.fillna(0).astype(int).astype(str).str.zfill(2) + parts[1].fillna("")
+    return clock.where(parts[0].isna(), halved)
 
 
 def _seconds(moments: pd.Series[Any], offset_s: float) -> Array:

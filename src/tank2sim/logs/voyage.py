@@ -14,6 +14,7 @@ from tank2sim.logs.channel_search import find_channels
 from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
+from tank2sim.logs.parts import joined_parts
 from tank2sim.logs.quantities import QUANTITIES
 from tank2sim.logs.reference import HEADING_WINDOW_S, differenced, local_metres, rounded_origin
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
@@ -76,24 +77,26 @@ class Voyage:
 
 
 def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -> Voyage:
-    """Join logs: find or take their channels, convert them to SI, and bring positions to local metres.
+    """Join logs, files that follow each other as one: find or take their channels, convert them to SI, and bring
+    positions to local metres.
 
     Raises
     ------
     InputError
         A channel names a stream that no log has, or nothing in the logs is understood.
     """
-    findings = [finding for log in logs for finding in log.findings]
+    parts = joined_parts(logs)
+    findings = [finding for log in parts for finding in log.findings]
     counts: dict[str, dict[str, int]] = {log.path.name: dict(log.counts) for log in logs}
     streams: list[LogStream] = []
-    for log in logs:
+    for log in parts:
         repeated = 0
         for stream in log.streams:
             tidy, doubled, found_in_time = tidied(stream)
             repeated += doubled
             findings += found_in_time
             if len(tidy.values):
-                name = stream.name if len(logs) == 1 else f"{log.path.stem}: {stream.name}"
+                name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
                 streams.append(replace(tidy, name=name))
         counts[log.path.name]["repeated_samples"] = repeated
     findings = _gathered(findings)
@@ -102,8 +105,8 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
         raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
     found = channels or find_channels(streams)
     findings += found.findings
-    if len(logs) > 1 and channels is None:
-        findings += _clock_findings([log.path.stem for log in logs], found, streams)
+    if len(parts) > 1 and channels is None:
+        findings += _clock_findings([log.path.stem for log in parts], found, streams)
     named = {stream.name: stream for stream in streams}
     series: dict[str, QuantitySeries] = {}
     for channel in found.channels:

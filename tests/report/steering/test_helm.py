@@ -182,7 +182,7 @@ class TestInABrowser:
         seen.times = helm().members.map((one) => one.voyage.time);
         press("a"); const steered = helm().own.ahead(60, 60); sail(60);
         seen.steered = [steered[1].x, pose(helm().own)[0]];
-        at("ahead").value = "6"; at("ahead").dispatchEvent(new Event("change", { bubbles: true })); press("v");
+        at("ahead").value = "360"; at("ahead").dispatchEvent(new Event("change", { bubbles: true })); press("v");
         press("g");
         seen.whole = pressed("whole"); press("+"); seen.free = pressed("whole");
         press("f"); seen.follow = pressed("follow"); seen.shown = at("members").checked;

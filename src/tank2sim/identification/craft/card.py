@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from tank2sim.cards.card import CraftCard
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.cards.small_craft import craft_scale, craft_scales
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.identification.craft.fit import CraftFit
+from tank2sim.identification.craft.order_response import OrderResponse
 from tank2sim.identification.craft.problem import twins
+from tank2sim.units import from_si
 
 _KEYS = {part: key for key, part in THRUSTER_PARAMETERS.items()}
 
 
-def identified_craft(card: CraftCard, fit: CraftFit) -> CraftCard:
+def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, OrderResponse] | None = None) -> CraftCard:
     """The card with the estimates and their standard errors, in the scaling of its own text.
 
     Parameters
@@ -20,8 +24,24 @@ def identified_craft(card: CraftCard, fit: CraftFit) -> CraftCard:
     card : CraftCard
         That the problem was made of; numbers that were not estimated stay.
     fit : CraftFit
+    responses : mapping, optional
+        Thruster to its response to orders: lag, and dead band where it is determined.
     """
     changes: dict[str, object] = {}
+    for number, thruster in enumerate(card.thrusters):
+        response = (responses or {}).get(thruster.name)
+        if response is None:
+            continue
+        place = f"thrusters.{number}"
+        changes[f"{place}.time_constant_s"] = float(response.lag_s)
+        changes[f"{place}.uncertainty.time_constant_s"] = float(response.lag_error_s)
+        if response.dead_band is None:
+            continue
+        in_rpm = card.spelt.get(f"{place}.dead_band_radps", "").endswith("_rpm")
+        key, unit = ("dead_band_rpm", from_si("n_rpm", 1.0)) if in_rpm else ("dead_band_radps", 1.0)
+        value, error = response.dead_band
+        changes[f"{place}.{key}"] = float(value * unit)
+        changes[f"{place}.uncertainty.{key}"] = float(error * unit)
     scales = craft_scales(card)
     shared = twins(card)
     estimates = zip(fit.problem.free, fit.estimate.values, fit.estimate.standard_errors, strict=True)

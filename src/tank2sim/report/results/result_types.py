@@ -51,6 +51,12 @@ RESULT_TYPES = (
         ("stability_criterion.stable", "stability_criterion.C_prime"),
     ),
     ResultType(
+        "Stability of a craft",
+        "stability",
+        ("straight_run", "difference_turns"),
+        ("straight_run.stable", "straight_run.surge_time_constant_s"),
+    ),
+    ResultType(
         "Heading control", "autopilot", ("ship", "design", "gains"), ("design", "margins.at_design.phase_margin_deg")
     ),
     ResultType(

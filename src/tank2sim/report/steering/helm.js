@@ -52,7 +52,7 @@ class Helm {
   order(name, value) {
     let ended = null;
     this.#all("o", [name, value], (voyage) => {
-      const left = name === "rudder.command" ? voyage.release() : null; // a member's zigzag may last longer
+      const left = voyage.steers(name) ? voyage.release() : null; // a member's zigzag may last longer
       if (voyage === this.own) ended = left;
       voyage.order(name, value);
     });
@@ -92,7 +92,7 @@ class Helm {
 
   #judge() {
     if (!this.score) return null;
-    const [x, y, psi, u, v] = Voyage.SIGNALS.map((name) => this.own.samples[name].at(-1));
+    const [x, y, psi, u, v] = Voyage.MOTION.map((name) => this.own.samples[name].at(-1));
     this.score.look(this.time, this.members);
     return this.score.take(this.time, x, y, psi, Math.hypot(u, v));
   }

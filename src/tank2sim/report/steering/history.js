@@ -4,7 +4,7 @@ class HistoryChart {
   static LEAST = 30; // deg either way that the axis shows at least: most rudders and headings of trials
 
   constructor(canvas, data, stretch) {
-    Object.assign(this, { canvas, ghost: data.ghost, stretch });
+    Object.assign(this, { canvas, ghost: data.ghost, thrusters: data.thrusters, stretch });
   }
 
   draw(samples, paper = false) {
@@ -20,7 +20,7 @@ class HistoryChart {
     const up = (value) => box.top + (high - value) / (high - low) * box.up;
     const times = ticks(span.begin, span.end, box.across / 90);
     axes(pen, colour, box, { values: times, at: across, title: "t (s)" },
-      { values: marks(box.up), at: up, title: "angle (deg)" });
+      { values: marks(box.up), at: up, title: this.thrusters.length > 0 ? "deg, %" : "angle (deg)" });
     pen.save();
     pen.beginPath();
     pen.rect(box.left, box.top, box.across, box.up);
@@ -64,9 +64,19 @@ class HistoryChart {
       found.push(made(t, changed(psi), { colour: colour.other, width: 1.6 }));
     }
     const { t } = samples;
-    found.push(made(t, deg(samples["rudder.angle"]), { colour: colour.own, dash, width: 1.6 }));
+    found.push(made(t, this.#steering(samples, deg), { colour: colour.own, dash, width: 1.6 }));
     found.push(made(t, changed(samples["motion.psi"]), { colour: colour.own, width: 2.2 }));
     return found;
+  }
+
+  // The rudder (deg), or the difference of a craft's revolutions in % of the largest that it can be.
+  #steering(samples, deg) {
+    if (this.thrusters.length === 0) return deg(samples["rudder.angle"]);
+    const levers = new Levers(this.thrusters);
+    const most = levers.high - levers.low;
+    const at = (row) => ([name]) => [name, samples[name.replace("command", "speed")][row]];
+    const now = (row) => Object.fromEntries(levers.names.map((name) => at(row)([name])));
+    return (row) => 100 * levers.read(now(row)).difference / most;
   }
 
   #range(lines) {

@@ -1,4 +1,6 @@
 // The bridge: what the hand sets on one side, the voyage on the other.
+const LEVER_STEP = 0.1; // of a lever's way by a key or a button of a gamepad (project choice)
+const LEVER_KEYS = [["u", "j"], ["i", "k"]]; // up and down of the first two thrusters
 (async () => {
   const data = JSON.parse(document.getElementById("ship").textContent);
   const find = (name) => document.getElementById(name);
@@ -8,12 +10,15 @@
   const history = new HistoryChart(find("history"), data, Number(find("stretch").value));
   const tape = new HeadingTape(find("tape"));
   const turning = new Dial(find("turning"), data.turning[0], data.turning);
+  const levers = data.thrusters.length > 0 ? new Levers(data.thrusters) : null; // a craft has no rudder
   const rudderDial = new Dial(find("rudder-dial"), data.largestRudder);
   const gamepad = new GamepadHelm();
   const sliders = Object.fromEntries(
     data.controls.map((one) => [one.name, { ...one, input: find(`set-${one.name}`) }]));
   const rudder = sliders["rudder.command"];
   const engine = sliders["propeller.speed"];
+  const both = levers && Object.fromEntries(data.levers.map((one) => [one.name, { ...one, input: find(`set-${one.name}`) }]));
+  const helms = levers ? levers.names.map((name) => sliders[name]) : [rudder, ...(engine ? [engine] : [])];
   const telegraph = engine &&
     new Telegraph(find("telegraph"), data.telegraph, (value) => order(engine, value * engine.factor));
   let helm = null;
@@ -25,6 +30,7 @@
   let sharing = false; // the address is about to change by the page itself
   let predicted = { at: -Infinity, places: [] };
   const held = {}; // inputs set by hand, but rudder and engine, SI
+  let wanted = null; // of a craft: the mean and the difference that were asked for, rad/s; the turn may hold back the mean
   let approach = {}; // as the page was written, to the last digit, until it is set by hand
 
   const say = (text) => { find("said").textContent = text; };
@@ -47,8 +53,9 @@
     }
     tape.draw(now["motion.psi"], voyage.course === null ? null : voyage.course / DEG, paper);
     turning.draw(now["motion.r"], null, paper);
-    rudderDial.draw(now["rudder.angle"], voyage.orders["rudder.command"] / DEG, paper);
-    for (const one of [rudder, engine]) if (one) showOrder(one);
+    for (const one of helms) showOrder(one);
+    if (levers) showLevers(voyage);
+    else rudderDial.draw(now["rudder.angle"], voyage.orders["rudder.command"] / DEG, paper);
     if (helm.score) showScore(helm.score);
     telegraph?.show(voyage.orders[engine.name]);
     find("autopilot")?.setAttribute("aria-pressed", String(voyage.course !== null));
@@ -61,13 +68,13 @@
 
   // Where the ship comes to: computed again after an order, and ten times a second.
   function ahead() {
-    const minutes = Number(find("ahead").value);
-    if (minutes === 0) return [];
+    const seconds = Number(find("ahead").value);
+    if (seconds === 0) return [];
     const now = performance.now();
     if (helm.time !== predicted.time && now - predicted.at > 100 || predicted.orders !== helm.attempt.version ||
-      predicted.minutes !== minutes) {
-      const places = own().ahead(60 * minutes, Math.max(1, minutes));
-      predicted = { at: now, places, minutes, time: helm.time, orders: helm.attempt.version };
+      predicted.seconds !== seconds) {
+      const places = own().ahead(seconds, seconds / 60);
+      predicted = { at: now, places, seconds, time: helm.time, orders: helm.attempt.version };
     }
     return predicted.places;
   }
@@ -89,8 +96,47 @@
     const words = spoken(one, value);
     find(`now-${one.name}`).textContent = words;
     if (one.input.getAttribute("aria-valuetext") !== words) one.input.setAttribute("aria-valuetext", words);
-    showGauge(one, own().ship.get(one === rudder ? "rudder.angle" : "propeller.speed_actual") * one.factor);
+    showGauge(one, own().ship.get(answering(one)) * one.factor);
   }
+
+  // What follows an order.
+  function answering(one) {
+    if (levers) return one.name.replace("command", "speed");
+    return one === rudder ? "rudder.angle" : "propeller.speed_actual";
+  }
+
+  // Of a craft: the two levers over both thrusters, and the dial of the difference as it is and as it is ordered.
+  function showLevers(voyage) {
+    const { mean, difference } = levers.read(voyage.orders);
+    const speeds = Object.fromEntries(levers.names.map((name) => [name, voyage.ship.get(name.replace("command", "speed"))]));
+    const turning = levers.read(speeds).difference;
+    const { surge, turn } = both;
+    for (const [one, value] of [[surge, mean], [turn, difference]]) {
+      one.input.value = value * one.factor;
+      const words = spoken(one, value * one.factor);
+      find(`now-${one.name}`).textContent = words;
+      if (one.input.getAttribute("aria-valuetext") !== words) one.input.setAttribute("aria-valuetext", words);
+    }
+    showGauge(surge, levers.read(speeds).mean * surge.factor);
+    showGauge(turn, turning * turn.factor);
+    find("read-difference").textContent = shown(turning * turn.factor, 0);
+    rudderDial.draw(turning * turn.factor, difference * turn.factor, paper);
+  }
+
+  // The levers over both thrusters: a mean or a difference, rad/s, from what was asked for last.
+  function drive(change) {
+    wanted = { ...(wanted ?? levers.read(own().orders)), ...change };
+    const kept = wanted;
+    for (const [name, value] of Object.entries(levers.orders(kept))) order(sliders[name], value * sliders[name].factor);
+    wanted = kept;
+  }
+
+  // One step of a lever, `share` of its way from the middle.
+  const stepped = (what, share) => {
+    const [now, one] = [wanted ?? levers.read(own().orders), both[what === "mean" ? "surge" : "turn"]];
+    const [low, high] = [one.minimum / one.factor, one.maximum / one.factor];
+    drive({ [what]: Math.max(low, Math.min(high, now[what] + share * high)) });
+  };
 
   // The rudder and the revolutions as they are, below the order.
   function showGauge(one, value) {
@@ -98,7 +144,7 @@
     const bar = find(`gauge-${one.name}`);
     bar.style.left = `${part(Math.min(0, value))}%`;
     bar.style.width = `${Math.abs(part(value) - part(0))}%`;
-    bar.className = one === engine ? "engine" : value < 0 ? "port" : "starboard";
+    bar.className = one === rudder || one.name === "turn" ? (value < 0 ? "port" : "starboard") : "engine";
   }
 
   function stop(words) {
@@ -151,6 +197,7 @@
   // What was set by hand stays, except rudder and engine. With an `attempt` all is as it was then.
   function reset(attempt = null) {
     stop();
+    wanted = null;
     const given = Object.fromEntries(data.controls.map((one) => [one.name, one.start]));
     try {
       if (attempt) helm.begin(attempt.start, attempt.orders, attempt);
@@ -172,7 +219,8 @@
     const kept = Math.min(slider.maximum ?? Infinity, Math.max(slider.minimum ?? -Infinity, value));
     const left = LEFT[helm.order(slider.name, kept / slider.factor)];
     if (left) say(`Steered by hand: ${left}.`);
-    if (slider !== rudder && slider !== engine) held[slider.name] = kept / slider.factor;
+    wanted = null;
+    if (!helms.includes(slider)) held[slider.name] = kept / slider.factor;
     slider.input.value = kept;
     show();
   }
@@ -201,6 +249,7 @@
 
   function zigzag() {
     const [angle, heading] = [Number(find("zigzag-rudder").value), Number(find("zigzag-heading").value)];
+    if (levers) return zigzagByDifference(angle, heading);
     if (!(Math.abs(angle) > 0 && Math.abs(angle) < 90 && heading > 0 && heading < 90)) {
       say("A zigzag needs a rudder angle, negative to begin to port, and a heading above 0, both below 90 deg.");
       return;
@@ -211,6 +260,21 @@
     const lines = [`${titled(own().zigzag)} is executed.`];
     if (limited) lines.push(`The rudder was to go to ${plain(angle)} deg: its gear stops at ${plain(data.stop)} deg.`);
     const words = lines.join(" ");
+    if (sailing) say(words); else start(words);
+    show();
+  }
+
+  function zigzagByDifference(difference, heading) {
+    const { turn } = both;
+    if (!(Math.abs(difference) > 0 && Math.abs(difference) <= turn.maximum && heading > 0 && heading < 90)) {
+      say(`A zigzag needs a difference up to ${plain(turn.maximum)} rpm, negative to begin to port, and a heading above 0 ` +
+        "and below 90 deg.");
+      return;
+    }
+    byHand();
+    wanted = null;
+    helm.zigzag(difference / turn.factor, heading * DEG);
+    const words = `${titled(own().zigzag)} is executed.`;
     if (sailing) say(words); else start(words);
     show();
   }
@@ -234,7 +298,7 @@
   function comments() {
     const lines = [`steered in the page of ${data.name}`];
     for (const one of data.controls) {
-      if (Voyage.ORDERS.includes(one.name)) continue;
+      if (own().recorded.includes(one.name)) continue;
       const from = own().changes.filter(([, name]) => name === one.name);
       const start = [0, one.name, own().begun[one.name]];
       const words = [start, ...from].map(([t, , value]) => `${plain(value * one.factor)} ${one.unit} at ${plain(t)} s`);
@@ -307,13 +371,13 @@
 
   function setApproach() {
     const input = find("approach");
-    const value = typed(input, "The approach speed", "knots", Number(input.min), Number(input.max));
+    const value = typed(input, "The approach speed", data.speeds.unit, Number(input.min), Number(input.max));
     const said = find("said").textContent;
     if (value === null) { input.value = input.dataset.last; return; }
     const limited = value !== Number(input.value);
     if (limited) input.value = String(Number(value.toFixed(2)));
     input.dataset.last = input.value;
-    approach = { "initial.u": value / data.knots };
+    approach = { "initial.u": value / data.speeds.factor };
     reset();
     if (limited) say(said);
   }
@@ -325,12 +389,18 @@
   }
 
   function byGamepad() {
-    for (const done of gamepad.read(rudder.maximum)) {
-      if (done.rudder !== undefined) order(rudder, done.rudder);
+    for (const done of gamepad.read((both?.turn ?? rudder).maximum)) {
+      if (done.rudder !== undefined) turnTo(done.rudder);
       else if (done === "start") find("run").click();
-      else if (done === "midships") order(rudder, 0);
+      else if (done === "midships") turnTo(0);
+      else if (levers) stepped("mean", done === "ahead" ? LEVER_STEP : -LEVER_STEP);
       else telegraph?.step(done === "ahead" ? 1 : -1, own().orders[engine.name]);
     }
+  }
+
+  // The rudder, or the difference of a craft's thrusters, in the unit of its slider.
+  function turnTo(value) {
+    if (levers) drive({ difference: value / both.turn.factor }); else order(rudder, value);
   }
 
   // After a pointer the keys are the bridge's again; who goes by keys keeps the focus.
@@ -347,7 +417,7 @@
   function listen() {
     const clicks = {
       run: () => (sailing ? stop(`Stopped at ${clock(helm.time)}.`) : start()), reset: () => reset(),
-      midships: () => order(rudder, 0), zigzag, finish, save, replay, share, follow: () => look(() => view.follow()),
+      midships: () => turnTo(0), halt: () => drive({ mean: 0, difference: 0 }), zigzag, finish, save, replay, share, follow: () => look(() => view.follow()),
       whole: () => look(() => view.whole()), closer: () => look(() => view.zoom(View.STEP)),
       farther: () => look(() => view.zoom(1 / View.STEP)), autopilot: toggleAutopilot, trial: follow,
     };
@@ -358,10 +428,12 @@
     for (const name of ["ahead", "members"]) find(name)?.addEventListener("change", show);
     find("failed")?.addEventListener("change", (event) => { byHand(); helm.fail(event.target.checked); });
     for (const one of Object.values(sliders)) {
-      const slides = one === rudder || one === engine;
+      const slides = helms.includes(one);
       const changed = slides ? () => order(one, Number(one.input.value)) : () => setByHand(one);
       one.input.addEventListener(slides ? "input" : "change", changed);
     }
+    both?.surge.input.addEventListener("input", (event) => drive({ mean: Number(event.target.value) / both.surge.factor }));
+    both?.turn.input.addEventListener("input", (event) => turnTo(Number(event.target.value)));
     moveByHand(find("track"), view, show);
     document.addEventListener("keydown", key);
     document.addEventListener("pointerdown", () => { pointed = true; }, true);
@@ -397,14 +469,20 @@
     if (event.key.startsWith("Arrow") && target.matches("input[type=range]")) return;
     if ([" ", "Enter"].includes(event.key) && target.matches("button, input[type=checkbox], summary, a")) return;
     const by = event.shiftKey ? 5 : 1;
+    const way = event.shiftKey ? 1 : LEVER_STEP;
     const revolutions = (side) => (event.shiftKey ? order(engine, now(engine) + side) :
       telegraph.step(side, own().orders[engine.name]));
     const keys = {
       " ": () => find("run").click(),
-      ArrowLeft: () => order(rudder, now(rudder) - by),
-      ArrowRight: () => order(rudder, now(rudder) + by),
+      ArrowLeft: () => (levers ? stepped("difference", -way) : order(rudder, now(rudder) - by)),
+      ArrowRight: () => (levers ? stepped("difference", way) : order(rudder, now(rudder) + by)),
+      ...(levers ? {
+        w: () => stepped("mean", way), s: () => stepped("mean", -way), x: () => drive({ mean: 0, difference: 0 }),
+        ...Object.fromEntries(LEVER_KEYS.flatMap(([up, down], number) => [[up, 1], [down, -1]].map(([key, side]) =>
+          [key, () => helms[number] && order(helms[number], now(helms[number]) + side * way * helms[number].maximum)]))),
+      } : {}),
       ...(engine ? { w: () => revolutions(1), s: () => revolutions(-1) } : {}),
-      m: () => order(rudder, 0),
+      m: () => turnTo(0),
       a: toggleAutopilot,
       ",": () => steer(-1),
       ".": () => steer(1),

@@ -26,9 +26,11 @@ from tank2sim.report.steering.ship import (
     TOKEN,
     Control,
     controls,
+    levers_of,
     references,
     shown_in,
     telegraph_of,
+    thrusters_of,
 )
 
 LONGEST_ZIGZAG = 150.0
@@ -43,14 +45,29 @@ _WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 FASTEST_APPROACH = 2.0
 """Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
 
-PREDICTED_MINUTES = 3
-"""Minutes ahead that the page predicts at first: amid those that it offers, 1 to 6. Project choice."""
+SHIP_PREDICTED_S = (60, 120, 180, 240, 300, 360), 180
+"""Times ahead that the page of a ship predicts, and the one at first, s. Project choice."""
+
+CRAFT_PREDICTED_S = (5, 10, 20, 30, 60, 120), 10
+"""The same of a craft with thrusters, which comes through several of its lengths in seconds. Project choice."""
+
+OUTLINES_S, CRAFT_OUTLINES_S = 60, 5
+"""Time between outlines on the predicted curve, s. Project choice."""
+
+PACE, CRAFT_PACE = 5, 1
+"""Times real time of the page at first: a ship takes minutes to answer. Project choice."""
+
+CRAFT_ZIGZAG = 0.25
+"""Difference of revolutions of the zigzag that the page of a craft offers, over the largest. Project choice."""
 
 _TURNING = (10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 600.0, 1200.0, 1800.0)
-"""Ends of the dial of the rate of turn, deg/min: round ones, project choice."""
+"""Ends of the dial of the rate of turn, deg/min, of a craft deg/s: round ones, project choice."""
 
 _USUAL_TURNING = 0.5
 """Yaw rate in ship lengths, r L/u0, that the dial shows at first: a hard turn of most ships. Project choice."""
+
+_CRAFT_UNITS = {"knots": "m/s", "deg/min": "deg/s"}
+"""Units of a craft in place of those of a ship."""
 
 _DIALS = ("motion.psi", "motion.r", "rudder.angle")
 """Signals with an instrument of their own."""
@@ -58,7 +75,7 @@ _DIALS = ("motion.psi", "motion.r", "rudder.angle")
 _SCRIPTS = tuple(
     f"{name}.js"
     for name in (
-        *("ship", "voyage", "trial", "attempt", "score", "helm", "words"),
+        *("ship", "levers", "voyage", "trial", "attempt", "score", "helm", "words"),
         *("pen", "view", "waters", "track", "history", "instruments", "telegraph", "gamepad", "page"),
     )
 )
@@ -140,16 +157,22 @@ def steering_page(
         The model has no rudder.
     """
     model, library = ship.model, ship.library
-    if "rudder.command" not in model.input_names:
-        raise InputError(model.origin, "", "has no rudder", "only a ship (kind linear, abkowitz or mmg) can be steered")
+    thrusters = thrusters_of(model)
+    if "rudder.command" not in model.input_names and not thrusters:
+        remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
+        raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
     if library is None:
         notices = [NO_WASM_COMPILER, *notices]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
     )
-    rudder, *controls_left = _controls(model, ghost)
+    names = [thruster.name for thruster in thrusters]
+    found = _controls(model, ghost)
+    rudder = None if thrusters else found[0]
+    controls_left = found if thrusters else found[1:]
+    levers = levers_of(model)
     engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
-    set_by_hand = [control for control in controls_left if control is not engine]
+    set_by_hand = [control for control in controls_left if control is not engine and control.name not in names]
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template("steering/page.html.j2").render(
         name=model.name,
@@ -161,6 +184,13 @@ def steering_page(
         controls=set_by_hand,
         rudder=rudder,
         engine=engine,
+        levers=levers,
+        thrusters=[control for control in found if control.name in names],
+        zigzag=round(CRAFT_ZIGZAG * (levers[1].maximum or 0.0), -1) if levers else 20,
+        zigzag_most=levers[1].maximum if levers else 89,
+        pace=CRAFT_PACE if levers else PACE,
+        speed_unit=_speed_unit(model),
+        turning_unit=_turning_unit(model),
         approach=_approach(model, ghost, scenario),
         windows=_windows(model),
         telegraph=telegraph_of(model),
@@ -168,7 +198,7 @@ def steering_page(
         no_members=NO_COVARIANCE,
         autopilot=ship.autopilot,
         scenario=scenario,
-        ahead=PREDICTED_MINUTES,
+        ahead=_predicted(CRAFT_PREDICTED_S if levers else SHIP_PREDICTED_S),
         dials=_DIALS,
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
@@ -206,8 +236,11 @@ def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -
         "references": references(interface(model), {name for member in ship.members for name in member}),
         "members": [dict(member) for member in ship.members],
         "telegraph": [{"name": order.name, "value": order.value} for order in telegraph_of(model)],
-        "turning": _turning(_USUAL_TURNING * speed / length),
-        "largestRudder": _controls(model, ghost)[0].maximum,
+        "turning": _turning(shown_in(model["motion.r"], _turning_unit(model))[1] * _USUAL_TURNING * speed / length),
+        "thrusters": [dataclasses.asdict(thruster) for thruster in thrusters_of(model)],
+        "levers": [dataclasses.asdict(lever) for lever in levers_of(model)],
+        "largestRudder": (levers_of(model)[-1:] or _controls(model, ghost))[0].maximum,
+        "outlines": CRAFT_OUTLINES_S if thrusters_of(model) else OUTLINES_S,
         "speed": speed,
         "step": model.step_s,
         "start": {"initial.u": _start(model, "initial.u")} | _begin(ghost, scenario),
@@ -217,7 +250,8 @@ def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -
         "draught": ship.draught_m,
         "longest": LONGEST_ZIGZAG * length / speed,
         "stop": gear[0] if gear else None,
-        "knots": shown_in(model["initial.u"], "knots")[1],
+        "speeds": {"unit": _speed_unit(model), "factor": shown_in(model["initial.u"], _speed_unit(model))[1]}
+        | {"digits": 2 if thrusters_of(model) else 1},
         "controls": [dataclasses.asdict(control) for control in _controls(model, ghost)],
         "readouts": _readouts(model),
         "ghost": None if ghost is None else {"label": ghost.label, "angle": ghost.by_angle, **_series(ghost)},
@@ -246,9 +280,23 @@ def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
     return [(index, f"{index} s" if index < 120 else f"{index / 60:g} min") for index in shown], _WINDOWS[place]
 
 
+def _predicted(times: tuple[Sequence[int], int]) -> tuple[list[tuple[int, str]], int]:
+    """Times ahead that the page predicts (s, in words), and the one at first, s."""
+    offered, first = times
+    return [(one, f"{one} s" if one < 60 else f"{one / 60:g} min") for one in offered], first
+
+
+def _speed_unit(model: Model) -> str:
+    return _CRAFT_UNITS["knots"] if thrusters_of(model) else "knots"
+
+
+def _turning_unit(model: Model) -> str:
+    return _CRAFT_UNITS["deg/min"] if thrusters_of(model) else "deg/min"
+
+
 def _turning(usual: float) -> list[float]:
-    """Ends of the dial of the rate of turn, deg/min, from the one that holds a usual rate (rad/s) on."""
-    return [end for end in _TURNING if end >= 60 * math.degrees(usual)] or [_TURNING[-1]]
+    """Ends of the dial of the rate of turn from the one that holds a usual rate on, deg/min, of a craft deg/s."""
+    return [end for end in _TURNING if end >= usual] or [_TURNING[-1]]
 
 
 def _series(ghost: Ghost) -> dict[str, list[float | None]]:
@@ -268,16 +316,26 @@ def _series(ghost: Ghost) -> dict[str, list[float | None]]:
 
 def _readouts(model: Model) -> list[dict[str, Any]]:
     names = {*model.outputs, *model.state_names, *model.input_names}
+    thrusters = thrusters_of(model)
+    units = _CRAFT_UNITS if thrusters else {}
+    wanted = [*_READOUTS]
+    for thruster in thrusters:
+        prefix = thruster.name.removesuffix(".command")
+        wanted += [
+            (f"{prefix}.speed", thruster.label, "rpm", 0),
+            (f"{prefix}.thrust", f"{thruster.label} thrust", "N", 0),
+        ]
     return [
-        {"name": name, "label": label, "unit": unit, "digits": digits, "factor": shown_in(model[name], unit)[1]}
-        for name, label, unit, digits in _READOUTS
+        {"name": name, "label": label, "unit": shown, "digits": digits, "factor": shown_in(model[name], shown)[1]}
+        for name, label, unit, digits in wanted
+        for shown in [units.get(unit, unit)]
         if name in names
     ]
 
 
 def _approach(model: Model, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
-    """Approach speed of the trial or the scenario, else of the card, and its bounds, knots."""
-    factor = shown_in(model["initial.u"], "knots")[1]
+    """Approach speed of the trial or the scenario, else of the card, and its bounds, knots, of a craft m/s."""
+    factor = shown_in(model["initial.u"], _speed_unit(model))[1]
     measured = _begin(ghost, scenario).get("initial.u")
     speed = _start(model, "initial.u") if measured is None else measured
     fastest = max(FASTEST_APPROACH * _start(model, "ship.fastest"), speed)

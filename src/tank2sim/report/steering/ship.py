@@ -6,6 +6,7 @@ import base64
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, SHARES
 from tank2sim.dynamics.autopilot_loop import AUTOPILOT_ORDER
@@ -16,6 +17,7 @@ from tank2sim.fmu.interface import Interface, interface
 from tank2sim.fmu.sources import c_sources
 from tank2sim.native.cross import CompileTarget, cross_compiled, require_cross_compiler
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
+from tank2sim.simulation.thruster_manoeuvres import thruster_commands, thruster_sides
 from tank2sim.units import UNITS, from_si
 
 TOKEN = "page"
@@ -90,6 +92,46 @@ class TelegraphOrder:
         return from_si("n_rpm", self.value)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Thruster:
+    """A fixed thruster of a craft: its input, the side to which it turns the craft when it pushes ahead (1 starboard,
+    -1, or 0), and the bounds of its orders, rad/s."""
+
+    name: str
+    label: str
+    side: float
+    minimum: float
+    maximum: float
+
+
+def thrusters_of(model: Model) -> list[Thruster]:
+    """Thrusters that push a craft ahead, if they steer it by their difference; else none."""
+    sides = thruster_sides(model)
+    if not {1.0, -1.0} <= set(sides.values()):
+        return []
+    found = []
+    for command in thruster_commands(model):
+        if command.name in sides:
+            assert command.minimum is not None and command.maximum is not None
+            bounds = {"minimum": command.minimum, "maximum": command.maximum}
+            found.append(Thruster(name=command.name, label=_label(command.name), side=sides[command.name], **bounds))
+    return found
+
+
+def levers_of(model: Model) -> list[Control]:
+    """The two levers over all thrusters of a craft: what they have in common, and port less starboard; rpm."""
+    thrusters = thrusters_of(model)
+    if not thrusters:
+        return []
+    rpm = from_si("n_rpm", 1.0)
+    low, high = max(one.minimum for one in thrusters) * rpm, min(one.maximum for one in thrusters) * rpm
+    shared: dict[str, Any] = {"unit": "rpm", "factor": rpm, "step": _SMALL["rpm"], "start": 0.0}
+    return [
+        Control(name="surge", label="Both thrusters", minimum=low, maximum=high, **shared),
+        Control(name="turn", label="Turn", minimum=low - high, maximum=high - low, **shared),
+    ]
+
+
 def telegraph_of(model: Model) -> list[TelegraphOrder]:
     """Orders of the telegraph from full astern to full sea speed; empty without an engine.
 
@@ -156,7 +198,16 @@ def ship_following_angle(model: Model) -> Model:
 
 def references(described: Interface, drawn: Iterable[str] = ()) -> dict[str, int]:
     """Name to value reference of what the page sets and reads; `drawn` are parameters that its members differ in."""
-    wanted = ("initial.", "motion.", "rudder.", "steering.failed", "propeller.", "validity", AUTOPILOT_ORDER)
+    wanted = (
+        "initial.",
+        "motion.",
+        "rudder.",
+        "thrusters.",
+        "steering.failed",
+        "propeller.",
+        "validity",
+        AUTOPILOT_ORDER,
+    )
     named = {*(variable.name for variable in described.with_causality("input")), *drawn}
     return {
         variable.name: variable.reference
@@ -176,7 +227,7 @@ def controls(model: Model) -> list[Control]:
 
 
 def _control(model: Model, variable: Input) -> Control:
-    unit, factor = shown_in(variable)
+    unit, factor = shown_in(variable, "m/s" if thrusters_of(model) and variable.unit == "m/s" else None)
     low, high = _bounds(variable)
     if variable.name == "rudder.command":
         limits = [parameter.start for parameter in model.parameters if parameter.name == "steering.max_angle"]
@@ -217,6 +268,10 @@ def _label(name: str) -> str:
         "current.direction": "Current towards",
         "wind.direction": "Wind from",
     }
+    if name.startswith("thrusters."):
+        _, thruster, what = name.split(".")
+        words = thruster if what == "command" else f"{thruster} {what.removesuffix('_command')}"
+        return words.replace("_", " ").capitalize()
     return known.get(name, name.replace(".", " ").replace("_", " ").capitalize())
 
 

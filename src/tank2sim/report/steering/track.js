@@ -3,7 +3,7 @@
 const FLOWS = [["current", "towards", 0], ["wind", "from", Math.PI]];
 
 class TrackChart {
-  static INTERVALS = [15, 30, 60, 120, 300, 600, 1200, 1800, 3600]; // s between hulls along the track
+  static INTERVALS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 1800, 3600]; // s between hulls along the track
   static APART = 1.7; // drawn lengths between hulls along the track, at least
   static HULLS = 60; // most hulls along the track: the last
   static MEMBER_POINTS = 250; // of the track of a member
@@ -11,6 +11,7 @@ class TrackChart {
   constructor(canvas, data, view, waters = null) {
     Object.assign(this, { canvas, view, waters });
     Object.assign(this, { length: data.length, beam: data.beam, speed: data.speed, ghost: data.ghost });
+    Object.assign(this, { speeds: data.speeds, outlines: data.outlines });
     this.forget();
   }
 
@@ -115,22 +116,24 @@ class TrackChart {
     }
   }
 
-  // The curve of what is ahead, with an outline at each whole minute from now.
+  // The curve of what is ahead, with an outline every so often.
   #ahead(pen, colour, scene, ahead) {
     if (ahead.length < 2) return;
     const look = { colour: colour.ahead, width: 2.2, dash: [6, 4] };
     line(pen, ahead.length, (row) => scene.at(ahead[row].x, ahead[row].y), look);
     const [from, end] = [ahead[0].t, ahead.at(-1)];
-    let minute = 1;
+    const every = this.outlines;
+    let number = 1;
     for (const { t, x, y, psi } of ahead) {
-      if (t < from + 60 * minute - 1e-6) continue;
-      minute += 1;
+      if (t < from + every * number - 1e-6) continue;
+      number += 1;
       this.#hull(pen, scene, x, y, psi, { stroke: colour.ahead, width: t === end.t ? 2 : 1.2 });
     }
     Object.assign(pen, { fillStyle: colour.ahead, textAlign: "left", textBaseline: "middle" });
     const [left, top] = scene.at(end.x, end.y);
     const off = this.beam * scene.scale / 2 + 12;
-    pen.fillText(`in ${label(Math.round((end.t - from) / 6) / 10)} min`, left + off, top);
+    const [seconds, minutes] = [Math.round(end.t - from), Math.round((end.t - from) / 6) / 10];
+    pen.fillText(`in ${seconds < 60 ? `${seconds} s` : `${label(minutes)} min`}`, left + off, top);
   }
 
   // Twice, for the room on the left follows from the labels, and they from the room. `above` is kept free.
@@ -164,7 +167,7 @@ class TrackChart {
       const [speed, direction] = [orders[`${name}.speed`], orders[`${name}.direction`]];
       if (!(speed > 0)) continue;
       const bearing = Math.round(((direction * 180 / Math.PI) % 360 + 360) % 360) % 360;
-      const text = `${name} ${(speed * 3600 / 1852).toFixed(1)} knots ${word} ${bearing} deg`;
+      const text = `${name} ${(speed * this.speeds.factor).toFixed(this.speeds.digits)} ${this.speeds.unit} ${word} ${bearing} deg`;
       const wide = pen.measureText(text).width + 34;
       if (right - wide < 0) [right, top] = [width - 14, top + 28];
       found.push({ text, left: right - wide, top, towards: direction + turned });

@@ -4,8 +4,9 @@
 class Zigzag {
   static EXECUTES = 5;
 
-  constructor(rudder, heading, course, latest) {
-    Object.assign(this, { rudder: Math.abs(rudder), heading, course, latest });
+  // `unit` is that in which the order is shown, rad or rad/s: of a craft with thrusters it is a difference of revolutions.
+  constructor(rudder, heading, course, latest, unit) {
+    Object.assign(this, { rudder: Math.abs(rudder), heading, course, latest, unit });
     this.side = this.first = Math.sign(rudder);
     this.executes = 0;
     this.overshoots = [];
@@ -73,16 +74,25 @@ class Record {
 // A ship under way. Steps lie on a grid of whole ones; a switch or an order between two of them is one more sample.
 class Voyage {
   static POSE = ["motion.x", "motion.y", "motion.psi"];
-  static SIGNALS = [...Voyage.POSE, "motion.u", "motion.v", "motion.r", "rudder.angle"];
-  static ORDERS = ["rudder.command", "propeller.speed", "wind.speed", "wind.direction"];
+  static MOTION = [...Voyage.POSE, "motion.u", "motion.v", "motion.r"];
+  static WIND = ["wind.speed", "wind.direction"];
 
   // `signals` and `most` rows are recorded; `parameters` are the ship's, where they are not those of the card.
-  constructor(ship, data, signals = Voyage.SIGNALS, most = undefined, parameters = {}) {
+  constructor(ship, data, signals = [...Voyage.MOTION, ...Voyage.driven(data).shown], most = undefined, parameters = {}) {
     Object.assign(this, { ship, signals, most, parameters });
+    this.levers = data.thrusters.length > 0 ? new Levers(data.thrusters) : null;
+    this.recorded = [...Voyage.driven(data).ordered, ...Voyage.WIND];
     this.step = data.step;
     this.longest = data.longest;
     this.read = ship.reader(signals);
     this.begin(data.start);
+  }
+
+  // What steers and drives: names of its orders, and of what answers them.
+  static driven({ thrusters }) {
+    if (thrusters.length === 0) return { ordered: ["rudder.command", "propeller.speed"], shown: ["rudder.angle"] };
+    const ordered = thrusters.map((one) => one.name);
+    return { ordered, shown: ordered.map((name) => name.replace("command", "speed")) };
   }
 
   begin(start, orders = {}) {
@@ -92,8 +102,8 @@ class Voyage {
     this.zigzag = null;
     this.programme = [];
     this.course = null; // rad, that the autopilot keeps
-    this.orders = { "rudder.command": 0, ...orders };
-    this.record = new Record(["t", ...this.signals, ...Voyage.ORDERS], this.most);
+    this.orders = this.levers ? { ...orders } : { "rudder.command": 0, ...orders };
+    this.record = new Record(["t", ...this.signals, ...this.recorded], this.most);
     this.begun = { ...this.orders };
     this.changes = []; // [t, name, value] of what no column holds
     this.#sample(true);
@@ -105,8 +115,18 @@ class Voyage {
     this.ship.set(name, value);
     this.orders[name] = value;
     this.record.change(name, value);
-    if (!Voyage.ORDERS.includes(name)) this.changes.push([this.time, name, value]);
+    if (!this.recorded.includes(name)) this.changes.push([this.time, name, value]);
   }
+
+  // The rudder (rad), or the difference of the revolutions of a craft's thrusters (rad/s); positive to starboard.
+  turn(value) {
+    if (!this.levers) return this.order("rudder.command", value);
+    const orders = this.levers.orders({ mean: this.levers.read(this.orders).mean, difference: value });
+    for (const [name, one] of Object.entries(orders)) this.order(name, one);
+  }
+
+  // Whether an input is what a zigzag orders.
+  steers(name) { return this.levers ? this.levers.has(name) : name === "rudder.command"; }
 
   // The rudder is the hand's again, and the gear's. Returns what has ended: "zigzag", "programme", "autopilot" or null.
   release() {
@@ -132,8 +152,9 @@ class Voyage {
 
   startZigzag(rudder, heading) {
     this.release();
-    this.zigzag = new Zigzag(rudder, heading, this.ship.get("motion.psi"), this.time + this.longest);
-    this.order("rudder.command", this.zigzag.order);
+    this.zigzag = new Zigzag(rudder, heading, this.ship.get("motion.psi"), this.time + this.longest,
+      this.levers ? Math.PI / 30 : DEG);
+    this.turn(this.zigzag.order);
   }
 
   // Orders [{t, name: value, ...}], each held until the next, from now on.
@@ -204,7 +225,7 @@ class Voyage {
     if (last) this.steps += 1;
     this.#sample(true);
     if (this.zigzag.turn()) return this.#ended("zigzag");
-    this.order("rudder.command", this.zigzag.order);
+    this.turn(this.zigzag.order);
     return null;
   }
 
@@ -232,9 +253,14 @@ class Voyage {
   #sample(kept) {
     const values = this.read();
     if (this.course !== null) this.orders["rudder.command"] = this.ship.get("autopilot.order");
-    const row = [this.time, ...values, ...Voyage.ORDERS.map((name) => this.orders[name] ?? 0)];
+    const row = [this.time, ...values, ...this.recorded.map((name) => this.orders[name] ?? 0)];
     this.record.add(row, !kept && this.steps % this.record.stride !== 0);
     this.zigzag?.watch(values[2]);
+  }
+
+  #ofThrusters(rpm) {
+    const speeds = this.levers.names.map((name) => [`n_${name.split(".")[1]}_rpm`, [name.replace("command", "speed"), rpm]]);
+    return { ...this.levers.shares(), ...Object.fromEntries(speeds) };
   }
 
   // The voyage as a trial file of tank2sim, with all digits; `comments` are its first lines.
@@ -242,9 +268,12 @@ class Voyage {
     const deg = (value) => value * 180 / Math.PI;
     const rpm = (value) => value * 30 / Math.PI;
     const [engine, wind] = ["propeller.speed" in this.orders, "wind.speed" in this.orders];
+    const driven = this.levers ? this.#ofThrusters(rpm) : {
+      delta_order_deg: ["rudder.command", deg], delta_deg: ["rudder.angle", deg],
+      ...(engine ? { n_rpm: ["propeller.speed", rpm] } : {}),
+    };
     const columns = {
-      t_s: ["t", Number], delta_order_deg: ["rudder.command", deg], delta_deg: ["rudder.angle", deg],
-      ...(engine ? { n_rpm: ["propeller.speed", rpm] } : {}), u_mps: ["motion.u", Number], v_mps: ["motion.v", Number],
+      t_s: ["t", Number], ...driven, u_mps: ["motion.u", Number], v_mps: ["motion.v", Number],
       r_degps: ["motion.r", deg], psi_deg: ["motion.psi", deg], x_m: ["motion.x", Number], y_m: ["motion.y", Number],
       ...(wind ? { wind_speed_mps: ["wind.speed", Number], wind_direction_deg: ["wind.direction", deg] } : {}),
     };

@@ -22,14 +22,21 @@ const course = (angle) => String(Math.round(compass(angle / DEG, 0))).padStart(3
 
 // An order of the rudder or the engine (in the unit of its control) as one says it, with its side.
 function spoken(one, value) {
+  if (one.name === "turn") return turned(one, value);
   const rudder = one.name === "rudder.command";
-  const digits = one.unit === "rpm" ? 1 : Number.isInteger(Number(value.toFixed(6))) ? 0 : 1;
+  const digits = one.unit === "rpm" ? (one.name === "propeller.speed" ? 1 : 0) : Number.isInteger(Number(value.toFixed(6))) ? 0 : 1;
   const size = `${shown(Math.abs(value), digits)} ${one.unit}`;
   if (Number(Math.abs(value).toFixed(digits)) === 0) return rudder ? "midships" : "stopped";
   return `${size} ${rudder ? (value > 0 ? "starboard" : "port") : (value > 0 ? "ahead" : "astern")}`;
 }
 
-const titled = ({ first, rudder, heading }) => `Zigzag ${plain(first * rudder / DEG)}/${plain(heading / DEG)}`;
+// A difference of revolutions, with the side to which it turns.
+function turned(one, value) {
+  const size = shown(Math.abs(value), 0);
+  return size === "0" ? "even" : `${size} ${one.unit} to ${value > 0 ? "starboard" : "port"}`;
+}
+
+const titled = ({ first, rudder, heading, unit }) => `Zigzag ${plain(first * rudder / unit)}/${plain(heading / DEG)}`;
 
 // What has ended, with the overshoots of a zigzag.
 function ended(what, voyage) {

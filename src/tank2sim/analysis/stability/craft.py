@@ -1,0 +1,274 @@
+"""Straight-line stability, surge and turning of a craft that is steered by the difference of fixed thrusters.
+
+Linearised about a straight run at a speed, with revolutions held. Lag and dead band of the thrusters, which lie before
+the revolutions, are left out, and currents and winds are absent. With d the revolutions at port less those at starboard
+
+    r/d = K (1 + T3 s) / ((1 + T1 s)(1 + T2 s)),    T = T1 + T2 - T3    (Nomoto, Taguchi, Honda and Hirano 1957)
+
+so that a K above 0 turns to starboard where the thrusters at port run faster.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import root
+
+from tank2sim.analysis.linearisation import OperatingPoint, jacobians
+from tank2sim.analysis.stability.straight_line import steering_constants
+from tank2sim.arrays import Array
+from tank2sim.cards.card import CraftCard
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.effects import undisturbed_inputs
+from tank2sim.errors import InputError
+from tank2sim.simulation.thruster_manoeuvres import thruster_sides
+from tank2sim.units import from_si
+
+SPEED_SHARES = (0.25, 0.5, 0.75, 0.95)
+"""Speeds of the table, over the highest that the thrusters hold (project choice)."""
+
+DIFFERENCE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
+"""Differences of the table, over the largest about the revolutions of the straight run (project choice)."""
+
+_CURVATURES, _DRIFT = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6), 0.1
+"""Yaw rates in r L/U and sway over surge from which a steady turn is looked for: those of craft in wide to tight turns
+(project choice)."""
+
+_MOTION = ("motion.u", "motion.v", "motion.r")
+_RATES = ("motion.udot", "motion.vdot", "motion.rdot")
+_SMALL = 1e-6
+"""Largest rate of a steady motion, over that of its scale: rounding of the search."""
+
+
+@dataclass(frozen=True)
+class CraftAtSpeed:
+    """A craft at a speed.
+
+    Parameters
+    ----------
+    speed_mps, revolutions_radps : float
+        Surge velocity through the water, and the mean revolutions of the two sides that hold it.
+    eigenvalues : tuple of complex
+        Of surge, sway and yaw, 1/s, least damped first.
+    steering_modes : tuple of complex
+        Of sway and yaw at a held speed, 1/s.
+    surge_time_constant_s : float
+        -1 over the slope of du/dt by u; None where nothing brakes the craft.
+    K, T_s, T1_s, T2_s, T3_s : float
+        Of r/d; K in rad/s by rad/s; T1 and T2 are None for an oscillating pair.
+    """
+
+    speed_mps: float
+    revolutions_radps: float
+    eigenvalues: tuple[complex, ...]
+    steering_modes: tuple[complex, ...]
+    surge_time_constant_s: float | None
+    K: float
+    T_s: float
+    T1_s: float | None
+    T2_s: float | None
+    T3_s: float
+
+    @property
+    def stable(self) -> bool:
+        """True if the straight run is stable with revolutions held: every mode decays."""
+        return all(mode.real < 0 for mode in (*self.eigenvalues, *self.steering_modes))
+
+    def as_json(self) -> dict[str, object]:
+        """The run for JSON; eigenvalues as [real, imaginary]."""
+        found = dict(vars(self))
+        for key in ("eigenvalues", "steering_modes"):
+            found[key] = [[value.real, value.imag] for value in found[key]]
+        revolutions = from_si("n_rpm", found.pop("revolutions_radps"))
+        return {"revolutions_rpm": revolutions, **found, "stable": self.stable}
+
+
+@dataclass(frozen=True)
+class SteadyCraftTurn:
+    """A steady turn: revolutions at port less at starboard (rad/s), and the motion in m/s, rad/s, rad, m."""
+
+    difference_radps: float
+    speed_mps: float
+    yaw_rate_radps: float
+    drift_rad: float
+    diameter_m: float
+
+
+@dataclass(frozen=True)
+class CraftStability:
+    """Stability and turning of a craft.
+
+    Parameters
+    ----------
+    name : str
+    run : CraftAtSpeed
+        At the requested speed.
+    speeds : tuple of CraftAtSpeed
+        At :data:`SPEED_SHARES` of the highest speed.
+    highest_speed_mps : float
+        That the thrusters hold.
+    turns : tuple of SteadyCraftTurn
+        To starboard, about the revolutions of `run`.
+    """
+
+    name: str
+    run: CraftAtSpeed
+    speeds: tuple[CraftAtSpeed, ...]
+    highest_speed_mps: float
+    turns: tuple[SteadyCraftTurn, ...]
+
+
+def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStability:
+    """Stability and turning of a craft, by default at its cruising speed.
+
+    Parameters
+    ----------
+    card : CraftCard
+    speed_mps : float, optional
+        Surge velocity through the water, positive.
+
+    Raises
+    ------
+    InputError
+        The craft is not steered by fixed thrusters at both sides, or they do not hold the speed.
+    """
+    craft = _Craft(card)
+    speed = card.model.speed_mps if speed_mps is None else speed_mps
+    highest = craft.highest_speed(card.model.speed_mps)
+    if not 0 < speed <= highest * (1 + 1e-9):
+        problem = f"{speed:g} m/s is not a speed ahead that the thrusters hold"
+        raise InputError("--speed", "", problem, f"give one up to {highest:.4g} m/s")
+    run = craft.straight(speed)
+    return CraftStability(
+        name=card.ship.name,
+        run=run,
+        speeds=tuple(craft.straight(share * highest) for share in SPEED_SHARES),
+        highest_speed_mps=highest,
+        turns=tuple(craft.turns(run)),
+    )
+
+
+class _Craft:
+    """The accelerations of a craft by its motion and the revolutions of its sides."""
+
+    def __init__(self, card: CraftCard) -> None:
+        # Twice the bounds, so that the slopes at the largest revolutions are those of the thrust curve.
+        free = [
+            thruster.model_copy(
+                update={
+                    "time_constant_s": None,
+                    "dead_band_radps": 0.0,
+                    "max_radps": 2 * thruster.max_radps,
+                    "max_astern_radps": -2 * thruster.lowest_radps,
+                }
+            )
+            for thruster in card.thrusters
+        ]
+        self.model = model = build(replace(card, thrusters=tuple(free)))
+        self.sides = thruster_sides(model)
+        if not {1.0, -1.0} <= set(self.sides.values()):
+            problem = "is not steered by thrusters at both sides, and has no rudder"
+            raise InputError(card.source, "thrusters", problem, "give one at port and one at starboard")
+        steering = [one for one in card.thrusters if f"thrusters.{one.name}.command" in self.sides]
+        self.low, self.high = max(one.lowest_radps for one in steering), min(one.max_radps for one in steering)
+        self.p = model.parameter_values()
+        rates = ca.vcat([model.symbol(name) for name in _RATES])
+        self._rates = ca.Function("rates", [model.x, model.u, model.p], [model.expand(rates)])
+
+    def point(self, motion: Array, mean: float, difference: float) -> OperatingPoint:
+        """Motion (3,) and revolutions (rad/s): their mean, and port less starboard."""
+        x = np.array(self.model.initial(self.p)).ravel()
+        x[[self.model.state_names.index(name) for name in _MOTION]] = motion
+        inputs = self.model.input_values(undisturbed_inputs(self.model))
+        for name, side in self.sides.items():
+            inputs[self.model.input_names.index(name)] = mean + side * difference / 2
+        return OperatingPoint(x, inputs, self.p)
+
+    def rates(self, motion: Array, mean: float, difference: float) -> Array:
+        """du/dt, dv/dt, dr/dt (3,)."""
+        point = self.point(motion, mean, difference)
+        return np.array(self._rates(point.x, point.u, point.p)).ravel()
+
+    def highest_speed(self, about: float) -> float:
+        """Speed (m/s) that the largest revolutions hold on a straight course."""
+        ahead = self._solved(
+            lambda z: self.rates(np.array([z[0], z[1], 0.0]), self.high, z[2]), np.array([about, 0.0, 0.0])
+        )
+        return float(ahead[0])
+
+    def straight(self, speed: float) -> CraftAtSpeed:
+        """The straight run at a speed, m/s."""
+        mean, difference, sway = self._solved(
+            lambda z: self.rates(np.array([speed, z[2], 0.0]), z[0], z[1]), np.array([0.5 * self.high, 0.0, 0.0])
+        )
+        point = self.point(np.array([speed, sway, 0.0]), mean, difference)
+        A, B = jacobians(self.model, point, _RATES, _MOTION, list(self.sides))
+        by_difference = B @ np.array([side / 2 for side in self.sides.values()])
+        modes = _sorted(np.linalg.eigvals(A[1:, 1:]))
+        K, total, product, T3 = map(
+            float, steering_constants(A[1:, 1:], by_difference[1:, None], np.array([[0.0, 1.0]]))
+        )
+        real = total**2 >= 4 * product
+        T1 = 0.5 * (total + math.copysign(math.sqrt(total**2 - 4 * product), total)) if real else None
+        return CraftAtSpeed(
+            speed_mps=speed,
+            revolutions_radps=float(mean),
+            eigenvalues=_sorted(np.linalg.eigvals(A)),
+            steering_modes=modes,
+            surge_time_constant_s=float(-1 / A[0, 0]) if A[0, 0] < 0 else None,
+            K=K,
+            T_s=total - T3,
+            T1_s=T1,
+            T2_s=product / T1 if T1 else None,
+            T3_s=T3,
+        )
+
+    def turns(self, run: CraftAtSpeed) -> list[SteadyCraftTurn]:
+        """Steady turns to starboard about the revolutions of a straight run that are stable.
+
+        A craft that is unstable on a straight course turns without a difference, too: that turn is the first.
+        """
+        mean = run.revolutions_radps
+        most = 2 * min(self.high - mean, mean - self.low)
+        shares = DIFFERENCE_SHARES if run.stable else (0.0, *DIFFERENCE_SHARES)
+        found = [self._turn(run, share * most) for share in shares]
+        return [turn for turn in found if turn is not None]
+
+    def _turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
+        mean = run.revolutions_radps
+        for curvature in _CURVATURES:
+            rate = curvature * run.speed_mps / self.p[self.model.parameter_names.index("ship.length")]
+            start = np.array([run.speed_mps, -_DRIFT * run.speed_mps, rate])
+            solved = root(lambda z: self.rates(z, mean, difference), start)
+            u, v, r = map(float, solved.x)
+            if not solved.success or u <= 0 or r <= _SMALL * rate:
+                continue
+            A, _ = jacobians(self.model, self.point(solved.x, mean, difference), _RATES, _MOTION, [])
+            if np.linalg.eigvals(A).real.max() < 0:
+                speed = math.hypot(u, v)
+                return SteadyCraftTurn(difference, speed, r, -math.asin(v / speed), 2 * speed / r)
+        return None
+
+    def _solved(self, rates: Callable[[Array], Array], start: Array) -> Array:
+        """Where the accelerations vanish.
+
+        Raises
+        ------
+        InputError
+            Nowhere near the start.
+        """
+        found = root(rates, start)
+        if not found.success and np.abs(found.fun).max() > _SMALL:
+            problem = "has no steady motion with these thrusters"
+            raise InputError(self.model.origin, "", problem, "check thrust and damping, or give another speed")
+        return np.asarray(found.x, dtype=float)
+
+
+def _sorted(values: npt.NDArray[Any]) -> tuple[complex, ...]:
+    return tuple(complex(value) for value in sorted(values, key=lambda value: -value.real))

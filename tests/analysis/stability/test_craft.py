@@ -1,0 +1,99 @@
+"""Stability and turning of a craft with two thrusters, against the equations written out and the simulation."""
+
+import math
+
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.analysis.stability.craft import craft_stability
+from tank2sim.cards import parse_card
+from tank2sim.errors import InputError
+
+CARD = """
+format = "tank2sim-ship/1"
+[ship]
+name = "made up"
+source = "made up"
+length_m = 2.0
+[model]
+kind = "small_craft"
+speed_mps = 1.0
+[rigid_body]
+mass = 80.0
+yaw_inertia = 16.0
+x_G = 0.0
+[derivatives]
+Xudot = -5.0
+Yvdot = -40.0
+Nrdot = -10.0
+Xu = -30.0
+Xuabsu = -20.0
+Yv = -60.0
+Nr = -20.0
+Nv = -2.0
+[[thrusters]]
+name = "port"
+y_m = -0.4
+ahead_Ns2 = 0.01
+astern_Ns2 = 0.006
+max_radps = 100.0
+time_constant_s = 0.3
+[[thrusters]]
+name = "starboard"
+y_m = 0.4
+ahead_Ns2 = 0.01
+astern_Ns2 = 0.006
+max_radps = 100.0
+time_constant_s = 0.3
+"""
+
+
+@pytest.fixture(scope="module")
+def made_up():
+    return parse_card(CARD, "made_up.toml")
+
+
+def test_surge_and_steering_are_those_of_the_equations_written_out(made_up):
+    run = craft_stability(made_up).run
+    n = math.sqrt(50 / 2 / 0.01)  # 30 u + 20 u|u| of both thrusters
+    assert run.revolutions_radps == pytest.approx(n)
+    assert run.surge_time_constant_s == pytest.approx(85 / (30 + 2 * 20 * 1.0))
+    # (m - Yvdot) v' = Yv v - (m - Xudot) u r,  (I - Nrdot) r' = (Nv + (Yvdot - Xudot) u) v + Nr r + N  at u = 1 m/s
+    A = np.array([[-60 / 120, -85 / 120], [(-2 + (-40 + 5)) / 26, -20 / 26]])
+    assert sorted(mode.real for mode in run.steering_modes) == pytest.approx(sorted(np.linalg.eigvals(A).real))
+    b = np.array([0.0, 2 * 0.01 * n * 0.4 / 26])  # of d/2 more at port and less at starboard
+    assert pytest.approx(-np.linalg.solve(A, b)[1]) == run.K
+    zero = -A[0, 0]  # of r/d, where sway answers
+    assert run.T3_s == pytest.approx(1 / zero)
+    assert run.T_s == pytest.approx(-np.trace(A) / np.linalg.det(A) - 1 / zero)
+
+
+def test_a_steady_turn_is_that_to_which_the_simulation_comes():
+    otter = t2s.load("otter")
+    turn = craft_stability(otter.card).turns[3]
+    found = otter.simulate(f"difference:{turn.difference_radps * 30 / math.pi}", duration_s=60).figures
+    assert found["steady_rate_degps"] == pytest.approx(math.degrees(turn.yaw_rate_radps), rel=1e-3)
+    assert found["steady_diameter_m"] == pytest.approx(turn.diameter_m, rel=1e-3)
+    assert found["steady_drift_deg"] == pytest.approx(math.degrees(turn.drift_rad), rel=1e-3)
+
+
+def test_a_craft_unstable_on_a_straight_course_turns_without_a_difference():
+    study = craft_stability(t2s.load("otter").card)
+    assert not study.run.stable
+    assert study.turns[0].difference_radps == 0.0
+    assert study.turns[0].yaw_rate_radps > 0
+    assert craft_stability(t2s.load("otter").card, 0.7).run.stable
+
+
+def test_a_speed_beyond_the_thrusters_is_refused(made_up):
+    with pytest.raises(InputError, match="not a speed ahead"):
+        craft_stability(made_up, 5.0)
+
+
+def test_thrusters_at_one_side_and_ensembles_are_refused(made_up):
+    card = parse_card(CARD.replace("y_m = 0.4", "y_m = -0.4"), "made_up.toml")
+    with pytest.raises(InputError, match="both sides"):
+        craft_stability(card)
+    with pytest.raises(InputError, match="IMO"):
+        t2s.load("otter").stability(members=10)

@@ -1,0 +1,154 @@
+"""What recorders write beyond one tidy file: parts, several receivers, speed controllers, other clocks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tank2sim.api.log import log
+from tank2sim.errors import InputError
+from tank2sim.logs.reading import read_log
+from tests.logs.made_logs import frame, nmea_lines, sentence, voyage
+
+GPS_COLUMNS = "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U"
+GPS_FORMAT = "QBBIHBcLLeffffB"
+
+
+def dataflash(path: Path, *, statuses: tuple[int | None, ...] = (3,), escs: int = 1, reversed_servo: int = 1) -> Path:
+    """A dataflash log as text; a receiver for each of `statuses`, None for a message without an instance."""
+    columns, letters = GPS_COLUMNS.split(","), GPS_FORMAT
+    if statuses == (None,):
+        columns, letters = [name for name in columns if name != "I"], "QBIHBcLLeffffB"
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        f"FMT, 130, 50, GPS, {letters}, {','.join(columns)}",
+        "FMT, 131, 20, ATT, Qffffff, TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw",
+        "FMT, 132, 20, ESC, QBf, TimeUS,Instance,RPM",
+        "FMT, 133, 20, PARM, QNff, TimeUS,Name,Value,Default",
+        "FMT, 134, 20, RCOU, QHHHH, TimeUS,C1,C2,C3,C4",
+        "PARM, 1000, SERVO1_FUNCTION, 26, 0",
+        "PARM, 1000, SERVO1_MIN, 1000, 0",
+        "PARM, 1000, SERVO1_TRIM, 1500, 0",
+        "PARM, 1000, SERVO1_MAX, 2000, 0",
+        f"PARM, 1000, SERVO1_REVERSED, {reversed_servo}, 0",
+    ]
+    table, made = frame(), voyage()
+    pulses = 1500 + (-1 if reversed_servo else 1) * np.degrees(made.rudder) * 500 / 35
+    for k, time in enumerate(made.time):
+        at = int((time + 20) * 1e6)
+        for instance, status in enumerate(statuses):
+            values = {"TimeUS": at, "I": instance, "Status": 3 if status is None else status}
+            values |= {"GMS": int((time + 100000) * 1000), "GWk": 2300 if status is None or status >= 2 else 0}
+            values |= {"Lat": f"{table.latitude[k]:.7f}", "Lng": f"{table.longitude[k]:.7f}"}
+            values |= {"Spd": f"{table.sog_kn[k] * 1852 / 3600:.3f}", "GCrs": f"{table.cog_deg[k]:.2f}"}
+            lines.append("GPS, " + ", ".join(str(values.get(name, 0)) for name in columns))
+        lines.append(f"ATT, {at}, 0, 0, 0, 0, 0, {table.heading_deg[k]:.2f}")
+        lines += [f"ESC, {at}, {instance}, {table.shaft_rpm[k]:.1f}" for instance in range(escs)]
+        lines.append(f"RCOU, {at}, {pulses[k]:.0f}, 0, 1500, 0")
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    return path
+
+
+class TestDataflash:
+    @pytest.fixture(autouse=True)
+    def _library(self) -> None:
+        pytest.importorskip("pymavlink")
+
+    def test_a_receiver_without_an_instance_is_one(self, tmp_path) -> None:
+        found = read_log(dataflash(tmp_path / "old.log", statuses=(None,)))
+        assert {"GPS.Lat", "GPS.Lng"} <= {stream.name for stream in found.streams}
+
+    def test_the_clock_is_that_of_the_receiver_with_a_fix(self, tmp_path) -> None:
+        found = read_log(dataflash(tmp_path / "two.log", statuses=(1, 3)))
+        named = {stream.name: stream for stream in found.streams}
+        assert np.isnan(named["GPS[0].Lat"].values).all()
+        assert np.isfinite(named["GPS[1].Lat"].values).all()
+        utc = 315964800 + 2300 * 604800 + 100000 - 18
+        assert named["ATT.Yaw"].time_s[0] == pytest.approx(utc, abs=1e-3)
+
+    def test_a_log_without_a_fix_is_refused(self, tmp_path) -> None:
+        with pytest.raises(InputError, match="no fix"):
+            read_log(dataflash(tmp_path / "none.log", statuses=(1,)))
+
+    def test_two_speed_controllers_are_a_guess_and_one_is_the_shaft(self, tmp_path) -> None:
+        for escs, expected in ((1, [("rpm", "format")]), (2, [("rpm_port", ""), ("rpm_starboard", "")])):
+            found = read_log(dataflash(tmp_path / f"{escs}.log", escs=escs))
+            speeds = [stream for stream in found.streams if stream.name.startswith("ESC")]
+            assert [(stream.quantity, stream.stated_by) for stream in speeds] == expected
+
+    @pytest.mark.parametrize("reversed_servo", [0, 1])
+    def test_a_reversed_servo_steers_as_the_vessel_does(self, tmp_path, reversed_servo) -> None:
+        found = read_log(dataflash(tmp_path / "servo.log", reversed_servo=reversed_servo))
+        (rudder,) = (stream for stream in found.streams if stream.quantity == "rudder_order")
+        assert rudder.values * 35 == pytest.approx(np.degrees(voyage().rudder), abs=0.1)
+
+
+class TestParts:
+    @pytest.fixture
+    def parts(self, tmp_path) -> list[Path]:
+        table = frame()
+        paths = [tmp_path / "whole.csv", tmp_path / "a.csv", tmp_path / "b.csv"]
+        for path, rows in zip(paths, (table, table[:700], table[700:]), strict=True):
+            rows.to_csv(path, index=False)
+        return paths
+
+    @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+    def test_files_that_follow_each_other_are_one_log(self, parts, order) -> None:
+        whole, *halves = parts
+        one, joined = log(whole), log([halves[place] for place in order])
+        assert len(joined.cuts) == len(one.cuts) == 2
+        for name, series in one.voyage.series.items():
+            np.testing.assert_allclose(joined.voyage.series[name].values, series.values, rtol=0, atol=1e-9)
+
+    def test_files_of_the_same_time_stay_apart(self, parts, tmp_path) -> None:
+        table = frame().drop(columns=["heading_deg"])
+        table.to_csv(tmp_path / "other.csv", index=False)
+        result = log([parts[0], tmp_path / "other.csv"])
+        assert any(channel.stream.startswith("whole: ") for channel in result.voyage.channels.channels)
+
+
+def test_hours_of_am_and_pm_are_read(tmp_path) -> None:
+    table = frame()
+    moments = pd.to_datetime(table["utc"])
+    table["utc"] = moments.dt.strftime("%m/%d/%Y %I:%M:%S.%f %p")
+    table.to_csv(tmp_path / "us.csv", index=False)
+    expected = ((moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)).to_numpy()
+    np.testing.assert_allclose(read_log(tmp_path / "us.csv").streams[0].time_s, expected, atol=1e-5)
+
+
+def test_a_time_that_cannot_be_read_is_named(tmp_path) -> None:
+    table = frame()
+    table["utc"] = [f"{29}.11.2023 quarter past {k}" for k in range(len(table))]
+    table.to_csv(tmp_path / "odd.csv", index=False)
+    with pytest.raises(InputError, match="column"):
+        read_log(tmp_path / "odd.csv")
+
+
+class TestSentences:
+    @pytest.fixture(autouse=True)
+    def _library(self) -> None:
+        pytest.importorskip("pynmea2")
+
+    def test_a_log_without_checksums_is_read_and_says_so(self, tmp_path) -> None:
+        lines = nmea_lines()
+        for name, text in (("with", lines), ("without", [line.split("*")[0] for line in lines])):
+            (tmp_path / f"{name}.nmea").write_text("\n".join(text) + "\n", encoding="ascii")
+        checked, unchecked = (read_log(tmp_path / f"{name}.nmea") for name in ("with", "without"))
+        assert unchecked.counts["corrupted"] == 0
+        assert any("checksum" in finding.text for finding in unchecked.findings)
+        for one, other in zip(checked.streams, unchecked.streams, strict=True):
+            np.testing.assert_array_equal(one.values, other.values)
+
+    def test_a_true_heading_with_a_status_is_a_heading(self, tmp_path) -> None:
+        lines = []
+        for line in nmea_lines():
+            words = line.split("*")[0].split(",")
+            status = "V" if len(lines) < 100 else "A"
+            lines.append(sentence(f"HETHS,{words[1]},{status}") if words[0].endswith("HDT") else line)
+        (tmp_path / "ths.nmea").write_text("\n".join(lines) + "\n", encoding="ascii")
+        (heading,) = (stream for stream in read_log(tmp_path / "ths.nmea").streams if stream.quantity == "heading")
+        valid = [line.split(",")[1] for line in lines[100:] if "THS" in line]
+        np.testing.assert_array_equal(heading.values, np.array(valid, dtype=float))
