@@ -31,6 +31,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "engine_lag": {"time_constant_s": 15.0},
     "engine_telegraph": {"time_constant_s": 8.0, "start_s": 6.0, "reversal_s": 25.0},
     "astern_thrust": {"factor": 0.6},
+    "propeller_astern": {"side_force": 1.0},
     "controllable_pitch": {"pitch": 0.6, "design_pitch": 0.8},
     "twin_orders": {"propeller_starboard_rpm": -30.0, "propeller_port_rpm": 20.0},
     "bow_tunnel_thruster": {"command": 0.5},

@@ -42,6 +42,7 @@ EFFECTS: Registry[Effect] = Registry(
         propeller.ENGINE_LAG,
         propeller.ENGINE_TELEGRAPH,
         propeller.REVERSED_THRUST,
+        propeller.PROPELLER_ASTERN,
         controllable_pitch.CONTROLLABLE_PITCH,
         twin_screws.TWIN_ORDERS,
         harbour.BOW_THRUSTER,

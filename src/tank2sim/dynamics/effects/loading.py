@@ -56,7 +56,8 @@ def _ratios(
 
     def regression(name: str) -> ca.SX:
         bracket = CLARKE_BRACKETS[name]
-        return ratio**2 * (bracket(bl, bt / ratio, block * ratio ** (volume - 1)) / bracket(bl, bt, block))
+        at_draught = bracket(bl, bt / ratio, block * ratio ** (volume - 1))
+        return ca.SX(ratio**2 * (at_draught / bracket(bl, bt, block)))
 
     found = {}
     for full_name in model.parameter_names:
