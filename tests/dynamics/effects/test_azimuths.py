@@ -13,7 +13,14 @@ from tank2sim.simulation.running import Running
 from .ships import U0, B, L, added_forces, ship, state
 
 FORCE, NOMINAL = 4e5, 150.0 * 2 * math.pi / 60
-GIVEN = {"revolutions_1_rpm": 100.0, "angle_1_deg": 30.0, "force_N": FORCE, "nominal_rpm": 150.0}
+GIVEN = {
+    "revolutions_1_rpm": 100.0,
+    "angle_1_deg": 30.0,
+    "force_N": FORCE,
+    "nominal_rpm": 150.0,
+    "time_constant_s": 5.0,
+    "max_rate_degps": 12.0,
+}
 
 
 @pytest.mark.parametrize("motion", [(0.0, 0.0, 0.0), (3.0, -0.4, 0.006), (-1.0, 0.2, -0.01)])

@@ -10,6 +10,8 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.controllable_pitch import ADVANCE_SHARE
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
+from tank2sim.dynamics.effects.froude_scale import rates, time_scale_passages
+from tank2sim.dynamics.effects.harbour import largest_force
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Input, Model, Quantity, State
 
@@ -103,7 +105,7 @@ def _unit(unit: int) -> tuple[EffectParameter, ...]:
             None if first else 0.0,
             input_name=f"azimuth.revolutions_{unit}",
             absent=0.0,
-            typical=(10.0,),
+            typical=rates(200.0),  # those of a merchant ship (project choice)
         ),
         EffectParameter(
             f"angle_{unit}_rad",
@@ -134,8 +136,14 @@ AZIMUTHS = Effect(
     source="Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 9.1 and 9.4",
     parameters=(
         *(parameter for unit in range(1, UNITS_OF_SHIP + 1) for parameter in _unit(unit)),
-        EffectParameter("force_N", "thrust of each unit at rest and nominal revolutions", 0.0, 1e7, typical=(3e5,)),
-        EffectParameter("nominal_radps", "nominal revolutions of each unit", 0.1, 400.0, typical=(15.0,)),
+        EffectParameter(
+            "force_N",
+            "thrust of each unit at rest and nominal revolutions",
+            0.0,
+            1e7,
+            typical=lambda card: (4 * largest_force(card),),  # four tunnel thrusters (project choice)
+        ),
+        EffectParameter("nominal_radps", "nominal revolutions of each unit", 0.1, 400.0, typical=rates(300.0)),
         EffectParameter(
             "no_thrust_mps",
             "speed of the water along the unit at which it has no thrust at nominal revolutions",
@@ -145,14 +153,27 @@ AZIMUTHS = Effect(
             lambda card: card.model.speed_mps / ADVANCE_SHARE,
         ),
         EffectParameter("astern", "thrust at reversed revolutions over that ahead, at rest", 0.0, 1.0, 0.6),
-        EffectParameter("time_constant_s", "time constant of the revolutions", 0.01, 600.0, 5.0),
-        EffectParameter("angle_time_constant_s", "time constant of the turn of the unit", 0.01, 600.0, 1.0),
+        # 5 s, 1 s and 12 deg/s, two turns in a minute, of a ship whose L/u0 is 20 s, by Froude's law (project choices).
+        EffectParameter(
+            "time_constant_s",
+            "time constant of the revolutions, by default a quarter of L/u0",
+            0.01,
+            600.0,
+            lambda card: time_scale_passages(0.25)(card)[0],
+        ),
+        EffectParameter(
+            "angle_time_constant_s",
+            "time constant of the turn of the unit, by default a twentieth of L/u0",
+            0.01,
+            600.0,
+            lambda card: time_scale_passages(0.05)(card)[0],
+        ),
         EffectParameter(
             "max_rate_radps",
-            "largest rate at which a unit turns, by default 12 deg/s",
+            "largest rate at which a unit turns, by default 240 deg in L/u0",
             0.001,
             6.3,
-            math.radians(12.0),  # two turns in a minute, as makers state (project choice)
+            lambda card: rates(math.radians(240.0))(card)[0],
         ),
     ),
     equations=_with_azimuths,

@@ -134,13 +134,19 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
 _WITH_MASS = ("ship.mass", "ship.yaw_inertia", "ship.roll_inertia", "ship.weight")
 
 
+def _a_little_lighter(card: ManoeuvringCard) -> tuple[float]:
+    return (LIGHTER * model_particular(card, "draught_m"),)
+
+
 LOADING = Effect(
     name="loading",
     acts_on="force and mass",
     description="A ship that is deeper, lighter or trimmed has another mass, and other forces on the hull.",
     source="Clarke, Gedling and Hine (1983); Inoue, Hirano and Kijima (1981); Admiralty coefficient",
     parameters=(
-        EffectParameter("mean_draught_m", "mean draught, in place of the card's", 0.01, 50.0),
+        EffectParameter(
+            "mean_draught_m", "mean draught, in place of the card's", 0.01, 50.0, typical=_a_little_lighter
+        ),
         EffectParameter("trim_m", "trim in addition to the card's, positive by the stern", -10.0, 10.0, 0.0),
     ),
     equations=_loaded,
