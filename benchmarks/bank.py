@@ -27,8 +27,8 @@ import casadi as ca
 import numpy as np
 
 import tank2sim as t2s
+from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.dynamics.effects.banks import SQUAT_BY_BANK, SQUAT_BY_PROPELLER
-from tank2sim.identification.estimates import Particulars, estimate
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[1] / ".." / "shared")) / "data"
 LENGTH_M, BEAM_M, WALL_M, DENSITY = 0.945 * 4.332, 0.530, 3.5, 1000.0

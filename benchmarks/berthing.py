@@ -1,7 +1,8 @@
 """Berthing of the 3 m Esso Osaka model: median position error 100 s after a measured state, over the length.
 
-The card is identified here from turns and zigzags, in which no propeller turns astern: once with the thrust astern as
-the mirror of that ahead, and once with the share that is published of this ship. Or it is the one that is given. The
+The card is identified here from turns and zigzags, in which no propeller turns astern: with the thrust astern as the
+mirror of that ahead, with the share that is published of this ship, with its published thrust and side force astern by
+the advance ratio, and with the forces at low speed up to 0.9 of u0 as well. Or it is the one that is given. The
 measured rudder, revolutions and wind are its inputs; each window starts in the measured state. Needs the data folder.
 
 At the end, where the error comes from: median errors after 20 s with the propeller astern and ahead, and a propeller
@@ -148,6 +149,16 @@ def with_published_astern(ship: t2s.Ship) -> t2s.Ship:
     return t2s.Ship(replace(ship.manoeuvring(), effects=(*ship.manoeuvring().effects, astern)))
 
 
+def with_published_propeller(ship: t2s.Ship, low_speed_mps: float | None = None) -> t2s.Ship:
+    """The ship with thrust and side force astern of the same, and another bound of the forces at low speed (m/s)."""
+    card = ship.manoeuvring()
+    astern = EffectEntry(name="propeller_astern", parameters={"side_force": 1.0})
+    model = (
+        card.model if low_speed_mps is None else card.model.model_copy(update={"low_speed_below_mps": low_speed_mps})
+    )
+    return t2s.Ship(replace(card, model=model, effects=(*card.effects, astern)))
+
+
 def main() -> None:
     """Print the median position error of each run and of all."""
     paths = sorted((DATA / "esso_osaka_berthing").glob("*.csv"))
@@ -157,7 +168,12 @@ def main() -> None:
         cards = {name: t2s.load(name) for name in names}
     else:
         ship = identified()
-        cards = {"thrust astern as ahead": ship, "thrust astern as published": with_published_astern(ship)}
+        cards = {
+            "thrust astern as ahead": ship,
+            "thrust astern as published": with_published_astern(ship),
+            "thrust and side force astern as published": with_published_propeller(ship),
+            "the same, forces at low speed below 0.28 m/s": with_published_propeller(ship, 0.28),
+        }
     trials = [read_trial_file(path) for path in paths]
     for name, ship in cards.items():
         print(name)

@@ -50,11 +50,13 @@ FAMILIES = {
     "controllable_pitch": "Propeller and engine",
     "twin_screws": "Propeller and engine",
     "harbour": "Thrusters and tugs",
+    "azimuths": "Thrusters and tugs",
     "rudder": "Rudder",
     "loaded_rudder": "Rudder",
     "gear": "Steering gear",
     "hull": "Hull",
     "derivatives": "Hull: derivatives and masses",
+    "loading": "Hull: derivatives and masses",
     "dynamic_effects": "Hull: states of their own",
     "sensors": "Sensors",
 }

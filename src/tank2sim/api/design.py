@@ -14,6 +14,7 @@ from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
+from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.cards.writing import TestedRange
 from tank2sim.design.captive_design import DRAWN_SHIPS, CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
 from tank2sim.design.figure_slopes import FIGURES_OPTION, figure_of_text, range_of_figures
@@ -21,7 +22,6 @@ from tank2sim.design.plan_files import campaign_template, plan_csv, run_rows, ru
 from tank2sim.design.tank_form import TankFile, read_tank, with_tank_values
 from tank2sim.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.errors import InputError
-from tank2sim.identification.estimates import RELATIVE_ERROR
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.marks import ASSUMED, ASSUMED_TANK, CHECK, LINEARISED
 from tank2sim.units import from_si, to_si

@@ -13,12 +13,12 @@ from tank2sim.analysis.influence.figures import FIGURE_KINDS, InfluenceFigure, p
 from tank2sim.analysis.influence.study import Study
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.cards.writing import TestedRange
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, joint_errors
 from tank2sim.dynamics.effects.derivatives import hydrodynamic
 from tank2sim.errors import InputError
-from tank2sim.identification.estimates import RELATIVE_ERROR
 from tank2sim.simulation.run import simulate
 
 FIGURES_OPTION = "--figures"

@@ -16,13 +16,13 @@ from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.design.allocation import Allocation, InformationBlock, target_matrices
 from tank2sim.design.figure_slopes import FIGURES_OPTION, FigureSlopes, figure_slopes
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip
 from tank2sim.gap.outcome.next_test_candidates import Candidate, candidate_manoeuvres, orders_csv
-from tank2sim.identification.estimates import RELATIVE_ERROR
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 
 SENSORS: Mapping[str, float] = {

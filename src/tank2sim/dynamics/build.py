@@ -75,9 +75,14 @@ def _model(card: Card) -> Model:
     if not isinstance(card, ManoeuvringCard | CraftCard):
         raise TypeError(f"no model for {type(card).__name__}")
     model = craft_model(card) if isinstance(card, CraftCard) else ship_model(card)
-    for number, entry in enumerate(card.effects):
+    for number, entry in sorted(enumerate(card.effects), key=lambda numbered: _comes_last(numbered[1])):
         model = _with_effect(model, card, entry, f"effects.{number}")
     return model
+
+
+def _comes_last(entry: EffectEntry) -> bool:
+    effect = EFFECTS.get(entry.name)
+    return effect is not None and effect.last
 
 
 def _with_effect(model: Model, card: ManoeuvringCard | CraftCard, entry: EffectEntry, place: str) -> Model:

@@ -13,10 +13,10 @@ from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, POSTER_MANOEUVRES,
 from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
 from tank2sim.analysis.guess.study import guess_ship, parse_figures
 from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.reading import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.estimates import Particulars, estimate
 from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate

@@ -12,7 +12,7 @@ from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.response import FIRST_ORDER, GEAR, HULL, steering_responses
 from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.analysis.turning.characteristic import steering_characteristic
-from tank2sim.analysis.turning.diagram import steady_turning
+from tank2sim.analysis.turning.diagram import SteadyTurning, steady_turning
 from tank2sim.analysis.turning.spirals import direct_spiral, reverse_spiral
 from tests.analysis.turning.cubic_ship import LENGTH_M, N_D, N_RRR, SPEED_MPS, STABLE, UNSTABLE, cubic_ship, rudder_rad
 
@@ -75,3 +75,27 @@ def test_spirals_lie_on_the_diagram_the_reverse_one_on_its_unstable_branch_too()
     assert held.sum() >= 2 and reverse.steady[held].all()
     expected = [rudder_rad(UNSTABLE, one) for one in reverse.yaw_rate_radps[held]]
     np.testing.assert_allclose(reverse.rudder_rad[held], expected, atol=math.radians(0.02))
+
+
+def test_a_curve_that_turns_back_between_two_of_its_points_is_used_up_to_there() -> None:
+    rate = np.array([-4.0, -5.0, -3.0, -1.0, 0.0, 1.0, 3.0, 5.0, 4.0])
+    rows = np.arange(len(rate))
+    flat = np.zeros(len(rate))
+    turning = SteadyTurning(
+        rudder_rad=0.1 * (rows - 4.0),
+        yaw_rate_radps=1e-3 * rate,
+        speed_mps=flat,
+        drift_rad=flat,
+        heel_rad=None,
+        growth_per_s=flat - 1,
+        slope=np.tile([1.0, 1e-2], (len(rate), 1)),
+        arc=0.1 * rows,
+        straight=4,
+        folds=(),
+        loop=None,
+        ended=("", ""),
+        notices=(),
+    )
+    found = steering_characteristic(turning)
+    assert found is not None
+    assert found.yaw_rate_radps[[0, -1]].tolist() == [-5e-3, 5e-3]

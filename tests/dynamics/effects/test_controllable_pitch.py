@@ -11,7 +11,12 @@ import pytest
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.effects.controllable_pitch import b_series_thrust, pitch_thrust
+from tank2sim.dynamics.effects.controllable_pitch import (
+    b_series_thrust,
+    b_series_torque,
+    pitch_thrust,
+    pitch_torque,
+)
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
@@ -85,7 +90,66 @@ def test_on_an_mmg_card_the_thrust_and_the_race_on_the_rudder_change() -> None:
         assert np.sign(found[1] - without[1]) == np.sign(pitch - 0.72)
     with pytest.raises(InputError, match=r"advance_share: acts on nothing"):
         build(parse_card(text + added.replace("}", ", advance_share = 0.6}"), "ship.toml"))
-    assert not [name for name in model.outputs if name.startswith(("propeller.torque", "propeller.power"))]
+
+
+def test_torque_and_thrust_of_the_series_have_the_efficiency_of_good_propellers() -> None:
+    """One of P/D = 1 has its best in open water near 0.7."""
+    efficiency = [
+        J / (2 * math.pi) * b_series_thrust(J, 1.0, 0.55, 4) / b_series_torque(J, 1.0, 0.55, 4)
+        for J in np.arange(0.1, 1.0, 0.05)
+    ]
+    assert 0.65 < max(efficiency) < 0.75
+    assert min(efficiency) > 0
+
+
+def torque_at_pitch(J: float, pitch: float) -> float:
+    x = ca.SX.sym("x", 2)
+    torque = pitch_torque(x[0], x[1], ca.SX(0.55), ca.SX(4))
+    return float(ca.Function("torque", [x], [torque])([J, pitch]))
+
+
+def test_torque_is_least_at_zero_pitch_and_has_no_step_there_at_rest() -> None:
+    pitches = np.linspace(-1.4, 1.4, 281)
+    torques = np.array([torque_at_pitch(0.0, pitch) for pitch in pitches])
+    assert np.argmin(torques) == 140 and np.max(np.abs(np.diff(torques))) < 0.003
+    # 1/2 rho C_D A_E (2 pi n 0.35 D)^2 0.35 D over rho n^2 D^5
+    idle = 0.5 * 0.01 * 0.55 * math.pi / 4 * (0.7 * math.pi) ** 2 * 0.35
+    assert torque_at_pitch(0.4, 0.0) == pytest.approx(idle)
+    assert torque_at_pitch(0.4, 0.9) == pytest.approx(b_series_torque(0.4, 0.9, 0.55, 4))
+
+
+@pytest.mark.parametrize("with_torque", [True, False])
+def test_torque_and_power_of_an_mmg_card_change_by_the_series_or_are_those_of_it(with_torque: bool) -> None:
+    text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
+    if with_torque:
+        text = text.replace("[propeller]", "[propeller]\nq_0 = 0.034\nq_1 = -0.025\nq_2 = -0.01\neta_R = 1.01", 1)
+    added = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
+    model = build(parse_card(text + added, "ship.toml"))
+    u, n, D = 0.9, 10.0, 0.216
+    J = 0.6 * u / (n * D)
+    unit = 1000.0 * n**2 * D**5
+    for pitch in (0.72, 1.0, -0.5):
+        at = {"motion.u": u, "propeller.speed": 2 * math.pi * n, "propeller.pitch_actual": pitch}
+        Q, power = values(model, ["propeller.torque", "propeller.power"], at)
+        if with_torque:
+            own = (0.034 - 0.025 * J - 0.01 * J**2) / 1.01
+            K_Q = own + (torque_at_pitch(J, pitch) - torque_at_pitch(J, 0.72)) / 1.01
+        else:
+            K_Q = torque_at_pitch(J, pitch)
+        assert pytest.approx(unit * K_Q, rel=1e-9) == Q
+        assert power == pytest.approx(2 * math.pi * n * Q)
+    assert {"propeller.torque", "propeller.power"} <= set(model.outputs)
+
+
+def test_a_polynomial_has_torque_where_its_card_states_the_diameter() -> None:
+    stated = mariner_text(draught_m="draught_m = 7.468\npropeller_diameter_m = 6.7")
+    u, pitch, share = 5.0, 1.1, 0.8
+    at = {**state(u, 0.0, 0.0), "propeller.pitch_actual": pitch, "propeller.speed": share * N0}
+    Q, power = values(ship({"controllable_pitch": PITCH}, stated), ["propeller.torque", "propeller.power"], at)
+    K_Q = torque_at_pitch(0.7 * 0.8 * (u / U0) / share, pitch)
+    assert pytest.approx(RHO * (share * N0 / (2 * math.pi)) ** 2 * 6.7**5 * K_Q, rel=1e-9) == Q
+    assert power == pytest.approx(share * N0 * Q)
+    assert "propeller.torque" not in ship({"controllable_pitch": PITCH})
 
 
 def test_validity_falls_below_the_pitches_of_the_series() -> None:

@@ -54,6 +54,7 @@ def test_typical_parameters_change_something(name: str) -> None:
         **state(6.5, 0.5, 0.01, 0.5),
         **{"motion.psi": 0.7, "rudder.command": 0.45, "propeller.speed": -5.0, "motion.phi": 0.02},
     }
+    at["azimuth.revolutions_actual_1"] = 8.0
     if name == "controllable_pitch":  # a propeller that turns ahead
         at["propeller.speed"] = 5.0
     model, bare = ship({name: TYPICAL[name]}), ship()
@@ -124,6 +125,7 @@ ODD = [
     "rudder_effectiveness", "rudder_slipstream", "rudder_stall", "cross_flow_drag", "cubic_yaw_damping",
     "sway_yaw_coupling", "turning_drag", "added_yaw_inertia", "linear_yaw_damping", "linear_sway_damping",
     "shallow_water", "hull_fouling", "engine_droop", "flow_memory", "roll_coupling", "trim", "hump_resistance",
+    "loading",
 ]  # fmt: skip
 EVEN = ["propeller_side_force", "bank_suction", "bank", "asymmetric_turning", "loading_side_force"]
 SYMMETRIC = mariner_text(

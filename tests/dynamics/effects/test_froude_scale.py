@@ -111,6 +111,8 @@ def test_what_never_vanishes_replaces_something_or_needs_depth() -> None:
         "controllable_pitch",
         "water_depth",
         "finite_depth",
+        "propeller_astern",
+        "loading",
     }
 
 

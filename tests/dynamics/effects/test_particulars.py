@@ -28,6 +28,7 @@ def test_every_effect_that_needs_no_engine_is_on_a_minimal_card() -> None:
             "engine_lag",
             "engine_telegraph",
             "astern_thrust",
+            "propeller_astern",
             "twin_orders",
             "controllable_pitch",
         ):

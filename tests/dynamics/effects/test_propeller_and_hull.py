@@ -41,6 +41,35 @@ def test_a_propeller_walks_only_astern() -> None:
     np.testing.assert_allclose(found, [0.0, -1e-4 * q, 5e-5 * q * L], rtol=1e-6, atol=1e-5)
 
 
+@pytest.mark.parametrize("J", [-1.2, -0.35, -0.3, -0.1, -0.06, -0.02, 0.4])
+def test_a_propeller_astern_has_the_published_thrust_and_side_force_in_place_of_the_cards(J: float) -> None:
+    """Esso Osaka (Miyauchi et al. 2022): A_1 to A_5, B_1 to B_5, C_3, C_6, C_7 as printed."""
+    D, n = 0.6 * T, -1.1
+    if J < -0.35:
+        A, N_by_J = -4.93e-3 - 5.87e-3 * J, 1.96e-3 + 2.33e-3 * J
+    elif J > -0.06:
+        A, N_by_J = -5.58e-4, 2.25e-4
+    else:
+        A, N_by_J = -7.90e-5 + 7.99e-3 * J, 3.50e-5 - 3.17e-3 * J
+    C = -0.251 if J < -0.233 else -0.175 + 0.33 * J
+    at = {**state(J * n * D, 0.0, 0.0), "propeller.speed": 2 * np.pi * n}
+    share = 2 * np.pi * n / N0
+    of_card = -77e-5 * 0.5 * RHO * L**2 * U0**2 * share**2
+    X, Y, N = added_forces("propeller_astern", {"side_force": 1.0}, at)
+    assert pytest.approx(RHO * D**4 * n**2 * C - of_card, rel=5e-3) == X
+    assert pytest.approx(0.5 * RHO * L * T * (n * D) ** 2 * A, rel=2e-3) == Y
+    assert pytest.approx(0.5 * RHO * L**2 * T * (n * D) ** 2 * N_by_J, rel=3e-3) == N
+
+
+def test_a_propeller_ahead_has_no_part_in_it_and_one_astern_swings_the_bow_to_starboard() -> None:
+    given = {"side_force": 1.0}
+    assert not np.any(added_forces("propeller_astern", given, {**STATES[0], "propeller.speed": 0.5 * N0}))
+    running = Running(Integrator(ship({"propeller_astern": given})), {"propeller.speed": -0.6 * N0}, {"initial.u": 3.0})
+    running.run(60.0)
+    assert running.state("motion.psi") > 0.005
+    assert running.state("motion.u") < 3.0
+
+
 @pytest.mark.parametrize("at", STATES)
 def test_side_force_by_loading(at: dict[str, float]) -> None:
     U, n = np.hypot(at["motion.u"], at["motion.v"]), 0.9

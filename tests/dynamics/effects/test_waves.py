@@ -98,7 +98,8 @@ def test_drift_is_that_at_the_frequency_of_encounter_and_the_relative_direction(
                 "Y": lambda w, b: -900.0 * w * np.sin(b),
                 "N": lambda w, b: 7e3 * w * np.sin(2 * b),
             }
-        )
+        ),
+        speed_effect=0.0,
     )
     beta = np.radians(SEA["direction_deg"] - psi_deg)
     toward = u * np.cos(beta) + v * np.sin(beta)
@@ -111,6 +112,42 @@ def test_drift_is_that_at_the_frequency_of_encounter_and_the_relative_direction(
     expected = integral * np.array([-300 * np.cos(beta), -900 * np.sin(beta), 7e3 * np.sin(2 * beta)])
     found = values(model, ["waves.X", "waves.Y", "waves.N"], {**state(u, v, 0.0), "motion.psi": np.radians(psi_deg)})
     np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-6)
+
+
+@pytest.mark.parametrize(("u", "v", "psi_deg"), [(0.8, 0.0, 40.0), (0.6, -0.3, -50.0), (-0.4, 0.1, 100.0)])
+def test_speed_changes_the_drift_by_the_formula_of_aranha(u: float, v: float, psi_deg: float) -> None:
+    """The group velocity seen from the ship: D(w_e, direction of it) times the square of its size over that at rest."""
+    text = table(drift={"X": lambda w, b: -300.0 * np.cos(b), "Y": lambda w, b: -900.0 * w * np.sin(b)})
+    model = sea_ship(text)
+    psi = np.radians(psi_deg)
+    beta = np.radians(SEA["direction_deg"]) - psi
+
+    def integrand(w: float, force: int) -> float:
+        group = -G / (2 * w) * np.array([np.cos(beta), np.sin(beta)]) - [u, v]
+        size, seen = np.hypot(*group) / (G / (2 * w)), np.arctan2(-group[1], -group[0])
+        met = w + w**2 / G * (u * np.cos(beta) + v * np.sin(beta))
+        value = (-300.0 * np.cos(seen), -900.0 * met * np.sin(seen))[force]
+        return float(size**2 * value * bretschneider(w))
+
+    expected = [2 * quad(integrand, FREQUENCIES[0], FREQUENCIES[-1], (force,), limit=200)[0] for force in (0, 1)]
+    at = {**state(u, v, 0.0), "motion.psi": psi}
+    found = values(model, ["waves.X", "waves.Y"], at)
+    plain = values(sea_ship(text, speed_effect=0.0), ["waves.X", "waves.Y"], at)
+    np.testing.assert_allclose(found, expected, atol=0.03 * np.max(np.abs(expected)))
+    assert np.max(np.abs(found - plain)) > 0.05 * np.max(np.abs(expected))
+
+
+def test_added_resistance_in_head_seas_grows_and_validity_says_how_far_the_formula_holds() -> None:
+    model = sea_ship(table(drift={"X": lambda w, b: -300.0 * np.cos(b)}))
+    names = ["waves.X", "validity_by.wave_speed"]
+    slow, fast, beam = (
+        values(model, names, {**state(u, 0.0, 0.0), "motion.psi": np.radians(psi)})
+        for u, psi in ((0.0, 40.0), (7.0, 40.0), (1.0, -50.0))
+    )
+    assert fast[0] < 1.5 * slow[0] < 0 and beam[0] < 0  # a beam sea is met from ahead of the beam
+    assert (slow[1], fast[1]) == (1.0, 0.0)
+    calm = values(model, names, {**state(7.0, 0.0, 0.0), "waves.height": 0.0})
+    assert calm.tolist() == [0.0, 1.0]
 
 
 def test_the_drift_is_what_the_effect_adds_to_the_forces_and_the_phase_of_the_waves_is_not() -> None:

@@ -34,10 +34,10 @@ from tank2sim.analysis.conversion.origin import shift_matrix, shifted_body
 from tank2sim.analysis.guess.prior import rudder_by_rules
 from tank2sim.cards.card import scales_of_file
 from tank2sim.cards.coefficient_table import STATED_CONVENTIONS, CoefficientTable
+from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.form import RigidBody, ShipModel, ShipSection
 from tank2sim.cards.scaling import FileScales, file_factor
 from tank2sim.cards.terms import known_term
-from tank2sim.identification.estimates import Particulars, estimate
 
 PRIOR: Mapping[str, Mapping[str, float]] = {
     "rudder_sign": {"starboard": 0.5, "port": 0.5},
@@ -440,7 +440,7 @@ def with_diameter(ranked: RankedReading, diameter_lengths: float | None) -> Rank
 def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
     """TOML of a card of the ship by a reading: prime, midships, hydrodynamic, rudder to starboard.
 
-    Accelerations that the table lacks are the estimates of :mod:`tank2sim.identification.estimates`, and said so.
+    Accelerations that the table lacks are the estimates of :mod:`tank2sim.cards.estimates`, and said so.
     """
     filled, ship = _filled(table, ranked.ship), ranked.ship
     third = any(

@@ -1,6 +1,6 @@
 """What is known of a ship by its main dimensions alone: a card of published estimates with wide standard errors.
 
-Linear and acceleration derivatives are those of :mod:`tank2sim.identification.estimates`. The rudder is one of the
+Linear and acceleration derivatives are those of :mod:`tank2sim.cards.estimates`. The rudder is one of the
 area that rules of classification require, in the slipstream of its propeller. For all other numbers there is no
 regression that would hold here: their means and standard errors enclose what was identified or measured on the bundled
 KVLCC2, Esso Osaka and Mariner, three ships, and so are uncertain themselves.
@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards.estimates import GYRATION, Particulars, estimate
 from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, TestedRange, manoeuvring_card_text
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS
 from tank2sim.dynamics.effects.hull import CROSS_FLOW_DRAG
 from tank2sim.dynamics.effects.loaded_rudder import LOADED_RUDDER
 from tank2sim.errors import InputError
-from tank2sim.identification.estimates import GYRATION, Particulars, estimate
 from tank2sim.units import KNOT_MPS
 
 _THREE_SHIPS = "ESTIMATED: about what KVLCC2, Esso Osaka and Mariner have"

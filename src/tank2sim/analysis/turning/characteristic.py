@@ -138,10 +138,11 @@ def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -
 
 def _single_valued(turning: SteadyTurning) -> tuple[int, int]:
     """First and last row of the part around the straight course on which the yaw rate rises."""
-    rising = turning.slope[:, 1] > 0
+    rising, rate = turning.slope[:, 1] > 0, turning.yaw_rate_radps
     first = last = turning.straight
-    while first > 0 and rising[first - 1]:
+    # Where the curve turns back between two rows, both rise.
+    while first > 0 and rising[first - 1] and rate[first - 1] < rate[first]:
         first -= 1
-    while last < len(rising) - 1 and rising[last + 1]:
+    while last < len(rising) - 1 and rising[last + 1] and rate[last + 1] > rate[last]:
         last += 1
     return first, last

@@ -1,6 +1,7 @@
 """Physical effects on top of the polynomial: each a function from model to model."""
 
 from tank2sim.dynamics.effects import (
+    azimuths,
     banks,
     controllable_pitch,
     depth,
@@ -11,6 +12,7 @@ from tank2sim.dynamics.effects import (
     harbour,
     hull,
     loaded_rudder,
+    loading,
     propeller,
     rudder,
     sensors,
@@ -40,11 +42,13 @@ EFFECTS: Registry[Effect] = Registry(
         propeller.ENGINE_LAG,
         propeller.ENGINE_TELEGRAPH,
         propeller.REVERSED_THRUST,
+        propeller.PROPELLER_ASTERN,
         controllable_pitch.CONTROLLABLE_PITCH,
         twin_screws.TWIN_ORDERS,
         harbour.BOW_THRUSTER,
         harbour.STERN_THRUSTER,
         harbour.TUG_FORCES,
+        azimuths.AZIMUTHS,
         rudder.RUDDER_BIAS,
         rudder.RUDDER_EFFECTIVENESS,
         rudder.RUDDER_SLIPSTREAM,
@@ -70,6 +74,7 @@ EFFECTS: Registry[Effect] = Registry(
         derivatives.WATER_DEPTH,
         depth.FINITE_DEPTH,
         derivatives.TRIM,
+        loading.LOADING,
         dynamic_effects.ROLL_COUPLING,
         dynamic_effects.FLOW_MEMORY,
         sensors.GYRO_BIAS,

@@ -8,7 +8,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.effects.froude_scale import lengths
-from tank2sim.dynamics.effects.particulars import with_particulars
+from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
 from tank2sim.dynamics.hull import inside_range, validity_factor
 from tank2sim.dynamics.model import Model, Quantity
 
@@ -105,7 +105,7 @@ def _with_banks(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
         name="squat.bank",
         unit="m",
         description="Largest sinkage by squat near a bank: that of ICORELS, more by bank and propeller",
-        nominal=0.1 * draught,
+        nominal=0.1 * model_particular(card, "draught_m"),
         value=model.symbol("squat.icorels") * (1 + added),
     )
     drawn = drawn.extend(squat, outputs=[squat.name])

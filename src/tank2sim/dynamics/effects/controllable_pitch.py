@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -61,6 +61,57 @@ B_SERIES: Sequence[tuple[float, int, int, int, int]] = (
     (-0.00146564, 0, 3, 2, 2),
 )
 """C, s, t, u, v of K_T = sum of C J^s (P/D)^t (A_E/A_0)^u Z^v, at a Reynolds number of 2e6."""
+
+B_SERIES_TORQUE: Sequence[tuple[float, int, int, int, int]] = (
+    (0.00379368, 0, 0, 0, 0),
+    (0.00886523, 2, 0, 0, 0),
+    (-0.032241, 1, 1, 0, 0),
+    (0.00344778, 0, 2, 0, 0),
+    (-0.0408811, 0, 1, 1, 0),
+    (-0.108009, 1, 1, 1, 0),
+    (-0.0885381, 2, 1, 1, 0),
+    (0.188561, 0, 2, 1, 0),
+    (-0.00370871, 1, 0, 0, 1),
+    (0.00513696, 0, 1, 0, 1),
+    (0.0209449, 1, 1, 0, 1),
+    (0.00474319, 2, 1, 0, 1),
+    (-0.00723408, 2, 0, 1, 1),
+    (0.00438388, 1, 1, 1, 1),
+    (-0.0269403, 0, 2, 1, 1),
+    (0.0558082, 3, 0, 1, 0),
+    (0.0161886, 0, 3, 1, 0),
+    (0.00318086, 1, 3, 1, 0),
+    (0.015896, 0, 0, 2, 0),
+    (0.0471729, 1, 0, 2, 0),
+    (0.0196283, 3, 0, 2, 0),
+    (-0.0502782, 0, 1, 2, 0),
+    (-0.030055, 3, 1, 2, 0),
+    (0.0417122, 2, 2, 2, 0),
+    (-0.0397722, 0, 3, 2, 0),
+    (-0.00350024, 0, 6, 2, 0),
+    (-0.0106854, 3, 0, 0, 1),
+    (0.00110903, 3, 3, 0, 1),
+    (-0.000313912, 0, 6, 0, 1),
+    (0.0035985, 3, 0, 1, 1),
+    (-0.00142121, 0, 6, 1, 1),
+    (-0.00383637, 1, 0, 2, 1),
+    (0.0126803, 0, 2, 2, 1),
+    (-0.00318278, 2, 3, 2, 1),
+    (0.00334268, 0, 6, 2, 1),
+    (-0.00183491, 1, 1, 0, 2),
+    (0.000112451, 3, 2, 0, 2),
+    (-0.0000297228, 3, 6, 0, 2),
+    (0.000269551, 1, 0, 1, 2),
+    (0.00083265, 2, 0, 1, 2),
+    (0.00155334, 0, 2, 1, 2),
+    (0.000302683, 0, 6, 1, 2),
+    (-0.0001843, 0, 0, 2, 2),
+    (-0.000425399, 0, 3, 2, 2),
+    (0.0000869243, 3, 3, 2, 2),
+    (-0.0004659, 0, 6, 2, 2),
+    (0.0000554194, 1, 6, 2, 2),
+)
+"""The same of K_Q; alike in public transcriptions except for the 40th number, which is that of most of them."""
 # fmt: on
 
 LEAST_PITCH, LARGEST_PITCH, LARGEST_J = 0.5, 1.4, 1.6
@@ -72,6 +123,10 @@ PLATE_DRAG = 1.17
 ASTERN_OF_CAMBER = 0.7
 """Thrust at rest with a negative pitch over that with the same ahead: blades are then cambered and twisted the wrong
 way. Project choice, a little below that of a reversed propeller (:data:`tank2sim.cards.form.ASTERN_THRUST`)."""
+
+SECTION_DRAG = 0.01
+"""Drag coefficient of a blade's section along the stream, both sides and form: of blades that turn at zero pitch.
+Project choice, in the middle of 0.008 to 0.012 of thin sections."""
 
 ADVANCE_SHARE = 0.7
 """J of the design over P/D where a card states no propeller: a slip of 30 %. Project choice."""
@@ -89,8 +144,23 @@ def b_series_thrust(J: Any, pitch: Any, area: Any, blades: Any) -> Any:
     area, blades : float or symbol
         A_E/A_0 of 0.30 to 1.05, and Z of 2 to 7.
     """
+    return _of_series(B_SERIES, J, pitch, area, blades)
+
+
+def b_series_torque(J: Any, pitch: Any, area: Any, blades: Any) -> Any:
+    """Return K_Q of a propeller of the Wageningen B-series.
+
+    Parameters
+    ----------
+    J, pitch, area, blades : float or symbol
+        As of :func:`b_series_thrust`.
+    """
+    return _of_series(B_SERIES_TORQUE, J, pitch, area, blades)
+
+
+def _of_series(table: Sequence[tuple[float, int, int, int, int]], J: Any, pitch: Any, area: Any, blades: Any) -> Any:
     total: Any = 0.0
-    for coefficient, s, t, u, v in B_SERIES:
+    for coefficient, s, t, u, v in table:
         total = total + coefficient * J**s * pitch**t * area**u * blades**v
     return total
 
@@ -114,6 +184,22 @@ def pitch_thrust(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX, astern: ca.
     return total
 
 
+def pitch_torque(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX) -> ca.SX:
+    """K_Q at any P/D, positive with either sign of it: linear below that of the series, astern that at rest.
+
+    K_Q(J, P/D) = K_0 + (P/D)/0.5 (K_Q(J, 0.5) - K_0) from 0 to 0.5,   K_Q(J, -P/D) = K_Q(0, P/D)
+    K_0 = 1/2 C_D pi/4 A_E/A_0 (0.7 pi)^2 0.35
+
+    K_0 is the drag of the blades at 0.7 of the radius with :data:`SECTION_DRAG`. `J` is the advance ratio, `pitch` is
+    P/D, `area` A_E/A_0, `blades` Z.
+    """
+    idle = SECTION_DRAG / 2 * math.pi / 4 * area * (0.7 * math.pi) ** 2 * 0.35
+    size = ca.fabs(pitch)
+    met = ca.if_else(pitch > 0, J, 0)
+    inside = b_series_torque(met, ca.fmin(ca.fmax(size, LEAST_PITCH), LARGEST_PITCH), area, blades)
+    return ca.SX(idle + ca.fmin(size / LEAST_PITCH, 1) * (inside - idle))
+
+
 def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """The pitch follows its order, and the thrust changes by that of the series; the revolutions are as ordered:
 
@@ -122,7 +208,8 @@ def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     for n > 0, J = u_P/(n D), the rate no larger than 2 P_0/D in the time of reversal. P_0 is the pitch at which the
     card's own thrust is. On an MMG card T enters the race on the rudder too. A polynomial states neither D nor wake:
     there X gains (n/n_0)^2 of the card's thrust times (K_T(J, P/D) - K_T(J, P_0/D))/K_T(J_0, P_0/D), with
-    J = J_0 (u/u_0)/(n/n_0).
+    J = J_0 (u/u_0)/(n/n_0). The torque of a card with K_Q gains rho n^2 D^5 (K_Q(J, P/D) - K_Q(J, P_0/D))/eta_R; where
+    a card states D and no K_Q, it is rho n^2 D^5 K_Q(J, P/D), for n > 0.
     """
     if "propeller.speed_actual" not in model:
         raise card.fault("propulsion", "is missing", "controllable_pitch needs the revolutions of the propeller")
@@ -157,45 +244,86 @@ def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     model = model.redefine("validity", lambda validity: validity * factor.symbol)
     model = with_steps_for(model, "controllable_pitch.time_constant")
 
-    def coefficients(J: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """K_T at the pitch, and at that of the design."""
+    blades = given["area_ratio"], given["blades"]
+
+    def coefficients(J: ca.SX) -> Coefficients:
         held = ca.fmin(ca.fmax(J, 0), LARGEST_J)
-        blades = given["area_ratio"], given["blades"], given["astern"]
-        return pitch_thrust(held, pitch.symbol, *blades), pitch_thrust(held, given["design_pitch"], *blades)
+        both = pitch.symbol, given["design_pitch"]
+        thrusts = [pitch_thrust(held, one, *blades, given["astern"]) for one in both]
+        return Coefficients(*thrusts, *(pitch_torque(held, one, *blades) for one in both))
 
     if isinstance(card, MmgCard):
         refuse_given(card, CONTROLLABLE_PITCH.name, "advance_share", "leave it out: the card's own J holds")
-        return _without_torque(_on_each_side(model, coefficients))
+        return _on_each_side(model, coefficients)
     turning = model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
     designed = given["advance_share"] * given["design_pitch"]
-    by_pitch, own = coefficients(
-        designed * model.symbol("motion.u") / model.symbol("ship.speed") / ca.fmax(turning, _STOPPED)
-    )
-    thrust = scales(model, model.symbol("ship.speed")).force * model.symbol("propulsion.Xnn") * ca.fmax(turning, 0) ** 2
-    return with_forces(model, X=thrust * (by_pitch - own) / coefficients(designed)[1])
+    found = coefficients(designed * model.symbol("motion.u") / model.symbol("ship.speed") / ca.fmax(turning, _STOPPED))
+    nominal = scales(model, model.symbol("ship.speed")).force * model.symbol("propulsion.Xnn")
+    thrust = nominal * ca.fmax(turning, 0) ** 2 * (found.thrust - found.own_thrust) / coefficients(designed).own_thrust
+    model = with_forces(model, X=thrust)
+    if card.ship.propeller_diameter_m is None:
+        return model
+    scale = model.symbol("ship.water_density") * model.symbol("ship.propeller_diameter") ** 5
+    n = ca.fmax(model.symbol("propeller.speed_actual"), 0) / (2 * math.pi)
+    return _with_torques(model, {"": scale * n**2 * found.torque})
 
 
-def _on_each_side(model: Model, coefficients: Callable[[ca.SX], tuple[ca.SX, ca.SX]]) -> Model:
-    """The model with the thrust of each propeller of an MMG ship changed by that of its `coefficients` at J."""
+@dataclass(frozen=True)
+class Coefficients:
+    """K_T and K_Q at the pitch, and the own ones of the card, at the pitch of the design."""
+
+    thrust: ca.SX
+    own_thrust: ca.SX
+    torque: ca.SX
+    own_torque: ca.SX
+
+
+def _on_each_side(model: Model, coefficients: Callable[[ca.SX], Coefficients]) -> Model:
+    """The model with thrust and torque of each propeller of an MMG ship changed by its `coefficients` at J."""
     diameter, density = model.symbol("ship.propeller_diameter"), model.symbol("ship.water_density")
     least = _STOPPED * model.symbol("propulsion.nominal_speed") / (2 * math.pi)
+    has_torque = "propeller.power" in model
+    torques = {}
     for name in [quantity.name for quantity in model.quantities if quantity.name.startswith("propeller.thrust")]:
         suffix = name.removeprefix("propeller.thrust")
         n = model.symbol(f"propeller.speed_actual{suffix}") / (2 * math.pi)
-        by_pitch, own = coefficients(model.symbol(f"propeller.inflow{suffix}") / (ca.fmax(n, least) * diameter))
-        added = density * ca.fmax(n, 0) ** 2 * diameter**4 * (by_pitch - own)
-        model = model.redefine(name, lambda thrust, added=added: thrust + added)  # type: ignore[misc]
+        found = coefficients(model.symbol(f"propeller.inflow{suffix}") / (ca.fmax(n, least) * diameter))
+        unit = density * ca.fmax(n, 0) ** 2 * diameter**4
+        more = unit * (found.thrust - found.own_thrust)
+        model = model.redefine(name, lambda thrust, more=more: thrust + more)  # type: ignore[misc]
+        if has_torque:
+            more = unit * diameter * (found.torque - found.own_torque) / model.symbol("mmg.eta_R")
+            model = model.redefine(f"propeller.torque{suffix}", lambda torque, more=more: torque + more)  # type: ignore[misc]
+        else:
+            torques[suffix] = unit * diameter * found.torque
     unused = "controllable_pitch.advance_share"
-    return replace(model, parameters=tuple(one for one in model.parameters if one.name != unused))
+    model = replace(model, parameters=tuple(one for one in model.parameters if one.name != unused))
+    return model if has_torque else _with_torques(model, torques)
 
 
-def _without_torque(model: Model) -> Model:
-    """The model without outputs of torque and power, which are those of one pitch."""
-    outputs = tuple(name for name in model.outputs if not name.startswith(("propeller.torque", "propeller.power")))
-    if outputs == model.outputs:
-        return model
-    notice = "the card's K_Q is that of one pitch: with controllable_pitch there are no outputs of torque and power"
-    return replace(model, outputs=outputs, notices=(*model.notices, notice))
+def _with_torques(model: Model, torques: Mapping[str, ca.SX]) -> Model:
+    """The model with outputs ``propeller.torque`` (N m), by the suffix of each propeller, and ``propeller.power``."""
+    each = [
+        Quantity(
+            name=f"propeller.torque{suffix}",
+            unit="N.m",
+            description="Torque that turns the propeller, by the Wageningen B-series",
+            nominal=1e5,
+            value=torque,
+        )
+        for suffix, torque in torques.items()
+    ]
+    power = sum(
+        (
+            torque.symbol * model.symbol(f"propeller.speed_actual{suffix}")
+            for suffix, torque in zip(torques, each, strict=True)
+        ),
+        ca.SX(0),
+    )
+    delivered = Quantity(
+        name="propeller.power", unit="W", description="Power delivered to the propellers", nominal=1e6, value=power
+    )
+    return model.extend(*each, delivered, outputs=[*(torque.name for torque in each), delivered.name])
 
 
 def _pitch(name: str, description: str, lowest: float, **more: Any) -> EffectParameter:

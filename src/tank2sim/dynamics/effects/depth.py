@@ -10,7 +10,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.derivatives import at_depth, least_depth
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
-from tank2sim.dynamics.effects.particulars import with_particulars
+from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
 from tank2sim.dynamics.effects.propeller import resistance_prime
 from tank2sim.dynamics.hull import inside_range, validity_factor
 from tank2sim.dynamics.model import Model, Quantity
@@ -87,7 +87,7 @@ def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard
     model = at_depth(model, given, card)
     model, (beam, draught, block) = with_particulars(model, card, "beam_m", "draught_m", "block_coefficient")
     depth, gravity = given["depth"], card.environment.gravity_mps2
-    u = model.symbol("motion.u")
+    u, usual = model.symbol("motion.u"), model_particular(card, "draught_m")
     loss = given["resistance"] * _relative_loss(model, ca.SX(MIDSHIP_COEFFICIENT * beam * draught), depth, gravity)
     resistance = scales(model, ca.SX(1)).force * resistance_prime(model, card) * u * ca.fabs(u)
     slowed = with_forces(model, X=-resistance * (1 / (1 - loss) ** 2 - 1))
@@ -102,14 +102,14 @@ def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard
         ),
     )
     squats = [
-        Quantity(name=name, unit="m", description=description, nominal=0.1 * draught, value=value)
+        Quantity(name=name, unit="m", description=description, nominal=0.1 * usual, value=value)
         for name, description, value in described
     ]
     clearance = Quantity(
         name="water.under_keel_clearance",
         unit="m",
         description="Water under the keel: depth less draught less the larger squat; not above zero: aground",
-        nominal=draught,
+        nominal=usual,
         value=depth - draught - ca.fmax(squats[0].symbol, squats[1].symbol),
     )
     left = inside_range(CLEARANCE_MARGIN - clearance.symbol / draught, CLEARANCE_MARGIN)

@@ -43,12 +43,16 @@ def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
     With ``yaw_rate_terms = "total"``, X_vr, X_rr, Y_r, N_r contain m, m x_G, -m, -m x_G of (3.1).
     """
     symbol = model.symbol(f"derivatives.{name}")
-    if card.model.yaw_rate_terms == "hydrodynamic":
-        return symbol
-    mass = model.symbol("ship.mass") / scales(model, model.symbol("ship.speed")).mass
-    x_G = model.symbol("ship.x_G") / model.symbol("ship.length")
-    inertial = {"Xvr": mass, "Xrr": mass * x_G, "Yr": -mass, "Nr": -mass * x_G}
+    inertial = inertial_parts(model, model.symbol("ship.mass"), model.symbol("ship.x_G"), card)
     return symbol - inertial[name] if name in inertial else symbol
+
+
+def inertial_parts(model: Model, mass: ca.SX, x_G: ca.SX, card: ManoeuvringCard) -> dict[str, ca.SX]:
+    """What derivatives of a "total" card hold of a mass (kg) whose centre is x_G (m) forward; prime, none of others."""
+    if card.model.yaw_rate_terms == "hydrodynamic":
+        return {}
+    mass, x_G = mass / scales(model, model.symbol("ship.speed")).mass, x_G / model.symbol("ship.length")
+    return {"Xvr": mass, "Xrr": mass * x_G, "Yr": -mass, "Nr": -mass * x_G}
 
 
 def _magnified(names: Iterable[str]) -> EffectEquations:
@@ -250,7 +254,11 @@ def _trimmed(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
     Inoue, Hirano and Kijima (1981), Hydrodynamic derivatives on ship manoeuvring, Int. Shipbuilding Progress 28 (321).
     """
     model, (draught,) = with_particulars(model, card, "draught_m")
-    share = given["by_stern"] / draught
+    return trimmed(model, given["by_stern"] / draught, card)
+
+
+def trimmed(model: Model, share: ca.SX, card: ManoeuvringCard) -> Model:
+    """The model with the linear derivatives of a hull trimmed by this share of its draught, as :data:`TRIM` has."""
     changes = {
         "Yv": 2 / 3 * share * hydrodynamic(model, "Yv", card),
         "Yr": 0.80 * share * hydrodynamic(model, "Yr", card),

@@ -207,6 +207,8 @@ class Effect:
     of_craft : bool
         True if a small craft with thrusters can have it: it reads nothing of a card but ``ship`` and ``environment``,
         and nothing of a model that only a hull in the prime system or a rudder has.
+    last : bool
+        True if a card's model gets it after all other effects: it changes the mass and draught in their forces.
     terminal : str
         What its inputs are together, a few words for the FMI terminal that joins them.
     """
@@ -232,6 +234,7 @@ class Effect:
     in_roll: bool = False
     includes: tuple[str, ...] = ()
     sought: bool = True
+    last: bool = False
 
     @property
     def looks_like(self) -> str:

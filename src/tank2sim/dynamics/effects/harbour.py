@@ -44,7 +44,14 @@ def _with_thruster(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
     return with_forces(model, Y=force, N=given["forward"] * force)
 
 
-def _largest_force(card: ManoeuvringCard) -> float:
+def largest_force(card: ManoeuvringCard) -> float:
+    """Return the largest force of a usual tunnel thruster, N.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        Of the ship, whose weight of water L^2 T it goes with.
+    """
     weight = card.environment.water_density_kgpm3 * card.environment.gravity_mps2 * card.ship.length_m**2
     return THRUST_IN_WEIGHTS * weight * model_particular(card, "draught_m")
 
@@ -63,7 +70,7 @@ def _thruster(end: str, sign: float) -> tuple[EffectParameter, ...]:
             absent=0.0,
             typical=(0.5,),
         ),
-        EffectParameter("force_N", "largest force of the thruster at rest", 0.0, 1e7, _largest_force),
+        EffectParameter("force_N", "largest force of the thruster at rest", 0.0, 1e7, largest_force),
         EffectParameter("forward_m", "place of the thruster forward of midships", -250.0, 250.0, place),
         EffectParameter(
             "half_speed_mps",
@@ -127,7 +134,7 @@ def _tug(tug: int) -> tuple[EffectParameter, ...]:
             None if first else 0.0,
             input_name=f"tug.force_{tug}",
             absent=0.0,
-            typical=lambda card: (_largest_force(card),),
+            typical=lambda card: (largest_force(card),),
         ),
         EffectParameter(
             f"direction_{tug}_rad",

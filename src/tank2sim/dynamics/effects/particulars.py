@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model
@@ -86,8 +89,40 @@ def estimated_from(key: str) -> str:
     return f"{_ESTIMATES[key][2]}, typical"
 
 
-def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[Model, tuple[float, ...]]:
-    """Particulars by their keys (SI), and the model with a notice on each that the card does not state."""
+def volume_exponent(block: float) -> float:
+    """C_WP/C_B: the displaced volume goes with this power of the draught.
+
+    dV/dT = C_WP L B, with C_WP = (1 + 2 C_B)/3 of usual sections (Schneekluth and Bertram 1998, Ship Design for
+    Efficiency and Economy); that C_WP/C_B is the same at all draughts is the usual way to estimate C_B at another one.
+
+    Parameters
+    ----------
+    block : float
+        Block coefficient at the card's draught.
+    """
+    return (1 + 2 * block) / 3 / block
+
+
+def _at_draught(model: Model, card: ManoeuvringCard, key: str) -> ca.SX | float:
+    """A particular at the model's draught ``ship.draught``: the side above the water grows as the draught falls."""
+    value = model_particular(card, key)
+    if "ship.draught" not in model:
+        return value
+    draught, own = model.symbol("ship.draught"), model_particular(card, "draught_m")
+    by_draught: dict[str, Callable[[], ca.SX]] = {
+        "draught_m": lambda: draught,
+        "block_coefficient": lambda: value * (draught / own) ** (volume_exponent(value) - 1),
+        "projected_area_front_m2": lambda: value + model_particular(card, "beam_m") * (own - draught),
+        "projected_area_side_m2": lambda: value + card.ship.length_m * (own - draught),
+    }
+    return by_draught[key]() if key in by_draught else value
+
+
+def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[Model, tuple[Any, ...]]:
+    """Particulars by their keys (SI), and the model with a notice on each that the card does not state.
+
+    Draught, block coefficient and areas above the water are expressions of ``ship.draught``, where the model has it.
+    """
     for key in keys:
         name, unit, *_ = _ESTIMATES[key]
         if getattr(card.ship, key) is not None:
@@ -96,4 +131,4 @@ def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[M
         notice = f"{missing} ({estimated_from(key)})"
         if notice not in model.notices:
             model = model.extend(notices=[notice])
-    return model, tuple(model_particular(card, key) for key in keys)
+    return model, tuple(_at_draught(model, card, key) for key in keys)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import ASTERN_THRUST
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.particulars import with_particulars
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.dynamics.propulsion import propeller_force
 
@@ -351,5 +354,72 @@ REVERSED_THRUST = Effect(
     ),
     equations=_with_weaker_astern,
     in_mmg=True,
+    sought=False,
+)
+
+
+TANKER_THRUST = (-0.175, 0.33, 0.233)
+TANKER_SIDE = (-7.90e-5, 7.99e-3, -5.87e-3)
+TANKER_YAW = (3.50e-5, -3.17e-3, 2.33e-3)
+"""Thrust and side force of the right-handed propeller of the Esso Osaka, turning astern: C(0), slope of C by J, and -J
+from which C is constant; A or B at J = 0, its slopes by J between the two bounds below and beyond the second. Miyauchi
+et al. (2022), J. Mar. Sci. Technol. 27, after Hachii, in the transcription that goes with the authors' simulator."""
+
+SIDE_BOUNDS = (0.06, 0.35)
+"""-J below which A and B are constant, and where their slopes change: the same source."""
+
+
+def _with_propeller_astern(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    """Thrust and side force of a propeller that turns astern, by its J = u/(n D), in place of the card's:
+
+        X = c rho D^4 n^2 C(J),   Y = k 1/2 rho L T D^2 n^2 A(J),   N = k 1/2 rho L^2 T D^2 n^2 B(J),   n < 0
+
+    C, A, B are continuous and linear between bounds of J (:data:`TANKER_THRUST`, :data:`SIDE_BOUNDS`), so that n^2 C is
+    regular at n = 0. The stern goes to port while the ship moves ahead, most at J = -0.35, and hardly at rest.
+    """
+    if "propulsion.Xnn" not in model:
+        raise card.fault("propulsion", "has no Xnn", "propeller_astern is for linear and abkowitz cards with it")
+    model, (draught, diameter) = with_particulars(model, card, "draught_m", "propeller_diameter_m")
+    density, length = model.symbol("ship.water_density"), model.symbol("ship.length")
+    turning = -ca.fmin(model.symbol("propeller.speed_actual"), 0) / (2 * math.pi)
+    met = model.symbol("motion.u") / diameter
+    first, second = (bound * turning for bound in SIDE_BOUNDS)
+
+    def across(at_rest: float, slope: float, beyond: float) -> ca.SX:
+        """n^2 A(J), with n < 0 and J = -met/turning."""
+        within = ca.fmin(ca.fmax(met, first), second)
+        return ca.SX(turning * (at_rest * turning - slope * within - beyond * ca.fmax(met - second, 0)))
+
+    at_rest, slope, bound = TANKER_THRUST
+    pull = turning * (at_rest * turning - slope * ca.fmin(met, bound * turning))
+    of_card = scales(model, model.symbol("ship.speed")).force * model.symbol("propulsion.Xnn")
+    of_card = of_card * ca.fmin(_relative_revolutions(model), 0) ** 2
+    unit = given["side_force"] * density / 2 * length * draught * diameter**2
+    return with_forces(
+        model,
+        X=given["thrust"] * density * diameter**4 * pull + of_card,
+        Y=unit * across(*TANKER_SIDE),
+        N=unit * length * across(*TANKER_YAW),
+    )
+
+
+PROPELLER_ASTERN = Effect(
+    name="propeller_astern",
+    acts_on="force",
+    description="A propeller that turns astern pulls, and throws the stern aside, by the speed that is left.",
+    source="Miyauchi et al. (2022), J. Mar. Sci. Technol. 27, after Hachii: tanker Esso Osaka",
+    parameters=(
+        EffectParameter(
+            "side_force",
+            "share of the published side force; negative for a left-handed propeller",
+            -5.0,
+            5.0,
+            typical=(1.0,),
+        ),
+        EffectParameter("thrust", "share of the published thrust astern", 0.0, 3.0, 1.0),
+    ),
+    equations=_with_propeller_astern,
+    in_mmg=True,
+    includes=("propeller_walk", "astern_thrust"),
     sought=False,
 )

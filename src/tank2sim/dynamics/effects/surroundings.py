@@ -103,7 +103,7 @@ def _with_wind(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
         Y = 0.5 * density * side * given["sway_coefficient"] * speed * starboard
         # sin(2 gamma) = 2 sin cos, forward = -V cos, starboard = -V sin
         turning = -density * side * model.symbol("ship.length") * given["yaw_coefficient"] * forward * starboard
-        return ca.vertcat(X, Y, turning + given["centroid_forward"] * Y)
+        return ca.SX(ca.vertcat(X, Y, turning + given["centroid_forward"] * Y))
 
     felt = force(*air_over_ship(model, given["speed"], given["direction"]))
     in_still_air = force(*air_over_ship(model, ca.SX(0), ca.SX(0)))

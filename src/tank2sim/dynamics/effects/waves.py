@@ -28,6 +28,11 @@ COVERED, COVERED_MARGIN = 0.9, 0.5
 """Share of the variance of the sea within the frequencies of the table from which the effect holds, and the distance
 below over which ``validity`` falls to zero: project choice."""
 
+LARGEST_TAU, TAU_MARGIN = 0.15, 0.35
+"""w U/g at the peak up to which the effect of speed on the mean drift, of the first order in it, counts as valid, and
+the distance beyond over which ``validity`` falls to zero: at 0.25 the waves that a ship makes no longer go ahead of it.
+Project choice."""
+
 
 @dataclass(frozen=True)
 class Components:
@@ -100,9 +105,14 @@ def _harmonics(direction: ca.SX, count: int) -> tuple[ca.SX, ca.SX]:
     return ca.cos(orders * direction), ca.sin(orders * direction)
 
 
-def _drift(table: WaveTable, force: str, encounter: ca.SX, squares: ca.SX, direction: ca.SX) -> ca.SX:
+def _slopes(direction: ca.SX, count: int) -> tuple[ca.SX, ca.SX]:
+    """Derivatives of :func:`_harmonics` by the direction."""
+    orders = ca.DM(np.arange(count))
+    return -orders * ca.sin(orders * direction), orders * ca.cos(orders * direction)
+
+
+def _drift(table: WaveTable, force: str, encounter: ca.SX, squares: ca.SX, harmonics: ca.SX) -> ca.SX:
     """Sum of a^2 D: D linear between the frequencies of the table, 0 at 0, constant beyond the last."""
-    harmonics = _harmonics(direction, len(table.directions))[force in MIRRORED]
     nodes = np.concatenate([[0.0], table.frequencies])
     coefficients = by_direction(table.drift[force], force in MIRRORED)
     values = np.vstack([np.zeros_like(coefficients[:1]), coefficients])
@@ -134,14 +144,18 @@ def _motion(table: WaveTable, motion: str, chosen: Components, waves: tuple[ca.S
 def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Mean drift at the frequency of encounter, and the pose with the first-order motions on top.
 
-        X, Y, N = sum of a_k^2 D(w_k + w_k^2/g (u cos(beta) + v sin(beta)), beta)
+        X, Y, N = sum of a_k^2 (1 + 4 w_k/g w) D(w_k + w_k^2/g w, beta + 2 w_k/g (v cos(beta) - u sin(beta)))
+        w = u cos(beta) + v sin(beta)
         eta = eta_LF + sum of a_k abs(R_k) cos(theta_k + arg(R_k)),   R_k = RAO(w_k, beta)
         theta_k = w_k t + w_k^2/g (x cos(chi) + y sin(chi)) + eps_k
 
-    beta = chi - psi is the direction chi from which the waves come, clockwise from the bow: the linear approximation of
-    the mean drift in irregular waves with the coefficients of regular ones at the frequency of encounter, FRyDoM's
-    theory guide, "Mean wave drift force"; the motions of Fossen (2021), Handbook of Marine Craft Hydrodynamics and
-    Motion Control, 10.2.3, which do not act back on the manoeuvre. The waves are long-crested, of deep water.
+    beta = chi - psi is the direction chi from which the waves come, clockwise from the bow, and w the velocity
+    against them: the formula of Aranha (1994), A formula for "wave damping" in the drift of a floating body, J. Fluid
+    Mech. 275, 147-155, cited without the paper at hand, of the first order in w_k w/g, with D at rest; for N as for X
+    and Y, its factor held above zero, and the small change of direction linearised. With `speed_effect` 0 only the
+    frequency of encounter is left, as in FRyDoM's theory guide, "Mean wave drift force". The motions of Fossen
+    (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 10.2.3, which do not act back on the manoeuvre.
+    The waves are long-crested, of deep water.
     """
     if card.waves is None:
         raise card.fault("waves", "is missing", "the effect waves needs the table [waves] of the ship's own answer")
@@ -158,7 +172,17 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     heights = amplitudes(chosen, given["height"], given["period"], given["peakedness"])
     approach = motion("motion.u") * ca.cos(relative) + motion("motion.v") * ca.sin(relative)
     encounter = frequencies + numbers * approach
-    forces = {force: _drift(table, force, encounter, heights**2, relative) for force in table.drift}
+    across = motion("motion.v") * ca.cos(relative) - motion("motion.u") * ca.sin(relative)
+    share = given["speed_effect"] * frequencies / card.environment.gravity_mps2
+    grown = 1 + 4 * share * approach
+    squares = heights**2 * (grown + ca.fabs(grown)) / 2
+    forces = {}
+    for force in table.drift:
+        harmonics, slopes = (
+            of_direction(relative, len(table.directions))[force in MIRRORED] for of_direction in (_harmonics, _slopes)
+        )
+        turned = _drift(table, force, encounter, 2 * share * across * squares, slopes)
+        forces[force] = _drift(table, force, encounter, squares, harmonics) + turned
     way = motion("motion.x") * ca.cos(direction) + motion("motion.y") * ca.sin(direction)
     angle = frequencies * clock.symbol + numbers * way + phases(given["seed"])
     waves = heights * ca.cos(angle), heights * ca.sin(angle)
@@ -182,9 +206,15 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
         "the share of the sea within the frequencies of the table",
         inside_range((COVERED - covered) * given["height"] / (given["height"] + 0.01), COVERED_MARGIN),
     )
-    outputs = [quantity.name for quantity in (*shown, *poses, factor)]
-    sea = with_forces(model, **forces).extend(clock, rate, *shown, *poses, factor, outputs=outputs)
-    return sea.redefine("validity", lambda validity: validity * factor.symbol)
+    steepest = 2 * math.pi / given["period"] * ca.sqrt(approach**2 + across**2 + 1e-12) / card.environment.gravity_mps2
+    slow = validity_factor(
+        "wave_speed",
+        "the speed in waves, over that of the first order of its effect on the mean drift",
+        inside_range((steepest - LARGEST_TAU) * given["height"] / (given["height"] + 0.01), TAU_MARGIN),
+    )
+    outputs = [quantity.name for quantity in (*shown, *poses, factor, slow)]
+    sea = with_forces(model, **forces).extend(clock, rate, *shown, *poses, factor, slow, outputs=outputs)
+    return sea.redefine("validity", lambda validity: validity * factor.symbol * slow.symbol)
 
 
 _SENSES = ("forward", "to starboard", "down", "to starboard", "bow up", "to starboard")
@@ -231,7 +261,7 @@ WAVES = Effect(
     name="waves",
     acts_on="force",
     description="Irregular waves push the ship and move it about its course, by a table of what regular ones do to it.",
-    source="Fossen (2021), 10.2; JONSWAP spectrum by ITTC (2002); ITTC 7.5-02-07-01.1",
+    source="Fossen (2021), 10.2; Aranha (1994), J. Fluid Mech. 275; JONSWAP by ITTC (2002); ITTC 7.5-02-07-01.1",
     parameters=(
         EffectParameter(
             "height_m",
@@ -260,6 +290,13 @@ WAVES = Effect(
         ),
         EffectParameter(
             "peakedness", "gamma of the JONSWAP spectrum (1: Bretschneider, 3.3: a young wind sea)", 1.0, 7.0, 1.0
+        ),
+        EffectParameter(
+            "speed_effect",
+            "share of the effect of speed on the mean drift (0: the frequency of encounter alone)",
+            0.0,
+            1.0,
+            1.0,
         ),
         EffectParameter("seed", "number that determines the phases of the waves", 1.0, 1e6, 1.0),
     ),

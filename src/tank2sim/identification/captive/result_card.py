@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tank2sim.cards.estimates import CLARKE, ESTIMATED, GYRATION, RELATIVE_ERROR, Particulars, estimate
 from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, TestedRange, manoeuvring_card_text
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import ESSENTIAL, Reduction, is_resistance
 from tank2sim.identification.captive.tank_conditions import FroudeScaling
-from tank2sim.identification.estimates import CLARKE, ESTIMATED, GYRATION, RELATIVE_ERROR, Particulars, estimate
 from tank2sim.records.campaign_form import FullScaleSection, ModelSection, TankTest
 from tank2sim.records.campaigns import Campaign
 

@@ -8,13 +8,13 @@ import tomlkit
 
 from tank2sim.cards import parse_card
 from tank2sim.cards.card import PROPELLER_COEFFICIENTS, RUDDER_COEFFICIENTS, MmgCard
+from tank2sim.cards.estimates import estimate
 from tank2sim.cards.mmg import fujii
 from tank2sim.dynamics.mmg.hull import HULL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
 from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
-from tank2sim.identification.estimates import estimate
 
 _CAUSES = {
     "derivatives.Y": ("Y", "drift"),
@@ -120,7 +120,7 @@ def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping
 
 
 def estimated_masses(tests: SteadyTests) -> dict[str, tuple[float, float]]:
-    """X_udot, Y_vdot, N_rdot (prime II) and their standard errors, from :mod:`tank2sim.identification.estimates`."""
+    """X_udot, Y_vdot, N_rdot (prime II) and their standard errors, from :mod:`tank2sim.cards.estimates`."""
     model = tests.form.model
     assert model.draught_m is not None
     ratio = model.length_m / model.draught_m

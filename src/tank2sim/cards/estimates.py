@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 CLARKE = "Clarke, Gedling and Hine 1983, Trans. RINA 125"
 """The application of manoeuvring criteria in hull design using linear theory: regressions over rotating-arm and planar
@@ -110,15 +111,31 @@ def estimate(particulars: Particulars, names: Iterable[str]) -> dict[str, NamedE
     return {name: ESTIMATED[name](particulars) for name in names if name in ESTIMATED}
 
 
-def _clarke(
-    bracket: Callable[[float, float, float], float], coupling: bool = False
-) -> Callable[[Particulars], NamedEstimate]:
-    """An estimate -pi (T/L)^2 times a bracket of B/L, B/T and C_B."""
+CLARKE_BRACKETS: Mapping[str, Callable[[Any, Any, Any], Any]] = {
+    "Yvdot": lambda bl, bt, cb: 1 + 0.16 * cb * bt - 5.1 * bl**2,
+    "Yrdot": lambda bl, bt, cb: 0.67 * bl - 0.0033 * bt**2,
+    "Nvdot": lambda bl, bt, cb: 1.1 * bl - 0.041 * bt,
+    "Nrdot": lambda bl, bt, cb: 1 / 12 + 0.017 * cb * bt - 0.33 * bl,
+    "Yv": lambda bl, bt, cb: 1 + 0.40 * cb * bt,
+    "Yr": lambda bl, bt, cb: -1 / 2 + 2.2 * bl - 0.080 * bt,
+    "Nv": lambda bl, bt, cb: 1 / 2 + 2.4 * bl / bt,
+    "Nr": lambda bl, bt, cb: 1 / 4 + 0.039 * bt - 0.56 * bl,
+}
+"""What Clarke's regressions multiply by -pi (T/L)^2: functions of B/L, B/T and C_B, numbers or symbols."""
+
+CLARKE_COUPLINGS = ("Yrdot", "Nvdot")
+"""Those with an absolute error, :data:`COUPLING_ERROR`."""
+
+
+def _clarke(name: str) -> Callable[[Particulars], NamedEstimate]:
+    """An estimate -pi (T/L)^2 times its bracket."""
 
     def value(ship: Particulars) -> NamedEstimate:
         unit = math.pi * (ship.draught_m / ship.length_m) ** 2
-        number = -unit * bracket(ship.beam_m / ship.length_m, ship.beam_m / ship.draught_m, ship.block)
-        return NamedEstimate(number, unit * COUPLING_ERROR if coupling else RELATIVE_ERROR * abs(number), CLARKE)
+        bracket = CLARKE_BRACKETS[name](ship.beam_m / ship.length_m, ship.beam_m / ship.draught_m, ship.block)
+        number = -unit * bracket
+        error = unit * COUPLING_ERROR if name in CLARKE_COUPLINGS else RELATIVE_ERROR * abs(number)
+        return NamedEstimate(number, error, CLARKE)
 
     return value
 
@@ -138,14 +155,7 @@ def _yaw_inertia(ship: Particulars) -> NamedEstimate:
 
 
 ESTIMATED: Mapping[str, Callable[[Particulars], NamedEstimate]] = {
-    "Yvdot": _clarke(lambda bl, bt, cb: 1 + 0.16 * cb * bt - 5.1 * bl**2),
-    "Yrdot": _clarke(lambda bl, bt, cb: 0.67 * bl - 0.0033 * bt**2, coupling=True),
-    "Nvdot": _clarke(lambda bl, bt, cb: 1.1 * bl - 0.041 * bt, coupling=True),
-    "Nrdot": _clarke(lambda bl, bt, cb: 1 / 12 + 0.017 * cb * bt - 0.33 * bl),
-    "Yv": _clarke(lambda bl, bt, cb: 1 + 0.40 * cb * bt),
-    "Yr": _clarke(lambda bl, bt, cb: -1 / 2 + 2.2 * bl - 0.080 * bt),
-    "Nv": _clarke(lambda bl, bt, cb: 1 / 2 + 2.4 * bl / bt),
-    "Nr": _clarke(lambda bl, bt, cb: 1 / 4 + 0.039 * bt - 0.56 * bl),
+    **{name: _clarke(name) for name in CLARKE_BRACKETS},
     "Xudot": _surge,
     "yaw_inertia": _yaw_inertia,
 }

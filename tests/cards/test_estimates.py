@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from tank2sim.identification.estimates import ESTIMATED, Particulars, estimate
+from tank2sim.cards.estimates import ESTIMATED, Particulars, estimate
 
 KVLCC2 = Particulars(length_m=320.0, beam_m=58.0, draught_m=20.8, block_coefficient=0.8098)
 MARINER = Particulars(length_m=160.93, beam_m=23.17, draught_m=7.468, mass_kg=798e-5 * 0.5 * 1025 * 160.93**3)
