@@ -36,6 +36,11 @@ YAW, SURGE, SWAY, *_ = NAMES
 SETS = ((), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2))
 
 
+CALM = SimpleNamespace(belief=SimpleNamespace(waves=None))
+IN_A_SEA = SimpleNamespace(belief=SimpleNamespace(waves="a band"))
+"""Likelihoods of which a verdict reads no more."""
+
+
 def said(theta) -> module.Decision:
     """Of the toy with some forces hidden, all single ones and pairs fitted."""
     of = judge(toy_motion(theta), spread=1.0)
@@ -83,7 +88,18 @@ def calm(monkeypatch) -> None:
 
 
 def of_scores(*fits: ExplanationFit) -> module.Decision:
-    return decide(Search(SimpleNamespace(), tuple(sorted(fits, key=lambda found: found.score)), ()))
+    return decide(Search(CALM, tuple(sorted(fits, key=lambda found: found.score)), ()))
+
+
+@pytest.mark.usefixtures("calm")
+def test_where_waves_were_found_scores_count_half_as_much() -> None:
+    fits = fit(-1.5 * EVIDENCE_NEEDED, 0), fit(0)
+    for likelihood, verdict in ((CALM, MISSING), (IN_A_SEA, NO_EFFECT_MISSING)):
+        decision = decide(Search(likelihood, fits, ()))
+        assert decision.verdict == verdict
+        odds = decision.probabilities[fits[0].hypothesis.effects] / decision.probabilities[()]
+        halved = 2 if likelihood is IN_A_SEA else 1
+        assert odds == pytest.approx(np.exp(1.5 * EVIDENCE_NEEDED / 2 / module.TEMPER / halved))
 
 
 @pytest.mark.usefixtures("calm")
@@ -132,7 +148,7 @@ FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
 @pytest.mark.usefixtures("calm")
 def test_a_name_that_is_not_sure_enough_is_one_of_several() -> None:
     fits = [fit(0), fit(-50, 0), fit(-38, 1)]  # odds of exp(2) to 1
-    search = Search(SimpleNamespace(), tuple(sorted(fits, key=lambda found: found.score)), ())
+    search = Search(CALM, tuple(sorted(fits, key=lambda found: found.score)), ())
     assert 0.85 < decide(search).confidence(YAW) < 0.9
     for share, verdict in ((0.5, MISSING), (0.2, MISSING), (0.1, AMBIGUOUS), (0.02, AMBIGUOUS)):
         found = decide(search, share)
@@ -142,7 +158,7 @@ def test_a_name_that_is_not_sure_enough_is_one_of_several() -> None:
 
 @pytest.mark.usefixtures("calm")
 def test_where_no_other_effect_comes_near_the_alternative_is_nothing() -> None:
-    search = Search(SimpleNamespace(), (fit(-12, 0), fit(0)), ())  # odds of exp(2) to 1
+    search = Search(CALM, (fit(-12, 0), fit(0)), ())  # odds of exp(2) to 1
     (alternative,) = decide(search, 0.05).alike
     assert alternative.hypothesis.effects == () and decide(search).alike == ()
 

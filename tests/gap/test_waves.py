@@ -18,7 +18,7 @@ from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.gap.dense import Dense, pushed, rocked
-from tests.gap.test_kalman_filter import RUNS, columns, problem
+from tests.gap.random_filter import RUNS, columns, problem
 
 WAVES = WaveBand(np.array([0.4, 1.1, 0.7]), frequency=0.9, time=7.0)
 

@@ -22,16 +22,18 @@ def joined_parts(logs: Sequence[VesselLog]) -> list[VesselLog]:
     Parameters
     ----------
     logs : sequence of VesselLog
-        In any order.
+        In any order, in which they stay: that of the first that was given of each.
     """
-    found: list[VesselLog] = []
-    for log in sorted(logs, key=lambda one: _span(one)[0]):
-        place = next((place for place, before in enumerate(found) if _follows(before, log)), None)
+    found: list[tuple[int, VesselLog]] = []
+    for given in sorted(range(len(logs)), key=lambda one: _span(logs[one])[0]):
+        log = logs[given]
+        place = next((place for place, (_, before) in enumerate(found) if _follows(before, log)), None)
         if place is None:
-            found.append(log)
+            found.append((given, log))
         else:
-            found[place] = _joined(found[place], log)
-    return found
+            first, before = found[place]
+            found[place] = min(first, given), _joined(before, log)
+    return [log for _, log in sorted(found, key=lambda one: one[0])]
 
 
 def _span(log: VesselLog) -> tuple[float, float]:

@@ -27,7 +27,7 @@ DAMPINGS = (0.02, 0.5)
 WEAKEST = 1e-3
 """Least level over that to begin with (project choice): an axis on which no waves act."""
 
-WORTH = 30.0
+WAVES_DECREASE = 30.0
 """Decrease of the score from which waves are taken to act (project choice): that of five numbers by Schwarz's criterion
 for some hundred independent measurements."""
 
@@ -79,4 +79,4 @@ def fit_waves(likelihood: Likelihood, fit: ExplanationFit) -> WaveBand | None:
         bounds=list(zip(low, high, strict=True)),
         options={"maxiter": STEPS, "eps": 1e-3, "ftol": CONVERGED / max(abs(without), 1.0)},
     )
-    return band(best.x) if best.fun < without - WORTH else None
+    return band(best.x) if best.fun < without - WAVES_DECREASE else None

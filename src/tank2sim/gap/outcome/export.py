@@ -247,7 +247,7 @@ def _misfit(gap: Gap) -> dict[str, object]:
     return {
         "noise": noise,
         "noise_floor": NOISE_FLOOR,
-        **({"waves": _waves(gap.waves)} if gap.waves else {}),
+        **({"in_waves": _waves(gap.waves)} if gap.waves else {}),
         **{
             version: {word: _finite(gap.misfit(version, held_out=held)) for word, held in sets.items()}
             for version in ("before", "after", "black_box")

@@ -54,6 +54,10 @@ their scores suggest, for noise is coloured and formulas have errors. benchmarks
 effects."""
 
 
+IN_WAVES = 2.0
+"""Factor on the evidence that names need, and on :data:`TEMPER`, where waves were found (project choice): means over
+blocks do not follow them whole, and what remains is coloured."""
+
 SUREST = 0.99
 """Largest probability of an effect: one outside the library may look the same (project choice)."""
 
@@ -124,20 +128,22 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
     """
     none = search.none
     best = none
+    doubt = IN_WAVES if search.likelihood.belief.waves else 1.0
+    needed, temper = doubt * EVIDENCE_NEEDED, doubt * TEMPER
     single = next((fit for fit in search.fits if len(fit.hypothesis.effects) == 1 and is_significant(fit)), None)
     pair = next((fit for fit in search.fits if len(fit.hypothesis.effects) == 2 and is_significant(fit)), None)
-    if single is not None and single.score < none.score - EVIDENCE_NEEDED:
+    if single is not None and single.score < none.score - needed:
         best = single
     if pair is not None:
-        worth = max(EVIDENCE_NEEDED, _share(pair) * (none.score - pair.score))
+        worth = max(needed, _share(pair) * (none.score - pair.score))
         best = pair if pair.score < min(fit.score for fit in (best, single) if fit is not None) - worth else best
-    scores = np.array([fit.score for fit in search.fits]) / TEMPER
+    scores = np.array([fit.score for fit in search.fits]) / temper
     weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
     probabilities = {fit.hypothesis.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
-    behind = ALIKE
+    behind = doubt * ALIKE
     unsure = {name for name in best.hypothesis.effects if _confidence(probabilities, name) < 1 - false_discovery}
     if unsure:
-        behind = max(ALIKE, -2 * TEMPER * np.log(RIVAL))
+        behind = max(behind, -2 * temper * np.log(RIVAL))
     alike = tuple(
         fit
         for fit in search.fits
