@@ -150,7 +150,7 @@ def backward(
 
 def _waves(push: Array) -> bool:
     """Whether the states hold accelerations of waves."""
-    return push.shape[-1] > _FORCES
+    return bool(push.shape[-1] > _FORCES)
 
 
 @cache
