@@ -16,6 +16,9 @@ from tank2sim.gap.inference.kalman_filter import NoiseLevels, observer, slopes
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.inference.wave_band import WaveBand
+from tank2sim.gap.result import NO_EFFECT_MISSING
+from tank2sim.gap.search.explanations import search
+from tank2sim.gap.search.model_choice import decide
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.gap.dense import Dense, pushed, rocked
 from tests.gap.random_filter import RUNS, columns, problem
@@ -95,3 +98,12 @@ def test_the_frequency_of_a_made_up_sea_is_found(seed: int, effects: tuple[str, 
 
 def test_no_waves_are_found_in_gusts(tmp_path) -> None:
     assert fit_waves(*likelihood_of(Setting((), 33, process="gusts"), 1, tmp_path)) is None
+
+
+@pytest.mark.slow
+def test_an_effect_that_swings_as_waves_do_is_not_sought_in_them(tmp_path) -> None:
+    likelihood, _ = likelihood_of(Setting((), 34, process="waves"), 1, tmp_path)
+    found = search(likelihood, names=("rudder_bias", "roll_coupling"), most=1)
+    assert found.likelihood.belief.waves is not None
+    assert {name for fit in found.fits for name in fit.hypothesis.effects} == {"rudder_bias"}
+    assert decide(found).verdict == NO_EFFECT_MISSING

@@ -750,7 +750,8 @@ def _of_waves(waves: WaveBand) -> str:
     speed, rate = waves.motion["motion.v"], np.rad2deg(waves.motion["motion.r"])
     return (
         f"waves or a swell with a period of {waves.period_s:.3g} s move the ship in the fitted trials (standard "
-        f"deviation {speed:.2g} m/s in sway, {rate:.2g} deg/s in yaw): counted as noise, not as a missing effect"
+        f"deviation {speed:.2g} m/s in sway, {rate:.2g} deg/s in yaw): counted as noise, not as a missing effect; "
+        f"{' and '.join(name for name, effect in EFFECTS.items() if effect.resonant)}, which they hide, is not sought"
     )
 
 

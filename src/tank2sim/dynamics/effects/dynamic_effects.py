@@ -118,6 +118,7 @@ def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
 
 ROLL_COUPLING = Effect(
     name="roll_coupling",
+    resonant=True,
     acts_on="force",
     description="The ship heels in a turn, and a heeled hull is pushed and turned aside.",
     source="Hirano and Takashina (1980), Trans. West Japan Soc. Naval Arch. 59; Son and Nomoto (1981)",

@@ -207,6 +207,8 @@ class Effect:
     of_craft : bool
         True if a small craft with thrusters can have it: it reads nothing of a card but ``ship`` and ``environment``,
         and nothing of a model that only a hull in the prime system or a rudder has.
+    resonant : bool
+        True if it swings at a frequency of its own near that of waves, by which they hide it.
     last : bool
         True if a card's model gets it after all other effects: it changes the mass and draught in their forces.
     terminal : str
@@ -235,6 +237,7 @@ class Effect:
     includes: tuple[str, ...] = ()
     sought: bool = True
     last: bool = False
+    resonant: bool = False
 
     @property
     def looks_like(self) -> str:

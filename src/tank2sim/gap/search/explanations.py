@@ -117,6 +117,8 @@ def search(
     likelihood = likelihood.with_scale(likelihood.noise_scale(rough.best()))
     rough = Fitting(likelihood, hypotheses, progress, executor, rough.found)
     chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
+    if likelihood.belief.waves is not None:
+        chosen = tuple(name for name in chosen if not EFFECTS[name].resonant) or chosen
     every = tuple(variant for name in chosen for variant in _variants(likelihood, hypotheses, name))
     none = rough.best()
     first = Screen(likelihood, none, every)
@@ -125,7 +127,9 @@ def search(
     best = rough.best()
     # Again about the motion of the best: its residual is small, and "none" is scored about the same motion.
     about_best = likelihood.about(best)
-    fitting = Fitting(about_best.with_waves(fit_waves(about_best, best)), hypotheses, progress, executor)
+    if likelihood.belief.waves is not None:
+        about_best = about_best.with_waves(fit_waves(about_best, best))
+    fitting = Fitting(about_best, hypotheses, progress, executor)
     again = [fit for fit in rough.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     fitting.fit(
         [Proposal({}, [best.logs, none.logs, believed], ROUNDS_OF_NONE)]
