@@ -49,10 +49,10 @@ def waterplane_inertia(block: float) -> float:
 
 
 def _ratios(
-    model: Model, ratio: ca.SX, beam: float, block: float, own: float, card: ManoeuvringCard
+    model: Model, ratio: ca.SX, beam: float, block: float, card_draught: float, card: ManoeuvringCard
 ) -> dict[str, ca.SX]:
-    """What multiplies the hydrodynamic part of each derivative at `ratio` times the card's draught `own` (m)."""
-    bl, bt, volume = beam / card.ship.length_m, beam / own, volume_exponent(block)
+    """What multiplies the hydrodynamic part of each derivative at `ratio` times the `card_draught` (m)."""
+    bl, bt, volume = beam / card.ship.length_m, beam / card_draught, volume_exponent(block)
 
     def regression(name: str) -> ca.SX:
         bracket = CLARKE_BRACKETS[name]
@@ -89,9 +89,9 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     stay, with the card's GM.
     """
     model, (_, beam) = with_particulars(model, card, "draught_m", "beam_m")
-    own, block = (model_particular(card, key) for key in ("draught_m", "block_coefficient"))
+    card_draught, block = (model_particular(card, key) for key in ("draught_m", "block_coefficient"))
     draught, trim, length = given["mean_draught"], given["trim"], model.symbol("ship.length")
-    ratio = draught / own
+    ratio = draught / card_draught
     filled = ratio ** volume_exponent(block)
     resistance = scales(model, ca.SX(1)).force * resistance_prime(model, card)
     along = model.symbol("motion.u")
@@ -100,7 +100,7 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     model = trimmed(model, trim / draught, card)
 
     mass, x_G = model.symbol("ship.mass"), model.symbol("ship.x_G")
-    shift = trim * waterplane_inertia(block) * length / (block * own * filled)
+    shift = trim * waterplane_inertia(block) * length / (block * card_draught * filled)
     for name, value in (
         ("ship.x_G", x_G - shift),
         *((name, model.symbol(name) * filled) for name in _WITH_MASS if name in model),
@@ -109,7 +109,7 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     before, after = (inertial_parts(model, *parts, card) for parts in ((mass, x_G), (mass * filled, x_G - shift)))
     changes = {
         name: (factor - 1) * hydrodynamic(model, name, card) + (after[name] - before[name] if name in after else 0)
-        for name, factor in _ratios(model, ratio, beam, block, own, card).items()
+        for name, factor in _ratios(model, ratio, beam, block, card_draught, card).items()
     }
     model = with_changes(model, changes, card)
     displacement = Quantity(

@@ -120,12 +120,12 @@ def _response(runs: Sequence[_Run], largest: float) -> OrderResponse | None:
     lag = _best_lag(runs, bands[best])
     costs = np.array([_cost(runs, lag, band) for band in bands])
     variance = costs.min() / count
-    independent = min(1.0, float(np.median([step for step, _, _ in runs])) / INDEPENDENT_S)
+    step = float(np.median([each for each, _, _ in runs]))
+    independent = min(1.0, step / INDEPENDENT_S)
     possible = np.flatnonzero(independent * (costs - costs.min()) < SURELY_WORSE * max(variance, 1e-12))
     above = levels[levels > edges[possible[-1]] + _LEVEL * largest / 2]
     if not len(above):
         return None
-    step = float(np.median([each for each, _, _ in runs]))
     curvature = _curvature(runs, lag, bands[best], 0.05 * lag)
     error = np.sqrt(2 * variance / max(curvature, 1e-12) / independent)
     # A change of order is known to a part of a step.
