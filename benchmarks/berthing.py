@@ -1,8 +1,9 @@
 """Berthing of the 3 m Esso Osaka model: median position error 100 s after a measured state, over the length.
 
 The card is identified here from turns and zigzags, in which no propeller turns astern: with the thrust astern as the
-mirror of that ahead, with the share that is published of this ship, with its published thrust and side force astern by
-the advance ratio, and with the forces at low speed up to 0.9 of u0 as well. Or it is the one that is given. The
+mirror of that ahead, with the share of it that is published of this ship, with its published thrust and side force
+astern by the advance ratio (as the bundled cards have it), and with the forces at low speed up to 0.9 of u0 as well. Or
+it is the one that is given. The
 measured rudder, revolutions and wind are its inputs; each window starts in the measured state. Needs the data folder.
 
 At the end, where the error comes from: median errors after 20 s with the propeller astern and ahead, and a propeller
@@ -100,12 +101,9 @@ def print_causes(ship: t2s.Ship, trials: list[Trial]) -> None:
     """Print errors after 20 s, and what a propeller walk fitted to other runs does to each; `ship` has none."""
 
     def with_walk(values: np.ndarray) -> t2s.Ship:
-        card, (Y, N, factor) = ship.manoeuvring(), values
-        added = (
-            EffectEntry(name="astern_thrust", parameters={"factor": float(factor)}),
-            EffectEntry(name="propeller_walk", parameters={"Y_prime": float(Y), "N_prime": float(N)}),
-        )
-        return t2s.Ship(replace(card, effects=(*card.effects, *added)))
+        Y, N, factor = map(float, values)
+        thrust = EffectEntry(name="astern_thrust", parameters={"factor": factor})
+        return with_astern(ship, thrust, EffectEntry(name="propeller_walk", parameters={"Y_prime": Y, "N_prime": N}))
 
     first = [short_errors(with_walk(START), trial) for trial in trials]
     every = np.concatenate(first)
@@ -137,26 +135,22 @@ def print_causes(ship: t2s.Ship, trials: list[Trial]) -> None:
     print(f"  median of held-out windows {np.median(np.concatenate(held_out)):.2f} L")
 
 
+ASTERN_EFFECTS = {"propeller_astern", "astern_thrust"}
+"""Effects of the bundled cards that act with the propeller astern alone."""
+
+
 def identified() -> t2s.Ship:
     """The card of turns and zigzags, from the one that was estimated before any trial."""
     folder = DATA / "esso_osaka"
     return t2s.identify("esso-osaka-estimated", [*folder.glob("turning/*.csv"), *folder.glob("zigzag/*.csv")]).ship
 
 
-def with_published_astern(ship: t2s.Ship) -> t2s.Ship:
-    """The ship with the thrust astern of Miyauchi et al. (2022)."""
-    astern = EffectEntry(name="astern_thrust", parameters={"factor": ASTERN_THRUST})
-    return t2s.Ship(replace(ship.manoeuvring(), effects=(*ship.manoeuvring().effects, astern)))
-
-
-def with_published_propeller(ship: t2s.Ship, low_speed_mps: float | None = None) -> t2s.Ship:
-    """The ship with thrust and side force astern of the same, and another bound of the forces at low speed (m/s)."""
+def with_astern(ship: t2s.Ship, *astern: EffectEntry, low_speed_mps: float | None = None) -> t2s.Ship:
+    """The ship with these effects astern in place of its own, and another bound of the forces at low speed (m/s)."""
     card = ship.manoeuvring()
-    astern = EffectEntry(name="propeller_astern", parameters={"side_force": 1.0})
-    model = (
-        card.model if low_speed_mps is None else card.model.model_copy(update={"low_speed_below_mps": low_speed_mps})
-    )
-    return t2s.Ship(replace(card, model=model, effects=(*card.effects, astern)))
+    changed = {} if low_speed_mps is None else {"low_speed_below_mps": low_speed_mps}
+    others = tuple(entry for entry in card.effects if entry.name not in ASTERN_EFFECTS)
+    return t2s.Ship(replace(card, model=card.model.model_copy(update=changed), effects=(*others, *astern)))
 
 
 def main() -> None:
@@ -168,11 +162,13 @@ def main() -> None:
         cards = {name: t2s.load(name) for name in names}
     else:
         ship = identified()
+        share = EffectEntry(name="astern_thrust", parameters={"factor": ASTERN_THRUST})
+        published = EffectEntry(name="propeller_astern", parameters={"side_force": 1.0})
         cards = {
-            "thrust astern as ahead": ship,
-            "thrust astern as published": with_published_astern(ship),
-            "thrust and side force astern as published": with_published_propeller(ship),
-            "the same, forces at low speed below 0.28 m/s": with_published_propeller(ship, 0.28),
+            "thrust astern as ahead": with_astern(ship),
+            "thrust astern as published": with_astern(ship, share),
+            "thrust and side force astern as published": with_astern(ship, published),
+            "the same, forces at low speed below 0.28 m/s": with_astern(ship, published, low_speed_mps=0.28),
         }
     trials = [read_trial_file(path) for path in paths]
     for name, ship in cards.items():

@@ -113,3 +113,10 @@ def test_trials_to_fit_may_be_files_folders_or_records(write, tmp_path, mariner_
     with pytest.raises(t2s.InputError) as refusal:
         fitted_and_held(path, t2s.read_trial(path), mariner_card)  # one record cannot judge itself
     assert refusal.value.source == str(path)
+
+
+@pytest.mark.parametrize("task", [t2s.find_gap, t2s.identify])
+def test_a_task_on_no_trials_is_refused(task) -> None:
+    with pytest.raises(t2s.InputError) as refusal:
+        task("mariner", [])
+    assert refusal.value.source == "trials"

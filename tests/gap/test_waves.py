@@ -94,6 +94,8 @@ def test_the_frequency_of_a_made_up_sea_is_found(seed: int, effects: tuple[str, 
     assert waves.frequency == pytest.approx(truth, abs=0.05)
     explained = likelihood.with_waves(waves).at_best(fit.hypothesis, fit.theta, [fit.logs], (0,))
     assert explained.score < fit.score - 100
+    cost = likelihood.cost_of_waves(fit)  # without combinations of coefficients that the trials hardly determine
+    assert cost(waves) - cost(None) == pytest.approx(explained.score - fit.score, rel=1e-3, abs=1.0)
 
 
 def test_no_waves_are_found_in_gusts(tmp_path) -> None:

@@ -185,13 +185,16 @@ def fitted_and_held(trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCa
     ------
     InputError
         A file is at fault (:func:`tank2sim.identification.trials.problem.prepare_trials.measured`), or two have one
-        name or are one record, also where one of them is held out; or the card was fitted to one that is held out.
+        name or are one record, also where one of them is held out; the card was fitted to one that is held out; or
+        there is none to fit.
     """
     from tank2sim.identification.trials.problem.prepare_trials import measured
     from tank2sim.identification.trials.problem.signatures import fitted_as
     from tank2sim.records.same_record import refuse_copies
 
     fitted, held = measured(trials_of(trials), card), measured(trials_of(holdout), card)
+    if not fitted.trials:
+        raise InputError("trials", "", "is empty", "give a file of a trial or a folder with trials")
     for trial in held.trials:
         if trial.name in {trial_fitted.name for trial_fitted in fitted.trials}:
             raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")

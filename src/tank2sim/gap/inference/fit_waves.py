@@ -44,15 +44,13 @@ def fit_waves(likelihood: Likelihood, fit: ExplanationFit) -> WaveBand | None:
     likelihood : Likelihood
         With or without waves; those that it has are one of the beginnings.
     fit : ExplanationFit
-        Its parameters and noise are kept.
+        Its noise is kept; its parameters follow linearly.
     """
     motion = likelihood.motion
     highest, lowest = (2 * np.pi / (blocks * motion.block_s) for blocks in (SHORTEST, LONGEST))
     noise = motion.errors[:3]
 
-    def score(waves: WaveBand | None) -> float:
-        found = likelihood.with_waves(waves)
-        return found.at_best(fit.hypothesis, fit.theta, [fit.logs], (0,)).score
+    score = likelihood.cost_of_waves(fit)
 
     def band(logs: Array) -> WaveBand:
         frequency = float(np.exp(logs[3]))

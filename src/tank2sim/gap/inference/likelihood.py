@@ -400,8 +400,7 @@ class Likelihood:
         self, fit: ExplanationFit, linear: Linear, coefficients: Array
     ) -> Callable[[Array], tuple[float, Array]]:
         """Cost of the logarithms of noise and width and its slope, for the columns of a fit as they are."""
-        least, largest = fit.hypothesis.bounds
-        free = bool(np.all((fit.theta > least) & (fit.theta < largest)))
+        free = _inside(fit)
         columns = self._informative(fit, linear, self.columns(fit.hypothesis, fit.theta, coefficients))
 
         def cost(logs: Array) -> tuple[float, Array]:
@@ -418,6 +417,20 @@ class Likelihood:
             belief, by_belief = self.belief.cost(logs)
             # Without the penalty of the parameters: its dependence on the noise is negligible, and not in the slopes.
             return seen.log_det + solved.reduced_cost + belief, np.append(by_noise, by_width) + by_belief
+
+        return cost
+
+    def cost_of_waves(self, fit: ExplanationFit) -> Callable[[WaveBand | None], float]:
+        """Cost of accelerations by waves, for the columns of a fit as they are and at its noise; parameters and
+        coefficients follow linearly unless a parameter is at a bound."""
+        hypothesis, theta, free = fit.hypothesis, fit.theta, _inside(fit)
+        linear = self.linear(hypothesis, theta)
+        columns = self.columns(hypothesis, theta, self.of_coefficients(hypothesis, theta))
+        columns = self._informative(fit, linear, columns).scaled(fit.width)
+
+        def cost(waves: WaveBand | None) -> float:
+            seen = observer(linear, fit.noise, waves)
+            return seen.log_det + self._solved(hypothesis, theta, seen, columns, free=free).reduced_cost
 
         return cost
 
@@ -500,6 +513,12 @@ class Likelihood:
             weights,
             whitened,
         )
+
+
+def _inside(fit: ExplanationFit) -> bool:
+    """Whether no parameter of a fit is at a bound."""
+    least, largest = fit.hypothesis.bounds
+    return bool(np.all((fit.theta > least) & (fit.theta < largest)))
 
 
 def _mixed(columns: Array, weights: Array) -> Array:
