@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import tomlkit
 
 import tank2sim as t2s
 from tank2sim.cards.form import ASTERN_THRUST, EffectEntry
@@ -139,10 +141,17 @@ ASTERN_EFFECTS = {"propeller_astern", "astern_thrust"}
 """Effects of the bundled cards that act with the propeller astern alone."""
 
 
-def identified() -> t2s.Ship:
-    """The card of turns and zigzags, from the one that was estimated before any trial."""
+def identified(low_speed_mps: float | None = None) -> t2s.Ship:
+    """The card of turns and zigzags, from the one that was estimated before any trial, or from that with another bound
+    of the forces at low speed (m/s)."""
     folder = DATA / "esso_osaka"
-    return t2s.identify("esso-osaka-estimated", [*folder.glob("turning/*.csv"), *folder.glob("zigzag/*.csv")]).ship
+    with tempfile.TemporaryDirectory() as temporary:
+        path = Path(temporary) / "ship.toml"
+        content = tomlkit.parse(t2s.load("esso-osaka-estimated").manoeuvring().text)
+        if low_speed_mps is not None:
+            content["model"]["low_speed_below_mps"] = low_speed_mps
+        path.write_text(tomlkit.dumps(content), encoding="utf-8")
+        return t2s.identify(path, [*folder.glob("turning/*.csv"), *folder.glob("zigzag/*.csv")]).ship
 
 
 def with_astern(ship: t2s.Ship, *astern: EffectEntry, low_speed_mps: float | None = None) -> t2s.Ship:
@@ -169,6 +178,7 @@ def main() -> None:
             "thrust astern as published": with_astern(ship, share),
             "thrust and side force astern as published": with_astern(ship, published),
             "the same, forces at low speed below 0.28 m/s": with_astern(ship, published, low_speed_mps=0.28),
+            "the same, identified so": with_astern(identified(0.28), published),
         }
     trials = [read_trial_file(path) for path in paths]
     for name, ship in cards.items():

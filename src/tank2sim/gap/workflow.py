@@ -61,6 +61,7 @@ from tank2sim.gap.search.explanations import Search, search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, TEMPER, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import lowered_bound_notice, polynomial_over_trials
+from tank2sim.identification.trials.problem.structures import structure_that_adds
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
 
@@ -738,6 +739,11 @@ def _notices(
             f"the trials are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
             "coefficients that are off, or something more that is missing; the standard errors do not cover it"
         )
+        if structure := structure_that_adds(card, decision.best.hypothesis.effects):
+            notices.append(
+                f"identify with --structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
+                "trials together with the hull's derivatives, from the card as it was given"
+            )
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [f"{name}: the improved card follows it worse than the given one" for name in worse_trials(results)]
     for variable, values in agreement.items():

@@ -22,7 +22,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     rounded,
     with_correlations,
 )
-from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent
+from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent, structure_that_adds
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +49,24 @@ def test_cross_flow_drag_takes_the_place_of_cubic_terms_and_keeps_the_linear_one
         assert started.derivatives[name] == kvlcc2.derivatives[name]
     assert [effect.name for effect in started.effects] == ["cross_flow_drag", "loaded_rudder"]
     assert {"cross_flow_drag.drag_coefficient", "loaded_rudder.lever"} < set(free_parameters(started))
+
+
+@pytest.mark.parametrize(
+    ("effects", "structure"),
+    [
+        (("loaded_rudder", "cross_flow_drag"), "cross_flow"),
+        (("cross_flow_drag",), None),
+        (("wind",), None),
+        ((), None),
+    ],
+)
+def test_the_structure_with_just_some_effects_is_known(
+    effects: tuple[str, ...], structure: str | None, kvlcc2: ManoeuvringCard
+) -> None:
+    assert structure_that_adds(kvlcc2, effects) == structure
+    mmg = read_card("kvlcc2-mmg")
+    assert isinstance(mmg, ManoeuvringCard)
+    assert structure_that_adds(mmg, effects) is None
 
 
 def test_the_structure_of_the_card_is_the_card(kvlcc2: ManoeuvringCard) -> None:

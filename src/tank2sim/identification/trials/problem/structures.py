@@ -6,7 +6,7 @@ result is a card, so that simulation, linearisation and FMU accept it unchanged.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import tomlkit
@@ -115,6 +115,25 @@ STRUCTURES: Registry[ModelStructure] = Registry(
     reserved=(AUTO, AVERAGE, BY_EVIDENCE),
 )
 """By rising number of parameters, then those of installed packages: the first of equal predictions is taken."""
+
+
+def structure_that_adds(card: ManoeuvringCard, effects: Collection[str]) -> str | None:
+    """Name of the first structure that adds just these effects to a card; None without one, or for an MMG card.
+
+    Examples
+    --------
+    >>> from tank2sim.cards import read_card
+    >>> structure_that_adds(read_card("kvlcc2-captive"), {"cross_flow_drag", "loaded_rudder"})
+    'cross_flow'
+    """
+    if card.model.kind == "mmg":
+        return None  # its structure is its own
+    there = {entry.name for entry in card.effects}
+    for name, structure in STRUCTURES.items():
+        added = {entry.name for entry in structure.start(card).effects} - there
+        if added and added == set(effects):
+            return name
+    return None
 
 
 def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
