@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -26,10 +27,17 @@ from .ships import N0, RHO, U0, L, added_forces, mariner_text, ship, state, valu
 PITCH = {"pitch": 0.8, "design_pitch": 0.8}
 
 
+@cache
+def at_pitches() -> ca.Function:
+    """K_T and K_Q of J, pitch and the share of the thrust astern."""
+    J, pitch, astern = ca.SX.sym("J"), ca.SX.sym("pitch"), ca.SX.sym("astern")
+    blades = ca.SX(0.55), ca.SX(4)
+    thrust, torque = pitch_thrust(J, pitch, *blades, astern), pitch_torque(J, pitch, *blades)
+    return ca.Function("at_pitches", [J, pitch, astern], [thrust, torque])
+
+
 def at_pitch(J: float, pitch: float, astern: float = 0.7) -> float:
-    x = ca.SX.sym("x", 2)
-    thrust = pitch_thrust(x[0], x[1], ca.SX(0.55), ca.SX(4), ca.SX(astern))
-    return float(ca.Function("thrust", [x], [thrust])([J, pitch]))
+    return float(at_pitches()(J, pitch, astern)[0])
 
 
 def test_the_series_is_near_the_open_water_curve_of_a_tankers_propeller() -> None:
@@ -103,9 +111,7 @@ def test_torque_and_thrust_of_the_series_have_the_efficiency_of_good_propellers(
 
 
 def torque_at_pitch(J: float, pitch: float) -> float:
-    x = ca.SX.sym("x", 2)
-    torque = pitch_torque(x[0], x[1], ca.SX(0.55), ca.SX(4))
-    return float(ca.Function("torque", [x], [torque])([J, pitch]))
+    return float(at_pitches()(J, pitch, 0.7)[1])
 
 
 def test_torque_is_least_at_zero_pitch_and_has_no_step_there_at_rest() -> None:
