@@ -52,7 +52,7 @@ from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.bands import figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, AskTogether, Draws, Ensemble, Question, _prepared, ensemble
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
 HERE = Path(__file__).parent
@@ -243,19 +243,24 @@ def on_dask(members: int) -> bool:
 
 def users(rounds: int, together: int = 256, alone: int = 4) -> None:
     """Processor time of a member of the ensembles of each command, in lanes and by single runs."""
-    card = read_card("mariner")
-    assert isinstance(card, ManoeuvringCard)
-    draws, _ = draws_of(card, SEED)
-    ship, ten, none = ShipText.of(card), float(np.radians(10.0)), np.zeros(0)
-    asked: dict[str, Question] = {
-        "simulate --ensemble, turn:35": OfManoeuvre(ship, Turn(float(RUDDER)), None, none),
-        "simulate --ensemble, zigzag:10/10": OfManoeuvre(ship, Zigzag(ten, ten), None, none),
-        "stability --ensemble, all IMO criteria": OfCriteria(ship),
-        "influence --ensemble, advance and overshoot": OfFigures(ship, ("advance_m@35", "overshoot1_deg@10/10")),
+    mariner, tanker = (read_card(name) for name in ("mariner", "esso-osaka-ship"))
+    assert isinstance(mariner, ManoeuvringCard) and isinstance(tanker, ManoeuvringCard)
+    ship, other_ship, ten, none = ShipText.of(mariner), ShipText.of(tanker), float(np.radians(10.0)), np.zeros(0)
+    asked: dict[str, tuple[ManoeuvringCard, Question]] = {
+        "simulate --ensemble, turn:35": (mariner, OfManoeuvre(ship, Turn(float(RUDDER)), None, none)),
+        "simulate --ensemble, zigzag:10/10": (mariner, OfManoeuvre(ship, Zigzag(ten, ten), None, none)),
+        "simulate --ensemble, stop (Esso Osaka)": (tanker, OfManoeuvre(other_ship, Stop(), None, none)),
+        "stability --ensemble, all IMO criteria": (mariner, OfCriteria(ship)),
+        "the same with a stop (Esso Osaka)": (tanker, OfCriteria(other_ship)),
+        "influence --ensemble, advance and overshoot": (
+            mariner,
+            OfFigures(ship, ("advance_m@35", "overshoot1_deg@10/10")),
+        ),
     }
     usual = questions.lanes_of
     print(f"processor time of a member, {together} in lanes, {alone} by single runs, medians of {rounds} rounds")
-    for told, question in asked.items():
+    for told, (card, question) in asked.items():
+        draws, _ = draws_of(card, SEED)
         fast: list[float] = []
         slow: list[float] = []
         for _ in range(rounds + 1):  # in the first one things are loaded and compiled

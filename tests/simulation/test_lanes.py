@@ -20,7 +20,7 @@ from tank2sim.native.library import cached_library
 from tank2sim.simulation import lane_runs
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
-from tank2sim.simulation.manoeuvres import PullOut, Turn, Zigzag
+from tank2sim.simulation.manoeuvres import PullOut, Stop, Turn, Zigzag
 from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.run import simulate
 
@@ -38,6 +38,8 @@ MANOEUVRES = [
     (Zigzag(-TWENTY, TWENTY), None),
     (Zigzag(TWENTY, TEN, opposite=-TEN), 300.05),
 ]
+CASES = [(name, *case) for name in ("mariner", "kvlcc2") for case in MANOEUVRES]
+CASES += [("kvlcc2", Stop(), None), ("esso-osaka-ship", Stop(0.0), None), ("esso-osaka-ship", Stop(), None)]
 
 
 def ships(card: ManoeuvringCard, model: Model, count: int) -> tuple[list[dict[str, float]], Array]:
@@ -47,8 +49,7 @@ def ships(card: ManoeuvringCard, model: Model, count: int) -> tuple[list[dict[st
     return members, np.array([model.parameter_values(member) for member in members])
 
 
-@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
-@pytest.mark.parametrize(("manoeuvre", "duration"), MANOEUVRES)
+@pytest.mark.parametrize(("name", "manoeuvre", "duration"), CASES)
 def test_figures_in_lanes_are_those_of_single_runs(name: str, manoeuvre, duration) -> None:
     card = read_card(name)
     assert isinstance(card, ManoeuvringCard)
@@ -97,6 +98,32 @@ def test_no_bit_depends_on_the_number_of_lanes_or_on_neighbours(mariner_card, ma
         np.testing.assert_array_equal(result.states, results[0].states[part])
         for figure, values in result.figures.items():
             np.testing.assert_array_equal(values, results[0].figures[figure][part], err_msg=figure)
+
+
+def test_a_stop_leaves_the_cards_range_as_a_single_run_does_and_depends_on_no_neighbour() -> None:
+    card = read_card("kvlcc2")
+    assert isinstance(card, ManoeuvringCard)
+    model = build(card)
+    members, p = ships(card, model, 5)
+    results = [LaneManoeuvres(model, lanes).run(Stop(), p) for lanes in WIDTHS]
+    for number in (0, 4):
+        reading = simulate(model, Stop(), parameters=members[number]).reading
+        assert reading.exit_s is not None
+        assert results[0].left_s[number] == pytest.approx(reading.exit_s, rel=1e-12)
+        outside = {name for name in reading.figures if results[0].outside(name)[number]}
+        assert outside == set(reading.outside_names) == set(reading.figures)
+    for result in results[1:]:
+        for figure, values in result.figures.items():
+            np.testing.assert_array_equal(values, results[0].figures[figure], err_msg=figure)
+
+
+def test_a_ship_that_begins_at_rest_has_stopped_as_it_begins() -> None:
+    model = build(read_card("kvlcc2"))
+    at_rest = model.parameter_values({"initial.u": 0.0})
+    found = LaneManoeuvres(model).run(Stop(), np.array([at_rest, model.parameter_values()]))
+    expected = single_figures(simulate(model, Stop(), parameters={"initial.u": 0.0}).figures)
+    assert found.fine.all() and np.isfinite(found.figures["track_reach_m"][1])
+    assert {name for name, values in found.figures.items() if np.isfinite(values[0])} == set(expected)
 
 
 def test_ships_that_are_doubtful_with_longer_steps_are_run_with_the_usual_ones(mariner_card) -> None:
@@ -178,7 +205,8 @@ def test_a_zigzag_with_more_executes_than_are_kept_is_run_by_itself(mariner_card
 
 
 def test_what_lanes_do_not_have_is_left_to_single_runs(mariner) -> None:
-    assert runs_in_lanes(Turn(TEN)) and runs_in_lanes(Zigzag(TEN, TEN))
+    assert runs_in_lanes(Turn(TEN)) and runs_in_lanes(Zigzag(TEN, TEN)) and runs_in_lanes(Stop())
+    assert not runs_in_lanes(Stop(), 100.0)
     assert not runs_in_lanes(PullOut(TEN)) and not runs_in_lanes(Zigzag(TEN, TEN, lag_s=1.0))
     assert not runs_in_lanes(Turn(TEN, wait_s=2.0)) and not runs_in_lanes(Zigzag(TEN, TEN, course=0.1))
     with pytest.raises(NoLanesError):

@@ -181,6 +181,6 @@ def simulate_manoeuvre(
 
         length = duration_s, float(run.trajectory.t[-1])
         request = EnsembleRequest(ensemble.members, ensemble.seed)
-        with ensemble.computing(FEW_IN_LANES if runs_in_lanes(manoeuvre) else FEW) as executor:
+        with ensemble.computing(FEW_IN_LANES if runs_in_lanes(manoeuvre, duration_s) else FEW) as executor:
             bands = manoeuvre_bands(ship.manoeuvring(), manoeuvre, length, request, executor)
     return ManoeuvreResult(ship, words, run, bands, other)

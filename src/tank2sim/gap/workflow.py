@@ -61,8 +61,8 @@ from tank2sim.gap.search.explanations import Search, search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, TEMPER, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import lowered_bound_notice, polynomial_over_trials
-from tank2sim.identification.trials.problem.structures import structure_that_adds
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.identification.trials.problem.structures import structure_that_adds
 from tank2sim.records.trials import Trial
 
 RIVALS = 12

@@ -1,4 +1,4 @@
-"""Figures of turns and zigzags of many ships, from what their runs in lanes keep.
+"""Figures of turns, zigzags and stops of many ships, from what their runs in lanes keep.
 
 They are those of :mod:`tank2sim.simulation.figures` for a trajectory with a sample at each step, to rounding: the same
 Hermite cubics at crossings, the same cubics through four samples, for all ships at once.
@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeGuard
 
 import casadi as ca
 import numpy as np
@@ -24,9 +25,11 @@ from tank2sim.simulation.figures import REST_SPEED, STEADY_SHARE
 from tank2sim.simulation.lane_runs import CROSSINGS, FINE, UNKNOWN, LanePlan, LaneResults, LaneRunner
 from tank2sim.simulation.manoeuvres import (
     LONGEST_LENGTHS,
+    LONGEST_STOP,
     TURN_HEADING,
     ZIGZAG_EXECUTES,
     Manoeuvre,
+    Stop,
     Turn,
     Zigzag,
 )
@@ -101,16 +104,23 @@ class LaneFigures:
         return LaneFigures(figures, states, fine, left, self.doubtful)
 
 
-def runs_in_lanes(manoeuvre: Manoeuvre) -> bool:
-    """Whether lanes have this manoeuvre: a turn or a zigzag without delays of helm and gear."""
+LaneManoeuvre = Turn | Zigzag | Stop
+"""Manoeuvres that lanes have."""
+
+
+def runs_in_lanes(manoeuvre: Manoeuvre, duration_s: float | None = None) -> TypeGuard[LaneManoeuvre]:
+    """Whether lanes have this manoeuvre: a turn or a zigzag without delays of helm and gear, or a stop to its end."""
+    if isinstance(manoeuvre, Stop):
+        return duration_s is None
     if isinstance(manoeuvre, Turn):
         return manoeuvre.wait_s == 0
-    simple = isinstance(manoeuvre, Zigzag) and manoeuvre.lag_s == manoeuvre.wait_s == 0 and manoeuvre.course is None
-    return simple and isinstance(manoeuvre, Zigzag) and manoeuvre.heading > 0
+    if not isinstance(manoeuvre, Zigzag):
+        return False
+    return manoeuvre.lag_s == manoeuvre.wait_s == 0 and manoeuvre.course is None and manoeuvre.heading > 0
 
 
 class LaneManoeuvres:
-    """Runs turns and zigzags of a model in lanes.
+    """Runs turns, zigzags and stops of a model in lanes.
 
     Parameters
     ----------
@@ -119,7 +129,7 @@ class LaneManoeuvres:
     lanes : int, optional
         As for :class:`tank2sim.simulation.lane_runs.LaneRunner`.
     longest : float
-        Longest run without a given duration, L/u0.
+        Longest turn or zigzag without a given duration, L/u0.
 
     Raises
     ------
@@ -148,7 +158,7 @@ class LaneManoeuvres:
 
     def run(
         self,
-        manoeuvre: Turn | Zigzag,
+        manoeuvre: LaneManoeuvre,
         p: Array,
         duration_s: float | None = None,
         times: Sequence[float] | Array = (),
@@ -159,7 +169,7 @@ class LaneManoeuvres:
 
         Parameters
         ----------
-        manoeuvre : Turn or Zigzag
+        manoeuvre : Turn, Zigzag or Stop
             One of those for which :func:`runs_in_lanes` is true.
         p : array (n, np)
             Parameters of the model.
@@ -173,23 +183,25 @@ class LaneManoeuvres:
             Step and precision. Ships that are `doubtful` are run again with the model's step in double precision.
         """
         u = self.model.input_values(inputs)
+        if isinstance(manoeuvre, Stop):
+            u[self.model.input_names.index("propeller.speed")] = manoeuvre.order(self.model)
         p = np.ascontiguousarray(p, dtype=float)
         (starts,) = self._start(p)
         place = self.model.parameter_names.index
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
-        ends = self._longest * ship_times if duration_s is None else np.full(len(p), duration_s)
-        plan = replace(_plan(manoeuvre, u, times, timed=duration_s is not None), step_factor=pace.step_factor)
-        side = math.copysign(1.0, manoeuvre.rudder)
-        heading = starts[:, [self.model.state_names.index("motion.psi")]]
-        if isinstance(manoeuvre, Turn):
-            levels = heading + side * np.array([math.pi / 2, math.pi])
-        else:
-            levels = np.hstack([heading, np.zeros_like(heading)])
-        found = (self._single if pace.single else self._runner).runs(plan, p, starts, ends, levels)
+        longest = LONGEST_STOP if isinstance(manoeuvre, Stop) else self._longest
+        ends = longest * ship_times if duration_s is None else np.full(len(p), duration_s)
+        plan, goals = self._plan(manoeuvre, u, starts, timed=duration_s is not None)
+        plan = replace(plan, times=times, step_factor=pace.step_factor)
+        levels = self._levels(manoeuvre, starts)
+        found = (self._single if pace.single else self._runner).runs(plan, p, starts, ends, levels, goals)
         if isinstance(manoeuvre, Turn):
             figures = self._turn(found, (u, p), starts, manoeuvre)
-        else:
+        elif isinstance(manoeuvre, Zigzag):
             figures = self._zigzag(found, (u, p), starts, (manoeuvre, plan.limit))
+        else:
+            figures = self._stop(found, p, starts, goals[:, 0])
+            found.ended[self._column(starts, "motion.u") <= goals[:, 0]] = UNKNOWN  # stopped as it begins
         fine = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
         left = np.where(fine, found.left, np.nan)
         for number in np.flatnonzero(found.ended == UNKNOWN).tolist():
@@ -206,7 +218,7 @@ class LaneManoeuvres:
 
     def _by_itself(
         self,
-        asked: tuple[Turn | Zigzag, float | None, Mapping[str, float] | None],
+        asked: tuple[LaneManoeuvre, float | None, Mapping[str, float] | None],
         p: Array,
         figures: dict[str, Array],
         number: int,
@@ -225,6 +237,33 @@ class LaneManoeuvres:
         for name, value in single_figures(run.figures).items():
             figures.setdefault(name, np.full(count, np.nan))[number] = value
         return True, math.inf if run.reading.exit_s is None else run.reading.exit_s
+
+    def _plan(self, manoeuvre: LaneManoeuvre, inputs: Array, starts: Array, *, timed: bool) -> tuple[LanePlan, Array]:
+        """The plan of a manoeuvre, and the levels (n, 2) at which its order changes."""
+        if isinstance(manoeuvre, Stop):
+            amidships = float(inputs[self.model.input_names.index("rudder.command")])
+            speeds = self._column(starts, "motion.u")
+            goals = np.array([2 * [manoeuvre.final_speed(speed)] for speed in speeds.tolist()])
+            return LanePlan((amidships, amidships), "motion.u", -1.0, 1, (), 0, inputs), goals
+        side, course = math.copysign(1.0, manoeuvre.rudder), self._column(starts, "motion.psi")[:, None]
+        if isinstance(manoeuvre, Turn):
+            orders, change, limit = (manoeuvre.rudder, manoeuvre.rudder), TURN_HEADING, 0 if timed else 1
+            watched, most = ("motion.psi", "motion.psi"), 1
+        else:
+            opposite = -manoeuvre.rudder if manoeuvre.opposite is None else manoeuvre.opposite
+            orders, change, limit = (manoeuvre.rudder, opposite), manoeuvre.heading, -1 if timed else ZIGZAG_EXECUTES
+            watched, most = ("motion.psi", "motion.r"), CROSSINGS
+        goals = course + side * np.array([change, -change])
+        return LanePlan(orders, "motion.psi", side, limit, watched, most, inputs), goals
+
+    def _levels(self, manoeuvre: LaneManoeuvre, starts: Array) -> Array:
+        """Levels (n, watches) of the watched states."""
+        course = self._column(starts, "motion.psi")[:, None]
+        if isinstance(manoeuvre, Turn):
+            return course + math.copysign(1.0, manoeuvre.rudder) * np.array([math.pi / 2, math.pi])
+        if isinstance(manoeuvre, Zigzag):
+            return np.hstack([course, np.zeros_like(course)])
+        return np.zeros((len(starts), 0))
 
     def _column(self, rows: Array, name: str) -> Array:
         values: Array = rows[..., self.model.state_names.index(name)]
@@ -317,6 +356,25 @@ class LaneManoeuvres:
             "speed_loss_percent": _speed_loss(found, found.speeds[:, 1]),
         }
 
+    def _stop(self, found: LaneResults, p: Array, starts: Array, final: Array) -> dict[str, Array]:
+        """Figures of stopping ships (n,), which end at the surge velocity `final` (n,), m/s."""
+        slow = self._column(found.last, "motion.u") <= final + REST_SPEED * found.speeds[:, 0]
+        stopped = (found.orders > 0) | slow
+        length = p[:, self.model.parameter_names.index("ship.length")]
+        ahead, aside = self._ahead_and_aside(found.last, starts, 1.0)
+        turned = self._column(found.last, "motion.psi") - self._column(starts, "motion.psi")
+        figures = {
+            "track_reach_m": found.way,
+            "head_reach_m": ahead,
+            "side_reach_m": aside,
+            "time_to_stop_s": found.end,
+            "stopped_at_mps": final,
+            "track_reach_lengths": found.way / length,
+            "head_reach_lengths": ahead / length,
+            "heading_change_deg": np.degrees(turned),
+        }
+        return {name: np.where(stopped, values, np.nan) for name, values in figures.items()}
+
     def _yaw_accelerations(self, found: LaneResults, others: tuple[Array, Array]) -> Array:
         """dr/dt (n, crossings, samples) about the crossings of zero rate, at the two samples between which they are."""
         windows = found.windows[:, 1]
@@ -337,16 +395,6 @@ class LaneManoeuvres:
         cos, sin = np.cos(heading), np.sin(heading)
         with np.errstate(invalid="ignore"):  # ships beyond all bounds, which are left out later
             return north * cos + east * sin, side * (east * cos - north * sin)
-
-
-def _plan(manoeuvre: Turn | Zigzag, inputs: Array, times: Sequence[float] | Array, *, timed: bool) -> LanePlan:
-    if isinstance(manoeuvre, Turn):
-        orders = (manoeuvre.rudder, manoeuvre.rudder)
-        return LanePlan(orders, TURN_HEADING, 0 if timed else 1, ("motion.psi", "motion.psi"), 1, inputs, times)
-    opposite = -manoeuvre.rudder if manoeuvre.opposite is None else manoeuvre.opposite
-    orders, watched = (manoeuvre.rudder, opposite), ("motion.psi", "motion.r")
-    limit = -1 if timed else ZIGZAG_EXECUTES
-    return LanePlan(orders, manoeuvre.heading, limit, watched, CROSSINGS, inputs, times)
 
 
 def _crossing(times: Array, offset: Array, slope: Array) -> Array:

@@ -2,7 +2,7 @@
 
 The runs take the steps of :mod:`tank2sim.simulation.running`: a grid of whole steps, and a sample at each change of the
 rudder order. Of the motion only what figures need is kept: the samples around crossings of watched levels, the changes
-of order, the ends, and on request the states at given times.
+of order, the ends, the way, and on request the states at given times.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ approach speed, two lengths at a tenth of it (project choice)."""
 
 # See Running.run_until and bracketed_root for the steps to an event. A lane that has ended takes steps of zero length.
 _RUNS = """
-enum {{ NX = {nx}, NU = {nu}, NP = {np}, NC = {nc}, PSI = {psi}, R = {r}, RUDDER = {rudder} }};
+enum {{ NX = {nx}, NU = {nu}, NP = {np}, NC = {nc}, X = {x}, Y = {y}, R = {r}, RUDDER = {rudder} }};
 enum {{ SAMPLES = {samples}, REMEMBERED = {remembered}, ROW = 2 + NX }};
 #if SINGLE
 /* After the states, what their rounding has lost (Kahan 1965); shares of a step: of a time's rounding, of a root. */
@@ -55,16 +55,17 @@ enum {{ KEPT = NX }};
 #define SAME_ROOT 1e-13
 #endif
 typedef struct {{
-  double h, first, second, heading;
-  long limit, kept, watches, most, times;
+  double h, first, second, side;
+  long changing, limit, kept, watches, most, times;
   const double *inputs, *limits, *at;
 }} Plan;
 typedef struct {{
-  double *end, *last, *then, *speeds, *left, *order_times, *order_states, *windows, *states;
+  double *end, *last, *way, *then, *speeds, *left, *order_times, *order_states, *windows, *states;
   int *ended, *orders, *crossings;
 }} Found;
 typedef struct {{
   V states[3][KEPT], *before, *x, *next, u[NU], p[NP], c[NC], h[1], t_before, t, t_next;
+  long changing; /* the state at a level of which the order changes */
 }} Group;
 static void take(Group *g, V *to) {{
   const V *const arg[5] = {{g->x, g->u, g->p, g->c, g->h}};
@@ -92,12 +93,12 @@ static void look(const Group *g, const V *x, V *speed, V *valid) {{
 static double beyond_after(Group *g, V *to, int lane, double length, double side, double goal) {{
   LANE(g->h[0], lane) = length;
   take(g, to);
-  return side * (LANE(to[PSI], lane) - goal);
+  return side * (LANE(to[g->changing], lane) - goal);
 }}
 /* The step to a goal within the step that was tried, by the method of Ridders, as bracketed_root. */
 static double step_to(Group *g, V *to, int lane, double high, double side, double goal) {{
-  double low = 0.0, best = INFINITY, f_low = side * (LANE(g->x[PSI], lane) - goal);
-  double f_high = side * (LANE(g->next[PSI], lane) - goal);
+  double low = 0.0, best = INFINITY, f_low = side * (LANE(g->x[g->changing], lane) - goal);
+  double f_high = side * (LANE(g->next[g->changing], lane) - goal);
   if (f_low == 0) return low;
   if (f_high == 0) return high;
   for (int k = 0; k < 200; ++k) {{
@@ -116,22 +117,31 @@ static double step_to(Group *g, V *to, int lane, double high, double side, doubl
   }}
   return best;
 }}
+/* What a step adds to a state. */
+static V gained(const Group *g, int i) {{
+#if SINGLE
+  return (g->next[i] - g->x[i]) + (g->next[NX + i] - g->x[NX + i]);
+#else
+  return g->next[i] - g->x[i];
+#endif
+}}
 static void keep_sample(double *row, double t, double order, const V *x, int lane) {{
   row[0] = t;
   row[1] = order;
   for (int i = 0; i < NX; ++i) row[2 + i] = LANE(x[i], lane);
 }}
 {export}void run_lanes(long members, const Plan *plan, const double *p, const double *starts, const double *ends,
-    const double *levels, const double *lengths, const int *watched, const Found *found) {{
+    const double *goals, const double *levels, const double *lengths, const int *watched, const Found *found) {{
   static const M none = {{0}};
   V rates[REMEMBERED], velocities[REMEMBERED];
-  const double h = plan->h, tolerance = SAME_TIME * h, side = plan->first < 0 ? -1.0 : 1.0;
+  const double h = plan->h, tolerance = SAME_TIME * h;
   for (long begin = 0; begin < members; begin += LANES) {{
     Group g;
     long member[LANES], due[LANES], events[LANES], open[LANES][2][2];
-    V goal, sides = all(side), end, level[2] = {{all(0), all(0)}}, steps = all(0), soon = all(INFINITY);
-    V approach, slowest, fastest, speed, valid, left;
+    V goal = all(0), sides = all(plan->side), end, level[2] = {{all(0), all(0)}}, steps = all(0), soon = all(INFINITY);
+    V approach, slowest, fastest, speed, valid, left, way = all(0), lost = all(0);
     M active = ~none, waiting = none;
+    g.changing = plan->changing;
     g.before = g.states[0]; g.x = g.states[1]; g.next = g.states[2];
     for (int l = 0; l < LANES; ++l) {{
       const long k = begin + l < members ? begin + l : members - 1;
@@ -141,6 +151,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       for (int i = 0; i < NP; ++i) LANE(g.p[i], l) = p[k * NP + i];
       for (int i = 0; i < KEPT; ++i) LANE(g.x[i], l) = i < NX ? starts[k * NX + i] : 0.0;
       LANE(end, l) = ends[k];
+      LANE(goal, l) = goals[2 * k];
       for (int w = 0; w < plan->watches; ++w) LANE(level[w], l) = levels[k * plan->watches + w];
       if (plan->times) LANE(soon, l) = plan->at[0];
     }}
@@ -148,7 +159,6 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
     g.u[RUDDER] = all(plan->first);
     {{ const V *const arg[1] = {{g.p}}; V *const res[1] = {{g.c}}; constants(arg, res); }}
     g.t = g.t_before = all(0);
-    goal = g.x[PSI] + sides * all(plan->heading);
     look(&g, g.x, &speed, &valid);
     approach = slowest = fastest = speed;
     left = WHERE(LT(valid, all({inside!r})), all(0), all(INFINITY));
@@ -165,7 +175,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       M event = none, crossed[2] = {{none, none}}, bad = none;
       const V before_rudder = g.u[RUDDER];
       if (plan->limit) {{
-        event = active & LE(all(0), sides * (g.next[PSI] - goal));
+        event = active & LE(all(0), sides * (g.next[g.changing] - goal));
         if (some(event)) {{
           V to[KEPT];
           const V tried = g.h[0];
@@ -190,6 +200,12 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       velocities[n & (REMEMBERED - 1)] = speed;
       for (int w = 0; w < plan->watches; ++w)
         crossed[w] = active & (LT(g.x[watched[w]], level[w]) ^ LT(g.next[watched[w]], level[w]));
+      {{ /* with what the rounding of the sum has lost (Kahan 1965) */
+        const V north = gained(&g, X), east = gained(&g, Y), part = lane_sqrt(north * north + east * east) - lost;
+        const V sum = way + WHERE0(active, part);
+        lost = WHERE0(active, (sum - way) - part);
+        way = sum;
+      }}
       const M over = active & LE(end - g.t_next, all(tolerance)), now = active & LE(soon, g.t_next);
       if (some(event | bad | crossed[0] | crossed[1] | over | now | waiting)) {{
         for (int l = 0; l < LANES; ++l) {{
@@ -219,7 +235,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
             if (!finished) {{
               LANE(sides, l) = -LANE(sides, l);
               LANE(g.u[RUDDER], l) = events[l] & 1 ? plan->second : plan->first;
-              LANE(goal, l) = starts[k * NX + PSI] + LANE(sides, l) * plan->heading;
+              LANE(goal, l) = goals[2 * k + (events[l] & 1)];
             }}
           }}
           LANE(waiting, l) = 0;
@@ -245,6 +261,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           LANE(active, l) = 0;
           LANE(waiting, l) = 0;
           found->end[k] = t_next;
+          found->way[k] = LANE(way, l);
           for (int i = 0; i < NX; ++i) found->last[k * NX + i] = LANE(g.next[i], l);
           found->orders[k] = (int) events[l];
           found->left[k] = LANE(left, l);
@@ -279,8 +296,8 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
 
 class _Plan(ctypes.Structure):
     _fields_ = (
-        *((name, ctypes.c_double) for name in ("h", "first", "second", "heading")),
-        *((name, ctypes.c_long) for name in ("limit", "kept", "watches", "most", "times")),
+        *((name, ctypes.c_double) for name in ("h", "first", "second", "side")),
+        *((name, ctypes.c_long) for name in ("changing", "limit", "kept", "watches", "most", "times")),
         *((name, ctypes.c_void_p) for name in ("inputs", "limits", "at")),
     )
 
@@ -288,6 +305,7 @@ class _Plan(ctypes.Structure):
 _FOUND = (
     "end",
     "last",
+    "way",
     "then",
     "speeds",
     "left",
@@ -307,15 +325,16 @@ class _Found(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class LanePlan:
-    """A manoeuvre of two rudder orders that take turns.
+    """A manoeuvre of two rudder orders that take turns, each until a state reaches its level.
 
     Parameters
     ----------
     orders : tuple of float
         Rudder at the execute and, after the first change, the other one, rad to starboard.
-    heading : float
-        Change of heading from the start at which the order changes, rad, first to the side of the first order, then to
-        the other.
+    changing : str
+        The state at a level of which the order changes.
+    side : float
+        1 or -1: whether that state rises or falls to its level first; then it falls or rises to the other, and so on.
     limit : int
         Changes of order at which a run ends; 0: none, the order is held to the end; -1: no limit.
     watched : tuple of str
@@ -331,7 +350,8 @@ class LanePlan:
     """
 
     orders: tuple[float, float]
-    heading: float
+    changing: str
+    side: float
     limit: int
     watched: tuple[str, ...]
     most: int
@@ -348,6 +368,8 @@ class LaneResults:
     ----------
     end, last : arrays (n,), (n, nx)
         Time, s, and states at the end.
+    way : array (n,)
+        Length of the track, m.
     then : array (n, 2)
         Yaw rate (rad/s) and speed (m/s) two lengths before the end.
     speeds : array (n, 4)
@@ -370,6 +392,7 @@ class LaneResults:
 
     end: Array
     last: Array
+    way: Array
     then: Array
     speeds: Array
     left: Array
@@ -405,15 +428,16 @@ class LaneRunner:
     def __init__(self, model: Model, lanes: int | None = None, *, single: bool = False):
         self.model, self.single = model, single
         self.lanes = widest_lanes() if lanes is None else lanes
-        needed = {"motion.psi", "motion.r", "rudder.angle"} - set(model.state_names)
+        needed = {"motion.x", "motion.y", "motion.r", "rudder.angle"} - set(model.state_names)
         if not self.lanes or needed or "rudder.command" not in model.input_names:
             raise NoLanesError("there is no C compiler, or the model is not that of a ship")
         self._run = self._compiled()
 
-    def runs(self, plan: LanePlan, p: Array, starts: Array, ends: Array, levels: Array) -> LaneResults:
+    def runs(self, plan: LanePlan, p: Array, starts: Array, ends: Array, levels: Array, goals: Array) -> LaneResults:
         """Runs of n ships with parameters `p` (n, np) from `starts` (n, nx), each at most to its time in `ends` (n,).
 
-        `levels` (n, watches) are those of the watched states.
+        `levels` (n, watches) are those of the watched states, `goals` (n, 2) those at which the order changes from the
+        first and from the second.
         """
         model, n, nx = self.model, len(starts), len(self.model.states)
         at = np.ascontiguousarray(plan.times, dtype=float)
@@ -426,6 +450,7 @@ class LaneRunner:
         found = LaneResults(
             end=np.full(n, np.nan),
             last=np.full((n, nx), np.nan),
+            way=np.full(n, np.nan),
             then=np.full((n, 2), np.nan),
             speeds=np.full((n, 4), np.nan),
             left=np.full(n, np.nan),
@@ -438,12 +463,13 @@ class LaneRunner:
             crossings=np.zeros(shape, dtype=np.int32),
         )
         lengths = p[:, model.parameter_names.index("ship.length")]
-        numbers = [np.ascontiguousarray(values, dtype=float) for values in (p, starts, ends, levels, lengths)]
+        numbers = [np.ascontiguousarray(values, dtype=float) for values in (p, starts, ends, goals, levels, lengths)]
         asked = _Plan(
             plan.step_factor * model.step_s,
             first,
             second,
-            plan.heading,
+            plan.side,
+            model.state_names.index(plan.changing),
             limit,
             kept,
             len(watched),
@@ -474,7 +500,8 @@ class LaneRunner:
             nu=step.size1_in(1),
             np=step.size1_in(2),
             nc=max(1, constants.size1_out(0)),
-            psi=model.state_names.index("motion.psi"),
+            x=model.state_names.index("motion.x"),
+            y=model.state_names.index("motion.y"),
             r=model.state_names.index("motion.r"),
             rudder=model.input_names.index("rudder.command"),
             samples=SAMPLES,
@@ -487,7 +514,7 @@ class LaneRunner:
             library = _library([VECTORS, *codes, runs], self.lanes, single=self.single)
         except (InputError, OSError) as error:  # a compiler that does not work, or compiles for another machine
             raise NoLanesError(str(error)) from error
-        pointers = [ctypes.c_void_p] * 5
+        pointers = [ctypes.c_void_p] * 6
         structures = ctypes.POINTER(_Plan), ctypes.POINTER(_Found)
         library.run_lanes.argtypes = [ctypes.c_long, structures[0], *pointers, ctypes.c_void_p, structures[1]]
         library.run_lanes.restype = None

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.dynamics.model import Input
+from tank2sim.dynamics.model import Input, Model
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, read_table
 from tank2sim.simulation.running import Running
@@ -49,6 +49,9 @@ SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -
 LONGEST_LENGTHS = 150.0
 """Longest run of a turning circle or zigzag without a given duration, L/u0. Project choice: some three times what slow
 ships need."""
+
+LONGEST_STOP = 300.0
+"""The same of a stopping ship: it coasts (project choice: twice that)."""
 
 FULL_ASTERN = 0.7
 """Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. Project choice;
@@ -237,8 +240,23 @@ class Stop:
         """Surge velocity (m/s) at which the ship has stopped: 0, or :data:`COASTING_END` of that of the approach."""
         return COASTING_END * approach if self.revolutions == 0 else 0.0
 
+    def order(self, model: Model) -> float:
+        """Revolutions (rad/s) ordered from the propeller of a ship.
+
+        Raises
+        ------
+        InputError
+            The ship has no propulsion.
+        """
+        if "propeller.speed" not in model.input_names:
+            problem = "is missing: the ship's engine cannot be stopped or reversed"
+            raise InputError(model.origin, "propulsion", problem, "add [propulsion] to the card")
+        nominal = model["propeller.speed"]
+        assert isinstance(nominal, Input)
+        return -FULL_ASTERN * nominal.start if self.revolutions is None else self.revolutions
+
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run for `duration` s, or until the ship is dead in the water (at most 300 L/u0).
+        """Run for `duration` s, or until the ship is dead in the water (at most :data:`LONGEST_STOP` L/u0).
 
         Raises
         ------
@@ -254,14 +272,7 @@ class Stop:
             running.order(orders)
             self._until_stopped(running, ship_time, duration)
             return
-        if "propeller.speed" not in running.model.input_names:
-            problem = "is missing: the ship's engine cannot be stopped or reversed"
-            raise InputError(running.model.origin, "propulsion", problem, "add [propulsion] to the card")
-        nominal = running.model["propeller.speed"]
-        assert isinstance(nominal, Input)
-        running.order(
-            {"propeller.speed": -FULL_ASTERN * nominal.start if self.revolutions is None else self.revolutions}
-        )
+        running.order({"propeller.speed": self.order(running.model)})
         self._until_stopped(running, ship_time, duration)
 
     def _until_stopped(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -269,7 +280,7 @@ class Stop:
             running.run(duration)
             return
         end = self.final_speed(running.state("motion.u"))
-        running.run_until("motion.u", end, rising=False, at_most=300 * ship_time)
+        running.run_until("motion.u", end, rising=False, at_most=LONGEST_STOP * ship_time)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from tank2sim.analysis.stability.imo import (
     imo_criteria,
     largest_trial_rudder,
     manoeuvring_trials,
-    stopping_reach,
 )
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -32,7 +31,7 @@ from tank2sim.simulation.card_range import Numbers, single_figures
 from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult, gathered
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.lane_figures import USUAL_PACE, LaneManoeuvres, Pace, runs_in_lanes
+from tank2sim.simulation.lane_figures import USUAL_PACE, LaneManoeuvre, LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
@@ -62,9 +61,6 @@ def signals_with_bands(model: Model) -> Mapping[str, tuple[str, float]]:
     heel = {"phi_deg": ("motion.phi", math.degrees(1.0))} if "motion.phi" in model else {}
     return {**ENSEMBLE_SIGNALS, **heel}
 
-
-EVERY = 10
-"""Steps between two kept samples: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
 LANE_BATCH = 256
 """Members of a batch that is run in lanes: with its crossings and histories it takes 10 MB (project choice)."""
@@ -113,15 +109,15 @@ class OfManoeuvre:
     @property
     def batch(self) -> int:
         """Members of a batch."""
-        return LANE_BATCH if runs_in_lanes(self.manoeuvre) else BATCH
+        return LANE_BATCH if runs_in_lanes(self.manoeuvre, self.duration_s) else BATCH
 
     def prepared(self) -> Ask | AskTogether:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = study_model(self.ship.card())
         signals = {name for name, _ in signals_with_bands(model).values()}
-        lanes = lanes_of(model) if runs_in_lanes(self.manoeuvre) and signals <= set(model.state_names) else None
-        if lanes is not None:
-            return AskTogether(self._in_lanes(model, lanes))
+        shown = signals <= set(model.state_names)
+        if shown and runs_in_lanes(self.manoeuvre, self.duration_s) and (lanes := lanes_of(model)) is not None:
+            return AskTogether(self._in_lanes(self.manoeuvre, model, lanes))
         return _each(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
 
     def _driven(self, model: Model) -> AskOne:
@@ -140,11 +136,12 @@ class OfManoeuvre:
 
         return ask
 
-    def _in_lanes(self, model: Model, lanes: LaneManoeuvres) -> Callable[[int, Mapping[str, Array], int], BatchResult]:
+    def _in_lanes(
+        self, manoeuvre: LaneManoeuvre, model: Model, lanes: LaneManoeuvres
+    ) -> Callable[[int, Mapping[str, Array], int], BatchResult]:
         """Joint runs of the members of a batch."""
-        assert isinstance(self.manoeuvre, Turn | Zigzag)
         signals = signals_with_bands(model).values()
-        manoeuvre, rows = self.manoeuvre, [model.state_names.index(name) for name, _ in signals]
+        rows = [model.state_names.index(name) for name, _ in signals]
         factors = np.array([factor for _, factor in signals])
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
@@ -234,7 +231,7 @@ class OfCriteria:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        integrator, each_step, parameters = Integrator(model, every=EVERY), Integrator(model), _parameters(model)
+        each_step, parameters = Integrator(model), _parameters(model)
 
         def ask_one(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
@@ -268,12 +265,9 @@ class OfCriteria:
                     beyond = np.any([side.outside(figure) for side in sides], axis=0)
                     figures[name + BEYOND_CARD_MARK] = beyond.astype(float)
             if "propeller.speed" in model.input_names:
-                given = ({name: value for name, value in member.items() if name in parameters} for member in members)
-                reaches = [
-                    None if trouble else stopping_reach(model, member, integrator)
-                    for member, trouble in zip(given, troubles, strict=True)
-                ]
-                figures[TRACK_REACH] = np.array([math.nan if reach is None else reach for reach in reaches])
+                stopping = lanes.run(Stop(), p, inputs=undisturbed_inputs(model))
+                figures[TRACK_REACH] = stopping.figures["track_reach_lengths"]
+                figures[TRACK_REACH + BEYOND_CARD_MARK] = stopping.outside("track_reach_lengths").astype(float)
             return _usable(figures, troubles)
 
         return AskTogether(ask)

@@ -9,10 +9,10 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.card_parameters import study_model
 from tank2sim.simulation.ensemble import Draws
 from tank2sim.simulation.lane_figures import USUAL_PACE, LaneFigures, Pace, runs_in_lanes
-from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.manoeuvres import Zigzag
 
 STEP_FACTORS = (6, 4, 3, 2)
-"""Lengths of steps of turns over the model's that are tried, the longest first (project choice)."""
+"""Lengths of steps of turns and stops over the model's that are tried, the longest first (project choice)."""
 
 STEP_TOLERANCE = 1e-5
 """Largest relative change of a figure by another pace: at most a unit of its fifth digit, and the sampling error of a
@@ -28,7 +28,7 @@ TRIED_MEMBERS = 64
 
 
 def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
-    """The fastest pace with which figures of a turn or zigzag are the same.
+    """The fastest pace with which figures of a turn, zigzag or stop are the same.
 
     The first :data:`TRIED_MEMBERS` members of the ensemble are run with the model's step in double precision, and at
     other paces: in single precision with each of :data:`STEP_FACTORS`, longest first, and with the model's step, then
@@ -46,7 +46,7 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
         Of the members.
     """
     manoeuvre = question.manoeuvre
-    if not isinstance(manoeuvre, Turn | Zigzag) or not runs_in_lanes(manoeuvre):
+    if not runs_in_lanes(manoeuvre, question.duration_s):
         return USUAL_PACE
     model = study_model(question.ship.card())
     lanes = lanes_of(model)
@@ -64,7 +64,7 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
         runs = lanes.run(manoeuvre, p, question.duration_s, pace=pace)
         return 2 * int(runs.doubtful.sum()) < len(p) and same_figures(usual, runs, tolerance)
 
-    factors = STEP_FACTORS if isinstance(manoeuvre, Turn) else ()
+    factors = () if isinstance(manoeuvre, Zigzag) else STEP_FACTORS
     for pace in (*(Pace(factor, single=True) for factor in (*factors, 1)), *map(Pace, factors)):
         edge = Pace(pace.step_factor + 1, pace.single)
         if same(pace, STEP_TOLERANCE) and (pace.step_factor == 1 or same(edge, EDGE_TOLERANCE)):

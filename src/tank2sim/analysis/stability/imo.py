@@ -260,21 +260,6 @@ def limits_of(manoeuvre: Manoeuvre, model: Model) -> dict[str, float]:
     return {figure: allowed[name] for name, figure in criteria.items() if name not in left_out}
 
 
-def stopping_reach(model: Model, changed: Mapping[str, float], integrator: Integrator) -> float | None:
-    """Track reach of full astern stopping, L, of a ship with propulsion; None where its trial does not show it.
-
-    Parameters
-    ----------
-    model : Model
-        The ship.
-    changed : mapping
-        Parameters in place of the model's, by name.
-    integrator : Integrator
-        An existing integrator of this model.
-    """
-    return _stopping(_Trials(model, integrator, changed)).found
-
-
 def _stopping(trials: _Trials) -> ImoCriterion:
     """Track reach of full astern stopping, for a card with propulsion."""
     name = TRACK_REACH
