@@ -11,7 +11,7 @@ from tank2sim.analysis.validation.comparison import CardComparison, compare_card
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.cards import Card, SteeredCard
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -21,7 +21,17 @@ if TYPE_CHECKING:
 _MOST = 10
 """Coefficients of each card that the tables show; JSON and page have all. Project choice: they fit a screen."""
 
-_SHOWN = ("advance_m", "tactical_diameter_m", "overshoot_1_deg", "overshoot_2_deg", "track_reach_m")
+_SHOWN = (
+    "final_speed_mps",
+    "steady_rate_degps",
+    "steady_diameter_m",
+    "final_rate_degps",
+    "advance_m",
+    "tactical_diameter_m",
+    "overshoot_1_deg",
+    "overshoot_2_deg",
+    "track_reach_m",
+)
 
 
 class ComparisonResult(Result):
@@ -29,14 +39,14 @@ class ComparisonResult(Result):
 
     Parameters
     ----------
-    cards : sequence of ManoeuvringCard
+    cards : sequence of SteeredCard
     comparison : CardComparison
         In the convention and at the size of the reference.
     """
 
     command = "compare"
 
-    def __init__(self, cards: Sequence[ManoeuvringCard], comparison: CardComparison) -> None:
+    def __init__(self, cards: Sequence[SteeredCard], comparison: CardComparison) -> None:
         self.ships, self.comparison = tuple(Ship(card) for card in cards), comparison
         self.notices = comparison.notices
 
@@ -61,6 +71,8 @@ class ComparisonResult(Result):
     @property
     def coefficients(self) -> pd.DataFrame:
         """A row each coefficient and card but the reference, in the reference's convention (prime; of effects SI).
+
+        Those of craft are in SI.
 
         ``difference_percent`` is in per cent of the reference's size, ``standard_errors`` the difference over the root
         of both variances; missing where they cannot be compared.
@@ -160,6 +172,8 @@ class ComparisonResult(Result):
 def compare(cards: Sequence[Ship | Card | str | Path], *, members: int = MEMBERS) -> ComparisonResult:
     """Compare cards of one ship, or of ships and models of one form; the first is the reference, whose size is taken.
 
+    Cards of a craft with thrusters are compared at its own size, by a straight run, turns by difference and a spin.
+
     Parameters
     ----------
     cards : sequence of Ship, Card, str or path
@@ -170,7 +184,7 @@ def compare(cards: Sequence[Ship | Card | str | Path], *, members: int = MEMBERS
     Raises
     ------
     InputError
-        There is only one card, or a card is not one of a ship that manoeuvres.
+        There is only one card, a card is not one of a ship or craft that manoeuvres, or both are mixed.
 
     Examples
     --------
@@ -181,7 +195,7 @@ def compare(cards: Sequence[Ship | Card | str | Path], *, members: int = MEMBERS
     >>> list(changed.index)
     ['Yv']
     """
-    ships = [as_ship(card).manoeuvring() for card in ([cards] if isinstance(cards, str | Path) else cards)]
+    ships = [as_ship(card).steered() for card in ([cards] if isinstance(cards, str | Path) else cards)]
     return ComparisonResult(ships, compare_cards(ships, members))
 
 

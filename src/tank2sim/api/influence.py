@@ -11,19 +11,21 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.results import EnsembleRequest, FigureBands, named_bands
 from tank2sim.analysis.influence.card_influence import CardInfluence, influence
-from tank2sim.analysis.influence.figures import parse_figure
+from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import Means, Tuned, tuned_text
 from tank2sim.analysis.tuning.targets import TARGET_OPTION, Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
+from tank2sim.analysis.validation.standard_trials import craft_trials
 from tank2sim.api.ensemble import FEW_IN_LANES, EnsembleOptions, band_table
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
-from tank2sim.cards import Card
+from tank2sim.cards import Card, CraftCard
 from tank2sim.cards.derived import derived_card
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -259,7 +261,7 @@ class TuningResult(InfluenceResult):
 
     @cached_property
     def _derived(self) -> tuple[Card, tuple[str, ...]]:
-        card = self.ship.manoeuvring()
+        card = self.ship.steered()
         return derived_card(card, tuned_text(card, self.tuned), _TUNED_CARD)
 
     def _card_notices(self) -> Sequence[str]:
@@ -279,8 +281,28 @@ def influence_of_ship(
     ensemble : EnsembleOptions
         Of its bands.
     """
-    study = Study(ship.manoeuvring(), [parse_figure(text) for text in dict.fromkeys(figures or DEFAULT_FIGURES)])
+    card = ship.steered()
+    asked = [parse_figure(text) for text in dict.fromkeys(figures)]
+    if not asked:
+        asked = craft_figures(card) if isinstance(card, CraftCard) else [parse_figure(text) for text in DEFAULT_FIGURES]
+    study = Study(card, asked)
     return InfluenceResult(ship, influence(study, joint_variation), _bands(ship, study, ensemble))
+
+
+def craft_figures(card: CraftCard) -> list[InfluenceFigure]:
+    """Figures of a craft where none is given: top speed, a turn by half of the largest difference, and a spin.
+
+    Parameters
+    ----------
+    card : CraftCard
+    """
+    names = {StraightRun: ["final_speed_mps"], DifferenceTurn: ["steady_diameter_m", "steady_rate_degps"]}
+    trials = craft_trials([card]).values()
+    return [
+        parse_figure(f"{name}@{trial.words}")
+        for trial in trials
+        for name in names.get(type(trial), ["final_rate_degps"])
+    ]
 
 
 def tune_ship(
@@ -301,7 +323,7 @@ def tune_ship(
         raise InputError(TARGET_OPTION, "", "has no target", "give FIGURE=VALUE, as steady_radius_m@20=424")
     parsed: list[Target] = [parse_target(text) for text in targets]
     asked = [*(parse_figure(text) for text in figures), *(target.figure for target in parsed)]
-    study = Study(ship.manoeuvring(), list(dict.fromkeys(asked)))
+    study = Study(ship.steered(), list(dict.fromkeys(asked)))
     tuned = tune(study, parsed, means)
     found = influence(study, means.agreed)
     return TuningResult(ship, found, tuned, study.figures_at(tuned.values), _bands(ship, study, ensemble))

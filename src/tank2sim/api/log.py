@@ -107,8 +107,12 @@ class LogResult(PagedResult):
         """
         from tank2sim.api.craft_identification import identify_craft
 
-        cut = [entry for entry in self.cuts if not entry.steered]
-        if self.craft is None or not cut:
+        if self.craft is None:
+            return None
+        assert isinstance(self.craft.card, CraftCard)
+        turning = any(thruster.max_azimuth_rad is not None for thruster in self.craft.card.thrusters)
+        cut = [entry for entry in self.cuts if turning or not entry.steered]
+        if not cut:
             return None
         with tempfile.TemporaryDirectory() as name:
             paths = [Path(name) / entry.trial.path.name for entry in cut]

@@ -491,6 +491,28 @@ class CraftIdentifyKeys(_Keys):
     notices: list[str]
 
 
+class CraftReplayKeys(_Part):
+    """Free-running predictions of a trial: their number, rms errors of the motion, and of the pose at their ends."""
+
+    predictions: Number
+    rms_u_mps: Number
+    rms_v_mps: Number
+    rms_r_degps: Number
+    end_distance_m: Number
+    end_heading_deg: Number
+
+
+class CraftValidateKeys(_Keys):
+    """R^2 of u, v and r of free-running predictions of a craft, and rms errors at their ends next to measurements."""
+
+    ship: str
+    determination: dict[str, Number]
+    end_distance_m: Number
+    end_heading_deg: Number
+    trials: dict[str, CraftReplayKeys]
+    notices: list[str]
+
+
 class WindowErrorKeys(_Part):
     """Root mean square of an error over windows, and of the measured signal."""
 
@@ -1208,7 +1230,7 @@ KEYS: dict[str, Any] = {
     "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
     "tow": TowKeys,
-    "validate": ValidateKeys,
+    "validate": ValidateKeys | CraftValidateKeys,
     "yaw": YawKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""

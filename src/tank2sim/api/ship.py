@@ -12,7 +12,7 @@ import numpy as np
 
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
-from tank2sim.cards import Card, CraftCard, ManoeuvringCard, parse_card, read_card
+from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.errors import InputError
@@ -51,6 +51,12 @@ class SimulationOptions(TypedDict, total=False):
     members: int
     seed: int
     executor: str
+
+
+CRAFT_COMMANDS = (
+    "identify, validate, compare, simulate, stability, autopilot, influence, convert, export, steer (without ensembles)"
+)
+"""Commands that take the card of a craft with thrusters."""
 
 
 class Ship:
@@ -119,12 +125,27 @@ class Ship:
         Raises
         ------
         InputError
-            It is not: a towed body, a yaw rig or a glider.
+            It is not: a towed body, a yaw rig, a glider or a craft without a rudder.
         """
+        if isinstance(self.card, CraftCard):
+            remedy = f"craft with thrusters are taken by {CRAFT_COMMANDS}"
+            raise InputError(
+                self.card.source, "model.kind", "is small_craft, and this is of ships with a rudder", remedy
+            )
         if not isinstance(self.card, ManoeuvringCard):
             remedy = "give a linear, abkowitz or mmg card"
             raise InputError(self.card.source, "model.kind", "is not that of a ship that manoeuvres", remedy)
         return self.card
+
+    def steered(self) -> SteeredCard:
+        """The card, if it is one of a ship that manoeuvres or of a small craft with thrusters.
+
+        Raises
+        ------
+        InputError
+            It is neither: a towed body, a yaw rig or a glider.
+        """
+        return self.card if isinstance(self.card, CraftCard) else self.manoeuvring()
 
     def replace(self, values: Mapping[str, object]) -> Ship:
         """The ship with other values on its card, by dotted key: ``{"derivatives.Yv": -0.012}``.
@@ -385,7 +406,9 @@ class Ship:
         ----------
         figures : str or sequence of str
             ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``, angles in degrees: names are those of
-            :data:`tank2sim.analysis.influence.figures.FIGURE_KINDS`. By default one of each kind.
+            :data:`tank2sim.analysis.influence.figures.FIGURE_KINDS`. Of a craft with thrusters
+            ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, ``final_rate_degps@spin:400``, in
+            rpm: :data:`.CRAFT_FIGURE_KINDS`. By default one of each kind.
         joint_variation : mapping, optional
             Changes in % of numbers that change together (Kc), by name: ``{"Yv": 0.62, "Nv": 1.7}``.
         members, seed, executor

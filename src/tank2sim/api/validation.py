@@ -15,11 +15,12 @@ from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
 from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, Verified, verify
 from tank2sim.analysis.validation.study import validate_card as validate_figures
+from tank2sim.api.craft_validation import CraftValidationResult, validate_craft
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.api.trial import TrialPaths, trials_of
+from tank2sim.api.trial import TrialPaths, trial_files, trials_of
 from tank2sim.arrays import Array
-from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.cards import Card, CraftCard, ManoeuvringCard
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import signal_display_name
@@ -68,7 +69,7 @@ class ValidationResult(Result):
         self.ready, self.trials, self.validation = ready, trials, validation
         self.verified, troubles = verify(ready, members)
         self.criteria: tuple[ImoCriterion, ...] = tuple(imo_criteria(ready.model))
-        replays = _replay(ready.card, trials)
+        replays = _replay(ready.manoeuvring, trials)
         self.replays = replays.replayed
         compiler = () if ready.integrator.compiled else (NO_COMPILER,)
         findings = (*validation.notices, *troubles, *replays.notices)
@@ -105,7 +106,7 @@ class ValidationResult(Result):
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
-        card, model = self.ready.card, self.ready.model
+        card, model = self.ready.manoeuvring, self.ready.model
         return {
             "kind": "validate",
             "ship": card.ship.name,
@@ -160,10 +161,11 @@ def validate(
     *,
     members: int = MEMBERS,
     required_percent: float = REQUIRED,
-) -> ValidationResult:
+) -> ValidationResult | CraftValidationResult:
     """Validate a ship in the manner of ITTC 7.5-02-06-03 by trials that did not make its card, figure by figure.
 
-    A trial that the card was identified from can only refute it.
+    A trial that the card was identified from can only refute it. A craft with thrusters is validated by free-running
+    predictions of its trials, without `members` and `required_percent`.
 
     Parameters
     ----------
@@ -181,6 +183,8 @@ def validate(
     InputError
         The card is not one of a ship that manoeuvres, or a file is at fault.
     """
+    if isinstance(as_ship(card).card, CraftCard):
+        return validate_craft(as_ship(card), trial_files(trials))
     ship = as_ship(card).manoeuvring()
     records = trials_of(trials)
     given = measured(records, ship) if records else Measured((), "angle", ())

@@ -296,6 +296,10 @@ class CraftCard(Card):
         return spelling, from_si(spelling, value)
 
 
+SteeredCard = ManoeuvringCard | CraftCard
+"""Card of a vessel that is steered in the horizontal plane, by a rudder or by thrusters."""
+
+
 @dataclass(frozen=True)
 class SurgeBodyCard(Card):
     """Card of a body that only surges: (1.5) of paper 1, SI."""

@@ -8,6 +8,7 @@ import click
 
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.analysis.validation.study import REQUIRED
+from tank2sim.api.craft_validation import CraftValidationResult
 from tank2sim.api.ship import load
 from tank2sim.api.validation import validate
 from tank2sim.cli.console import json_option, show_result, write_result
@@ -49,9 +50,13 @@ def command(
 ) -> None:
     """Validate CARD in the manner of ITTC 7.5-02-06-03: by TRIALs that did not make it, figure by figure.
 
-    A TRIAL that CARD was identified from, by its content or by the names in its source, can only refute it.
+    A TRIAL that CARD was identified from, by its content or by the names in its source, can only refute it. A craft
+    with thrusters is validated by free-running predictions of 30 s of trials that log cut.
     """
     result = validate(load(card, values), trials, members=members, required_percent=required_percent)
-    files = [trial.path for trial in result.trials.trials]
-    write_result(result, [result.ready.card.source, *files], json_file=json_file, page=page, plots=plots)
+    if isinstance(result, CraftValidationResult):
+        inputs: list[str | Path] = [result.ship.card.source, *result.paths]
+    else:
+        inputs = [result.ready.card.source, *(trial.path for trial in result.trials.trials)]
+    write_result(result, inputs, json_file=json_file, page=page, plots=plots)
     show_result(result)

@@ -19,6 +19,7 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, joint_errors
 from tank2sim.dynamics.effects.derivatives import hydrodynamic
 from tank2sim.errors import InputError
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
 FIGURES_OPTION = "--figures"
@@ -166,7 +167,7 @@ def range_of_figures(card: ManoeuvringCard, figures: Sequence[InfluenceFigure]) 
     length = card.ship.length_m
     drift, rudder, rate = _LEAST_RANGE
     for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in figures):
-        if manoeuvre is None:
+        if not isinstance(manoeuvre, Turn | Zigzag):
             continue
         run = simulate(model, manoeuvre).trajectory
         speed = np.maximum(run["motion.speed"], 1e-6)

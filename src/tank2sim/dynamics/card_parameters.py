@@ -1,7 +1,8 @@
 """Numbers of a ship's card with influence: parameters of the model, with their errors and keys in the file.
 
-These are the derivatives, the rigid body, the steering gear, the effect of revolutions and the parameters of the card's
-effects. Particulars (length, speed of expansion, density) only scale them, and sensors do not move the ship.
+These are the derivatives, the rigid body, the steering gear, the effect of revolutions or the thrusters, and the
+parameters of the card's effects. Particulars (length, speed of expansion, density) only scale them, and sensors do not
+move the ship.
 """
 
 from __future__ import annotations
@@ -9,15 +10,18 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard, MmgCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, MmgCard, SteeredCard
 from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.small_craft import body_scales, craft_scale, craft_scales
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import InputError
 from tank2sim.marks import ASSUMED
 from tank2sim.units import from_si
@@ -56,32 +60,61 @@ class CardParameter:
     @property
     def short(self) -> str:
         """The name in the card: ``Yv``, ``mass``, ``current.speed``."""
-        return self.name.removeprefix("derivatives.").removeprefix("ship.").removeprefix("mmg.")
+        for section in ("derivatives.", "ship.", "mmg.", "thrusters."):
+            if self.name.startswith(section):
+                return self.name.removeprefix(section)
+        return self.name
 
 
-def study_model(card: ManoeuvringCard) -> Model:
+def study_model(card: SteeredCard) -> Model:
     """The model of a card with the inputs of its effects (a current) as constants, which can be varied."""
     model = build(card)
     names = [name for entry in card.effects for name in EFFECTS[entry.name].model_names().values()]
     return model.with_constant_inputs(names)
 
 
-def card_parameters(card: ManoeuvringCard, model: Model) -> tuple[CardParameter, ...]:
+def card_parameters(card: SteeredCard, model: Model) -> tuple[CardParameter, ...]:
     """Parameters of a card that are in its model, except for those that are zero without a standard error."""
-    found = (
-        *_derivatives(card, model),
-        *_interaction(card),
-        *_rigid_body(card),
-        *_gear(card),
-        *_propulsion(card),
-        *_effects(card, model),
-    )
+    own = _of_craft(card) if isinstance(card, CraftCard) else _of_ship(card, model)
+    found = (*own, *_effects(card, model))
     known = set(model.parameter_names)
     return tuple(
         parameter
         for parameter in found
         if parameter.name in known and (parameter.value != 0 or parameter.standard_error > 0)
     )
+
+
+def _of_ship(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
+    return [
+        *_derivatives(card, model),
+        *_interaction(card),
+        *_rigid_body(card),
+        *_gear(card),
+        *_propulsion(card),
+    ]
+
+
+def _of_craft(card: CraftCard) -> list[CardParameter]:
+    """Rigid body, derivatives and thrusters of a craft, SI."""
+    scales, prime = craft_scales(card), card.model.scaling == "prime"
+    found = []
+    for name in dict.fromkeys((*card.derivatives, *card.uncertainty)):
+        value, error, stated = card.derivatives.get(name, 0.0), card.standard_error(name), name in card.uncertainty
+        factor = 1 / craft_scale(name, scales) if prime else 1.0
+        found.append(CardParameter(f"derivatives.{name}", value, error, not stated, f"derivatives.{name}", factor))
+    for key, unit in body_scales(scales).items():
+        value, factor = getattr(card.rigid_body, key), 1 / unit if prime else 1.0
+        found.append(CardParameter(f"ship.{key}", value, 0.0, False, f"rigid_body.{key}", factor))
+    for number, thruster in enumerate(card.thrusters):
+        for key, part in THRUSTER_PARAMETERS.items():
+            value, place = getattr(thruster, key) or 0.0, f"thrusters.{number}.{key}"
+            certain = key in ("x_m", "y_m")
+            error = thruster.uncertainty.get(key, 0.0 if certain else DEFAULT_RELATIVE_ERROR * abs(value))
+            assumed = not certain and key not in thruster.uncertainty
+            spelling, factor = card.in_file(place, 1.0)
+            found.append(CardParameter(f"thrusters.{thruster.name}.{part}", value, error, assumed, spelling, factor))
+    return found
 
 
 def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) -> CardParameter:
@@ -175,9 +208,11 @@ def _propulsion(card: ManoeuvringCard) -> list[CardParameter]:
     return [CardParameter("propulsion.Xnn", value, error, True, "propulsion.Xnn", factor)]
 
 
-def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
+def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     found = []
+    # What fits a craft reads nothing else of a card than what both kinds have.
+    shared = cast(ManoeuvringCard, card)
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]
         if effect.acts_on == "sensor":
@@ -191,7 +226,7 @@ def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
             key = key or f"effects.{number}.parameters.{parameter.name}"
             stated = parameter.name in entry.uncertainty
             error = entry.uncertainty.get(parameter.name, DEFAULT_RELATIVE_ERROR * abs(values[name]))
-            bounds = (parameter.lowest(card), parameter.maximum)
+            bounds = (parameter.lowest(shared), parameter.maximum)
             found.append(CardParameter(name, values[name], error, not stated, key, from_si(key, 1.0), bounds))
     return found
 
@@ -270,7 +305,7 @@ class JointErrors:
         return f"errors of {len(self.together)} numbers go together, as the covariance next to the card says"
 
 
-def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> JointErrors:
+def joint_errors(card: SteeredCard, parameters: Sequence[CardParameter]) -> JointErrors:
     """The errors of parameters of a card: correlated if in its covariance, else independent.
 
     Raises

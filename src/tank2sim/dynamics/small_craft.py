@@ -411,7 +411,7 @@ def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: Quan
 def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[Variable], ca.SX]:
     """Variables of a thruster that turns, and its azimuth (rad); none, and the number, of one that is fixed."""
     middle, reach = thruster.azimuth_rad, thruster.max_azimuth_rad
-    if reach is None or thruster.azimuth_time_constant_s is None:
+    if reach is None:
         return [], ca.SX(middle)
     command = Input(
         name=f"{prefix}.azimuth_command",
@@ -423,18 +423,19 @@ def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[V
         maximum=middle + reach,
         start=middle,
     )
-    lag = thruster.azimuth_time_constant_s
-    state = State(
-        name=f"{prefix}.azimuth",
-        unit="rad",
-        description=f"Direction in which {where} pushes the craft, clockwise from the bow",
-        display_unit="deg",
-        nominal=min(reach, 0.5),
-        derivative=f"{prefix}.azimuth_rate",
-        start=middle,
-        trim=command.symbol,
-    )
-    rate = (ca.fmax(middle - reach, ca.fmin(middle + reach, command.symbol)) - state.symbol) / lag
+    described = {
+        "name": f"{prefix}.azimuth",
+        "unit": "rad",
+        "description": f"Direction in which {where} pushes the craft, clockwise from the bow",
+        "display_unit": "deg",
+        "nominal": min(reach, 0.5),
+    }
+    lag, held = thruster.azimuth_time_constant_s, ca.fmax(middle - reach, ca.fmin(middle + reach, command.symbol))
+    if lag is None:
+        angle = Quantity(value=held, **described)  # type: ignore[arg-type]
+        return [command, angle], angle.symbol
+    state = State(derivative=f"{prefix}.azimuth_rate", start=middle, trim=command.symbol, **described)  # type: ignore[arg-type]
+    rate = (held - state.symbol) / lag
     if thruster.max_azimuth_rate_radps:
         limit = thruster.max_azimuth_rate_radps
         rate = ca.fmax(-limit, ca.fmin(limit, rate))

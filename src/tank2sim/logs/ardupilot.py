@@ -162,11 +162,17 @@ def _dataflash_tables(reader: Any) -> tuple[_Tables, dict[tuple[str, str], str],
 
 
 def _servo_orders(time: Array, table: Mapping[str, Array], params: Mapping[str, float]) -> list[LogStream]:
-    """Orders as shares of the range, positive to starboard and ahead, of the outputs with a known function."""
+    """Orders as shares of the range, positive to starboard and ahead, of the outputs with a known function.
+
+    Without any SERVOn_FUNCTION the pulses of all outputs, us.
+    """
     streams = []
+    nothing_known = not any(name.endswith("_FUNCTION") for name in params)
     for number in range(1, 17):
         quantity = _SERVO_FUNCTIONS.get(int(params.get(f"SERVO{number}_FUNCTION", 0)))
         pulses = table.get(f"C{number}", table.get(f"Ch{number}"))
+        if nothing_known and pulses is not None:  # their use is found by what the vessel does
+            streams.append(LogStream(f"RCOU.C{number}", time, np.where(pulses > 0, pulses, math.nan), "us"))
         if quantity is None or pulses is None:
             continue
         least, trim, most = (

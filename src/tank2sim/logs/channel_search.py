@@ -25,6 +25,7 @@ from tank2sim.logs.content import (
     speed_evidence,
     steering_evidence,
 )
+from tank2sim.logs.pulses import PulseScale, pulses_of
 from tank2sim.logs.quantities import QUANTITIES, sign_of_name
 from tank2sim.logs.reference import (
     POSITION_WINDOW_S,
@@ -58,6 +59,10 @@ over ground, which is noisier and has the drift in it, does not."""
 _TESTED_STEP_S = 0.2
 """Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more."""
 
+ALONE_LESS = 0.1
+"""A pair of orders is one of thrusters if either alone agrees with the turn by so much less than their difference
+(project choice)."""
+
 _BASE = {"format": 0.95, "name": 0.75, "": 0.6}
 _AGREED = {"format": 0.99, "name": 0.96, "": 0.9}
 _CONTRADICTED = 0.2
@@ -71,11 +76,13 @@ def find_channels(streams: Iterable[LogStream]) -> ChannelSet:
     used, and is a fault in the findings; the one of several that agrees best is used.
     """
     search = _Search([stream for stream in streams if len(stream.values) >= 2])
+    search.pulses()
     search.positions()
     search.headings()
     search.rates()
     search.speeds()
     search.unnamed()
+    search.unnamed_thrusters()
     search.steering()
     search.thrusters()
     search.others()
@@ -92,6 +99,27 @@ class _Search:
         empty = np.zeros(0)
         self.motion = ReferenceMotion(empty, empty, empty, empty, empty)
         self.rate: tuple[Array, Array] = (empty, empty)
+        self.pulse_scales: dict[str, PulseScale] = {}
+
+    def pulses(self) -> None:
+        """Search among the shares that pulses are of full order."""
+        for place, stream in enumerate(self.streams):
+            pulses, scale = pulses_of(stream)
+            if scale is not None:
+                self.pulse_scales[stream.name] = scale
+                self.streams[place] = replace(stream, values=scale.share(pulses.values), unit="1")
+
+    def _of_pulses(self, channel: LogChannel) -> LogChannel:
+        """The channel by what was recorded, if that was pulses."""
+        scale = self.pulse_scales.get(channel.stream)
+        if scale is None:
+            return channel
+        if channel.use:
+            full = scale.rest_us + scale.span_us
+            text = f"{channel.stream} holds pulses: {scale.rest_us:g} us is taken as rest and {full:g} us as full order"
+            self.findings.append(LogFinding("note", text, channel.stream))
+        offset = scale.rest_us + channel.offset * scale.span_us
+        return replace(channel, scale=channel.scale / scale.span_us, offset=offset)
 
     def named(self, *quantities: str) -> list[LogStream]:
         return [stream for stream in self.streams if stream.quantity in quantities]
@@ -509,6 +537,27 @@ class _Search:
         middle = float(np.median(ratio))
         return middle if np.median(np.abs(ratio - middle)) < 0.1 * abs(middle) and middle > 0 else None
 
+    def unnamed_thrusters(self) -> None:
+        """Two streams of orders without a name whose difference turns the vessel, which neither does alone."""
+        if self.named("thrust_order_port", "thrust_order_starboard", "rudder_order", "rudder_angle"):
+            return
+        orders = [
+            stream
+            for stream in self.streams
+            if not stream.quantity
+            and stream.unit == "1"
+            and np.ptp(stream.values) > 0.1
+            and np.nanmax(stream.values) < 2
+        ]
+        if len(orders) != 2:
+            return
+        (time, port), starboard = self.thin(orders[0]), self.thin(orders[1])
+        tried = [port - np.interp(time, *starboard), port, np.interp(time, *starboard)]
+        found = [steering_evidence(time, values, *self.rate)[0].agreement or 0.0 for values in tried]
+        if found[0] > 0.6 and found[0] > max(found[1:]) + ALONE_LESS:
+            for stream, quantity in zip(orders, ("thrust_order_port", "thrust_order_starboard"), strict=True):
+                self.streams[self.streams.index(stream)] = replace(stream, quantity=quantity)
+
     def thrusters(self) -> None:
         pairs = (("thrust_order_port", "thrust_order_starboard"), ("rpm_port", "rpm_starboard"))
         for port_name, starboard_name in pairs:
@@ -570,7 +619,7 @@ class _Search:
             use = channel.stream + channel.quantity in used
             if use:
                 used.discard(channel.stream + channel.quantity)
-            channels.append(replace(channel, use=use))
+            channels.append(self._of_pulses(replace(channel, use=use)))
         order = {name: place for place, name in enumerate(QUANTITIES)}
         channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
         return ChannelSet(tuple(channels), tuple(self.findings))

@@ -96,6 +96,7 @@ def _boot(gps: dict[str, Any]) -> tuple[float, list[LogFinding]]:
 
 
 def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airframe: int) -> Iterator[LogStream]:
+    ordered = any(name in ("actuator_motors", "actuator_servos") for name, _ in topics)
     for (name, instance), data in topics.items():
         time = data["timestamp"] * 1e-6 - boot
         label = name if instance == 0 and (name, 1) not in topics else f"{name}[{instance}]"
@@ -119,6 +120,10 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
             yield from _speeds(label, time, data)
         if name in ("actuator_motors", "actuator_servos"):
             yield from _orders(name, time, data, airframe)
+        if name == "actuator_outputs" and not ordered:  # logs of before PX4 1.13 have pulses alone
+            for key in sorted(key for key in data if key.startswith("output[")):
+                pulses = data[key].astype(float)
+                yield LogStream(f"{label}.{key}", time, np.where(pulses > 0, pulses, np.nan), "us")
 
 
 def _speeds(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
@@ -136,9 +141,9 @@ def _orders(name: str, time: Array, data: dict[str, Any], airframe: int) -> Iter
     quantities: tuple[str, ...] = ()
     if name == "actuator_servos":
         quantities = ("rudder_order",)
-    elif len(controls) == 1 or airframe != _AIRFRAME_ROVER_DIFFERENTIAL:
+    elif len(controls) == 1:
         quantities = ("rpm_order",)
-    elif len(controls) == 2:
+    elif len(controls) == 2 and airframe == _AIRFRAME_ROVER_DIFFERENTIAL:
         quantities = ("thrust_order_starboard", "thrust_order_port")
     for place, (key, values) in enumerate(controls.items()):
         quantity = quantities[place] if place < len(quantities) else ""

@@ -15,6 +15,7 @@ from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
 from tank2sim.logs.parts import joined_parts
+from tank2sim.logs.pulses import pulses_of
 from tank2sim.logs.quantities import QUANTITIES
 from tank2sim.logs.reference import HEADING_WINDOW_S, differenced, local_metres, rounded_origin
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
@@ -95,6 +96,7 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
             tidy, doubled, found_in_time = tidied(stream)
             repeated += doubled
             findings += found_in_time
+            tidy, _ = pulses_of(tidy)
             if len(tidy.values):
                 name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
                 streams.append(replace(tidy, name=name))
@@ -119,7 +121,8 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
             series[channel.quantity] = QuantitySeries(stream.time_s - channel.delay_s, channel.si(stream.values))
     if not series:
         problem = "no channel of it is understood"
-        raise InputError(logs[0].path, "", problem, "name its streams in a channels file (--channels)")
+        remedy = f"say which is what in a channels file (--channels), as docs/logs.md shows: {_listed(named)}"
+        raise InputError(logs[0].path, "", problem, remedy)
     findings += _to_confirm(found)
     series, origin = _derived(series)
     findings += _gap_findings(series)
@@ -188,9 +191,12 @@ def _shift(first: tuple[Array, Array], second: tuple[Array, Array]) -> float | N
     return float(lags[best]) if correlations[best] > AGREES else None
 
 
+def _listed(named: Mapping[str, LogStream]) -> str:
+    return f"streams are {', '.join(list(named)[:12])}{', ...' if len(named) > 12 else ''}"
+
+
 def _remedy(named: Mapping[str, LogStream]) -> str:
-    shown = ", ".join(list(named)[:12])
-    return f"streams are {shown}{', ...' if len(named) > 12 else ''}; correct the channels file, or delete it"
+    return f"{_listed(named)}; correct the channels file, or delete it"
 
 
 def _to_confirm(found: ChannelSet) -> list[LogFinding]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 
@@ -28,7 +29,9 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
     """A trial with the column ``n_<name>_rpm`` or ``order_<name>`` of each thruster, as ``tank2sim log`` cuts it; SI.
 
     An order is a share of the largest revolutions of the card, positive ahead, and becomes the signal
-    ``order_<name>_radps``; measured revolutions are ``n_<name>_radps``.
+    ``order_<name>_radps``; measured revolutions are ``n_<name>_radps``. A thruster that turns, an outboard, needs the
+    column ``azimuth_<name>_deg`` (clockwise from the bow); of a single one ``delta_deg`` or ``delta_order_deg`` and
+    ``n_rpm`` do, as ``tank2sim log`` cuts them.
 
     Parameters
     ----------
@@ -45,7 +48,8 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
     columns, time = table.columns, table.increasing("t_s")
     if len(time) < LEAST_CRAFT_ROWS:
         raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
-    driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps") for thruster in thrusters}
+    shaft = columns.get("n_radps") if len(thrusters) == 1 else None  # of one, its revolutions may be those of the log
+    driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps", shaft) for thruster in thrusters}
     orders = {f"order_{thruster.name}_radps": _ordered(path, thruster, columns) for thruster in thrusters}
     names = [name for name, values in driven.items() if not _known(values)]
     if all(_known(values) for values in orders.values()):
@@ -58,6 +62,7 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
             remedy += "psi_deg and of each thruster " + ", ".join(f"n_{thruster.name}_rpm" for thruster in thrusters)
             remedy += f" or its order, {', '.join(f'order_{thruster.name}' for thruster in thrusters)}"
             raise InputError(path, "header", f"lacks {re.sub('_rad$', '_deg', name.replace('_radps', '_rpm'))}", remedy)
+    driven |= _azimuths(path, thrusters, columns)
     signals = {name: values for name, values in (driven | orders).items() if values is not None and _known(values)}
     signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}
     known = np.isfinite(signals["psi_rad"])
@@ -66,7 +71,36 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
     return Trial(Path(path), time, signals | {"psi_rad": psi})
 
 
-def _known(values: Array | None) -> bool:
+def _azimuths(path: Path, thrusters: Sequence[ThrusterSection], columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Directions of the thrusters that turn: ``azimuth_<name>_rad``, or as ordered ``azimuth_order_<name>_rad``.
+
+    Of a single one the columns of a rudder do, positive where the craft turns to starboard.
+
+    Raises
+    ------
+    InputError
+        The direction of a thruster that turns is not there.
+    """
+    found = {}
+    turning = [thruster for thruster in thrusters if thruster.max_azimuth_rad is not None]
+    for thruster in turning:
+        name, side = thruster.name, 1.0 if thruster.x_m > 0 else -1.0
+        if _known(given := columns.get(f"azimuth_{name}_rad")):
+            found[f"azimuth_{name}_rad"] = given
+        elif len(turning) == 1 and _known(angle := columns.get("delta_rad")):
+            found[f"azimuth_{name}_rad"] = thruster.azimuth_rad + side * angle
+        elif len(turning) == 1 and _known(order := columns.get("delta_order_rad")):
+            found[f"azimuth_order_{name}_rad"] = thruster.azimuth_rad + side * order
+        else:
+            remedy = (
+                f"thruster {name} turns: give azimuth_{name}_deg, in which it pushes the craft, clockwise from the bow"
+            )
+            remedy += ", or delta_deg, positive to starboard" if len(turning) == 1 else ""
+            raise InputError(path, "header", f"lacks azimuth_{name}_deg", remedy)
+    return found
+
+
+def _known(values: Array | None) -> TypeGuard[Array]:
     return values is not None and bool(np.isfinite(values).any())
 
 

@@ -196,7 +196,7 @@ class OfFigures:
             p, troubles = ships_of(study.model, count, values)
             found: dict[str, Array] = {}
             for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in joint):
-                assert lanes is not None and manoeuvre is not None
+                assert lanes is not None and isinstance(manoeuvre, Turn | Zigzag)
                 runs = lanes.run(manoeuvre, p)
                 troubles = _with_runaways(troubles, runs.fine)
                 for figure in joint:

@@ -9,9 +9,14 @@ from dataclasses import dataclass
 
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
+from tank2sim.units import to_si
 
 STRAIGHT, STEADY, TURN, ZIGZAG = "straight course", "steady turn", "turning circle", "zigzag"
 """Origin of a figure: a linearised straight course, an equilibrium, or a simulated manoeuvre."""
+
+STRAIGHT_RUN, DIFFERENCE, SPIN = "straight run", "turn by difference", "spin"
+"""Origin of a figure of a craft with thrusters: a simulated manoeuvre."""
 
 FIGURE_OPTION = "--figure"
 
@@ -57,6 +62,35 @@ FIGURE_KINDS: dict[str, FigureKind] = {
 }
 """All kinds of figures by name."""
 
+_CRAFT_TURN = (
+    ("advance_m", "advance at 90 deg"),
+    ("transfer_m", "transfer at 90 deg"),
+    ("tactical_diameter_m", "tactical diameter at 180 deg"),
+    ("time_90_s", "time to 90 deg"),
+    ("time_180_s", "time to 180 deg"),
+    ("steady_diameter_m", "diameter of the steady turn, 2 U/|r|, after 540 deg"),
+    ("steady_rate_degps", "yaw rate of the steady turn, positive to starboard"),
+    ("steady_speed_mps", "speed in the steady turn"),
+)
+
+CRAFT_FIGURE_KINDS: dict[str, dict[str, FigureKind]] = {
+    word: {name: FigureKind(name, family, description) for name, description in described}
+    for word, family, described in (
+        ("straight", STRAIGHT_RUN, (("final_speed_mps", "speed of 30 lengths at the cruising speed from rest"),)),
+        ("difference", DIFFERENCE, _CRAFT_TURN),
+        (
+            "spin",
+            SPIN,
+            (
+                ("time_180_s", "time to 180 deg"),
+                ("time_360_s", "time to 360 deg"),
+                ("final_rate_degps", "yaw rate after 720 deg, positive to starboard"),
+            ),
+        ),
+    )
+}
+"""Manoeuvre of a craft with thrusters, by its word, to its figures by name."""
+
 ARGUMENTS = {
     STRAIGHT: ("", "no argument"),
     STEADY: ("@20", "the rudder in deg, positive to starboard"),
@@ -72,20 +106,32 @@ def forms() -> str:
     for family, (example, words) in ARGUMENTS.items():
         names = ", ".join(kind.name for kind in FIGURE_KINDS.values() if kind.family == family)
         parts.append(f"{family} ({words}{', as ' + example if example else ''}): {names}")
+    for word, kinds in CRAFT_FIGURE_KINDS.items():
+        parts.append(f"of a craft with thrusters @{word}:RPM: {', '.join(kinds)}")
     return "; ".join(parts)
+
+
+FigureManoeuvre = Turn | Zigzag | StraightRun | DifferenceTurn | Spin
+_BY_THRUSTERS: dict[str, type[StraightRun | DifferenceTurn | Spin]] = {
+    STRAIGHT_RUN: StraightRun,
+    DIFFERENCE: DifferenceTurn,
+    SPIN: Spin,
+}
 
 
 @dataclass(frozen=True)
 class InfluenceFigure:
-    """A figure of a ship: its kind, rudder (and heading) in rad, and the user's text."""
+    """A figure of a ship: its kind, rudder (and heading) in rad or revolutions in rad/s, and the user's text."""
 
     text: str
     kind: FigureKind
     angles: tuple[float, ...] = ()
 
     @property
-    def manoeuvre(self) -> Turn | Zigzag | None:
+    def manoeuvre(self) -> FigureManoeuvre | None:
         """The simulated manoeuvre: for a steady turn the turning circle to it; None on a straight course."""
+        if self.kind.family in _BY_THRUSTERS:
+            return _BY_THRUSTERS[self.kind.family](*self.angles)
         if self.kind.family == STRAIGHT:
             return None
         return Zigzag(*self.angles) if self.kind.family == ZIGZAG else Turn(*self.angles)
@@ -94,12 +140,16 @@ class InfluenceFigure:
 def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
     """Parse a figure of a command line: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
 
+    Of a craft with thrusters: ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, in rpm.
+
     Raises
     ------
     InputError
         The figure does not exist, or its argument is missing, not allowed or out of bounds.
     """
     name, at, argument = text.strip().partition("@")
+    if argument.partition(":")[0] in CRAFT_FIGURE_KINDS:
+        return _craft_figure(text.strip(), name, argument, option)
     kind = FIGURE_KINDS.get(name)
     if kind is None:
         close = difflib.get_close_matches(name, FIGURE_KINDS, n=1)
@@ -116,3 +166,19 @@ def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
         remedy = "the rudder lies between 0 and 90 deg to either side, the heading of a zigzag between 0 and 90 deg"
         raise InputError(option, text, "has an angle out of bounds", remedy)
     return InfluenceFigure(text.strip(), kind, tuple(math.radians(angle) for angle in angles))
+
+
+def _craft_figure(text: str, name: str, argument: str, option: str) -> InfluenceFigure:
+    word, _, number = argument.partition(":")
+    kinds = CRAFT_FIGURE_KINDS[word]
+    if name not in kinds:
+        close = difflib.get_close_matches(name, kinds, n=1)
+        remedy = f"did you mean {close[0]}?" if close else f"there are: {', '.join(kinds)}"
+        raise InputError(option, text, f"is not a figure of {word}", remedy)
+    try:
+        rpm = float(number)
+    except ValueError:
+        rpm = 0.0
+    if not rpm or not math.isfinite(rpm):
+        raise InputError(option, text, "cannot be read", f"give revolutions in rpm, as {name}@{word}:400")
+    return InfluenceFigure(text, kinds[name], (to_si("n_rpm", rpm)[1],))

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from tank2sim.analysis.influence.figures import FigureManoeuvre
 from tank2sim.arrays import Array
 from tank2sim.dynamics.event_indicators import kinks
 from tank2sim.dynamics.model import Model
@@ -29,6 +30,7 @@ from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 
 Sloped = tuple[float, Array]
@@ -60,7 +62,7 @@ class Event:
 
 
 class MotionSlopes:
-    """Slopes of the figures of turning circles and zigzags.
+    """Slopes of the figures of turning circles, zigzags and manoeuvres by thrusters.
 
     Parameters
     ----------
@@ -83,12 +85,14 @@ class MotionSlopes:
         self._kinks = RowFunction(ca.Function("indicators", arguments, [ca.densify(ca.vcat(found))])) if found else None
 
     def figures(
-        self, run: Trajectory, manoeuvre: Turn | Zigzag, p: Array, length: float, names: Collection[str]
+        self, run: Trajectory, manoeuvre: FigureManoeuvre, p: Array, length: float, names: Collection[str]
     ) -> dict[str, Sloped]:
         """Figures by their names in :mod:`tank2sim.analysis.influence.figures`, as far as the run shows them.
 
         The run is not evaluated after the last event of the figures in `names`.
         """
+        if isinstance(manoeuvre, StraightRun | DifferenceTurn | Spin):
+            return self._by_thrusters(run, manoeuvre, p, length, names)
         side = math.copysign(1.0, manoeuvre.rudder)
         axes = _Axes(run.x[0], self.model, side, length)
         if isinstance(manoeuvre, Turn):
@@ -108,6 +112,51 @@ class MotionSlopes:
             else:
                 found |= {"tactical_diameter_m": axes.aside(event), "time_180_s": (event.time, event.time_by)}
                 found |= {"tactical_diameter_lengths": axes.over_length(found["tactical_diameter_m"])}
+        return found
+
+    def _by_thrusters(
+        self,
+        run: Trajectory,
+        manoeuvre: StraightRun | DifferenceTurn | Spin,
+        p: Array,
+        length: float,
+        names: Collection[str],
+    ) -> dict[str, Sloped]:
+        places = [self.model.state_names.index(f"motion.{letter}") for letter in "uvr"]
+        if isinstance(manoeuvre, StraightRun):
+            end = len(run.t) - 1
+            slopes = self._forward(_Course(run.t, run.x, run.u), {end: None}, p)[end]
+            return {"final_speed_mps": (float(run.x[end][places[0]]), slopes[places[0]])}
+        turning = isinstance(manoeuvre, DifferenceTurn)
+        order = manoeuvre.difference if isinstance(manoeuvre, DifferenceTurn) else manoeuvre.revolutions
+        side = math.copysign(1.0, order)
+        axes = _Axes(run.x[0], self.model, side, length)
+        changes = [math.pi / 2, math.pi] if turning else [math.pi, 2 * math.pi]
+        found: dict[str, Sloped] = {}
+        if any(name in ("advance_m", "transfer_m", "tactical_diameter_m") or name.startswith("time") for name in names):
+            if turning:
+                found |= self._turn(run, axes, p, changes)
+            else:
+                crossings = [
+                    run.crossings("motion.psi", "motion.r", axes.heading + side * change) for change in changes
+                ]
+                events = self.events(run, [("motion.psi", float(times[0])) for times in crossings if len(times)], p)
+                shown = zip(("time_180_s", "time_360_s"), events, strict=False)
+                found |= {name: (event.time, event.time_by) for name, event in shown}
+        if any(name.startswith(("steady", "final")) for name in names):
+            (last,) = self.events(run, [("motion.psi", float(run.t[-1]))], p)
+            u, v, r = last.x[places]
+            u_by, v_by, r_by = last.x_by[places]
+            speed = math.hypot(u, v)
+            speed_by = (u * u_by + v * v_by) / speed
+            rate = math.degrees(r), np.degrees(r_by)
+            diameter = 2 * speed / abs(r)
+            found |= {
+                "steady_diameter_m": (diameter, diameter * (speed_by / speed - r_by / r)),
+                "steady_rate_degps": rate,
+                "steady_speed_mps": (speed, speed_by),
+                "final_rate_degps": rate,
+            }
         return found
 
     def _zigzag(self, run: Trajectory, zigzag: Zigzag, axes: _Axes, p: Array, overshoots: int) -> dict[str, Sloped]:

@@ -15,10 +15,10 @@ from tank2sim.analysis.influence.equilibria import (
     turn_figures,
     turning_states,
 )
-from tank2sim.analysis.influence.figures import FIGURE_OPTION, STEADY, STRAIGHT, InfluenceFigure
+from tank2sim.analysis.influence.figures import FIGURE_OPTION, STEADY, STRAIGHT, FigureManoeuvre, InfluenceFigure
 from tank2sim.analysis.influence.motion import HALF_TURN, MotionSlopes, overshoots_in
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import Figures
@@ -44,8 +44,8 @@ class Study:
 
     Parameters
     ----------
-    card : ManoeuvringCard
-        The ship.
+    card : SteeredCard
+        The ship, or craft.
     figures : sequence of InfluenceFigure
         Figures to compute.
 
@@ -55,7 +55,7 @@ class Study:
         The card has an error, or its ship does not show one of the figures.
     """
 
-    def __init__(self, card: ManoeuvringCard, figures: Sequence[InfluenceFigure]):
+    def __init__(self, card: SteeredCard, figures: Sequence[InfluenceFigure]):
         self.card, self.figures = card, tuple(figures)
         self.model = study_model(card)
         self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
@@ -65,7 +65,7 @@ class Study:
         self._length, self._speed = card_values["ship.length"], card_values["ship.speed"]
         self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
         self._equilibria: dict[float, Array] = {}
-        self._long_enough: dict[Turn | Zigzag, float] = {}
+        self._long_enough: dict[FigureManoeuvre, float] = {}
         self._notices: dict[str, None] = dict.fromkeys(self.model.notices)
         self._known = False  # whether the figures of the card itself have been found: others say nothing of it
         self.base: Array = self.figures_at(self.values)
@@ -119,6 +119,9 @@ class Study:
         """All figures of the same evaluation as this one, on request with their slopes."""
         p = self.model.parameter_values()
         p[self._places] = values
+        if figure.kind.family in (STRAIGHT, STEADY) and "rudder.command" not in self.model:
+            remedy = "give one of its thrusters, as steady_diameter_m@difference:200"
+            raise InputError(FIGURE_OPTION, figure.text, "is of a rudder, and the craft has none", remedy)
         if figure.kind.family == STRAIGHT:
             return self._linear(p, sloped)
         manoeuvre = figure.manoeuvre
@@ -172,7 +175,7 @@ class Study:
             raise InputError(FIGURE_OPTION, text, problem, "take that effect off the card, or ask for advance_m@35")
         return found[0]
 
-    def _simulated(self, manoeuvre: Turn | Zigzag, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+    def _simulated(self, manoeuvre: FigureManoeuvre, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
         names = {
             figure.kind.name
             for figure in self.figures
@@ -183,19 +186,19 @@ class Study:
         if manoeuvre in self._long_enough and not names <= set(found):
             run = self._run(manoeuvre, p)
             found = named_figures(run.figures)
-        if manoeuvre not in self._long_enough and names <= set(found):
+        of_rudder = isinstance(manoeuvre, Turn | Zigzag)  # a manoeuvre by thrusters ends with its last figure
+        if of_rudder and manoeuvre not in self._long_enough and names <= set(found):
             self._long_enough[manoeuvre] = SPARE * last_event(run.figures, names)
         if sloped:
             return dict(self._motion.figures(run.trajectory, manoeuvre, p, self._length, names))
         return {name: (value, None) for name, value in found.items()}
 
-    def _run(self, manoeuvre: Turn | Zigzag, p: Array, duration_s: float | None = None) -> Run:
+    def _run(self, manoeuvre: FigureManoeuvre, p: Array, duration_s: float | None = None) -> Run:
         values = dict(zip(self.model.parameter_names, p.tolist(), strict=True))
         model, integrator = self.model, self._integrator
         run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)
         if not self._known:
-            angles = [manoeuvre.rudder, *([manoeuvre.heading] if isinstance(manoeuvre, Zigzag) else [])]
-            words = f"{type(manoeuvre).__name__.lower()} {'/'.join(f'{math.degrees(angle):.4g}' for angle in angles)}"
+            words = manoeuvre.words
             marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
             self._notices |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
         return run

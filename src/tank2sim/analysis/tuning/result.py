@@ -11,7 +11,7 @@ import tomlkit
 
 from tank2sim.analysis.tuning.targets import Target
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter
 from tank2sim.errors import InputError
@@ -149,7 +149,7 @@ _DIGITS = 10
 """Significant digits of a tuned number: rounding does not change a printed figure."""
 
 
-def tuned_text(card: ManoeuvringCard, tuned: Tuned) -> str:
+def tuned_text(card: SteeredCard, tuned: Tuned) -> str:
     """Text of a card with the moves made: each changed key has its old value as a comment."""
     targets = ", ".join(target.text for target in tuned.targets)
     how = f"tuned by tank2sim influence to {targets}"
@@ -165,14 +165,14 @@ def tuned_text(card: ManoeuvringCard, tuned: Tuned) -> str:
     return mark + head + text.removeprefix(mark)
 
 
-def _comment(card: ManoeuvringCard, move: Move) -> str:
+def _comment(card: SteeredCard, move: Move) -> str:
     old = _found(card, move.parameter.key)
     moved = move.in_standard_errors
     far = "" if moved is None else f", moved {moved:+.2f} standard errors"
     return f"not stated before tuning{far}" if old is None else f"was {old.as_string()} before tuning{far}"
 
 
-def _found(card: ManoeuvringCard, key: str) -> Any:
+def _found(card: SteeredCard, key: str) -> Any:
     """Value at a dotted key of the card's text; None if absent."""
     content: Any = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
     for part in key.split("."):
@@ -185,7 +185,7 @@ def _found(card: ManoeuvringCard, key: str) -> Any:
     return content
 
 
-def _takes_comment(card: ManoeuvringCard, key: str) -> bool:
+def _takes_comment(card: SteeredCard, key: str) -> bool:
     """False in ``effects = [{...}]``: TOML has no comment within braces."""
     entries = _found(card, "effects")
     return not key.startswith("effects.") or isinstance(entries, tomlkit.items.AoT)

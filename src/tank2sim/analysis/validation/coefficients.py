@@ -21,12 +21,13 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.cards.card import CraftCard, ManoeuvringCard, MmgCard, SteeredCard
 from tank2sim.cards.scaling import file_factor
+from tank2sim.cards.small_craft import CRAFT_TERMS
 from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, polynomial
-from tank2sim.dynamics.card_parameters import card_parameters
+from tank2sim.dynamics.card_parameters import CardParameter, card_parameters
 from tank2sim.dynamics.mmg.equivalent import linear_form
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
@@ -106,7 +107,7 @@ class Expansion:
 
 
 def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[str, ...]]:
-    """All coefficients of the cards (the first is the reference), with notes on conversions.
+    """All coefficients of the cards of ships (the first is the reference), with notes on conversions.
 
     Between an MMG card and a polynomial the linear terms are compared: those of the straight course with propeller and
     rudder, the mean of both sides of the flow to the rudder.
@@ -138,6 +139,23 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
             "both sides of gamma_R; their standard errors are not known"
         )
     return tuple(rows), tuple(notes)
+
+
+def compare_craft(cards: Sequence[CraftCard]) -> tuple[CoefficientRow, ...]:
+    """Rigid body and hull of craft of one size (the first is the reference), SI."""
+    rows = {name: [CardCoefficient(getattr(card.rigid_body, name)) for card in cards] for name in _RIGID_BODY}
+    for name in CRAFT_TERMS:
+        if any(card.derivatives.get(name) for card in cards):
+            rows[name] = [
+                CardCoefficient(card.derivatives[name], card.standard_error(name), name in card.uncertainty)
+                if name in card.derivatives
+                else CardCoefficient(None)
+                for card in cards
+            ]
+    return tuple(
+        CoefficientRow(name, tuple(found), tuple(_difference(found[0], other) for other in found[1:]))
+        for name, found in rows.items()
+    )
 
 
 def _without_errors(found: Expansion) -> Expansion:
@@ -174,7 +192,7 @@ def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
     return Difference(apart / both, percent)
 
 
-def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
+def compare_effects(cards: Sequence[SteeredCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
     """All parameters of effects of the cards, in SI, in the units of their models; `models` are those of the cards.
 
     Values with a unit (a wind speed, a time) are compared only between ships of the same size.
@@ -195,13 +213,19 @@ def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -
     return tuple(rows)
 
 
-def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficient]:
-    """Parameters of effects, and of the propeller and rudder of an MMG card."""
+def _of_effects(card: SteeredCard, model: Model) -> dict[str, CardCoefficient]:
+    """Parameters of effects, of the propeller and rudder of an MMG card, and of thrusters."""
     return {
-        parameter.name: CardCoefficient(parameter.value, parameter.standard_error, not parameter.assumed)
+        parameter.name: CardCoefficient(parameter.value, _error_of(parameter), not parameter.assumed)
         for parameter in card_parameters(card, model)
-        if parameter.key.startswith("effects.") or parameter.name.startswith("mmg.")
+        if parameter.key.startswith("effects.") or parameter.name.startswith(("mmg.", "thrusters."))
     }
+
+
+def _error_of(parameter: CardParameter) -> float | None:
+    """Standard error; None of the place of a thruster, which is not uncertain and does not agree by chance."""
+    exact = parameter.name.startswith("thrusters.") and not parameter.standard_error
+    return None if exact else parameter.standard_error
 
 
 def _same(first: float, second: float) -> bool:

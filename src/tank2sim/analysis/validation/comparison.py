@@ -14,6 +14,7 @@ from tank2sim.analysis.validation.coefficients import (
     SAME,
     CoefficientRow,
     compare_coefficients,
+    compare_craft,
     compare_effects,
 )
 from tank2sim.analysis.validation.standard_trials import (
@@ -26,7 +27,7 @@ from tank2sim.analysis.validation.standard_trials import (
     standard_trials,
 )
 from tank2sim.arrays import Array
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, SteeredCard
 from tank2sim.errors import InputError
 from tank2sim.marks import ASSUMED, EXTRAPOLATED
 from tank2sim.simulation.card_range import Numbers
@@ -98,7 +99,7 @@ class CardComparison:
     labels, ships, sources : tuple of str
         Label of each card, its ship, and the source of its numbers.
     coefficients, effects : tuple of CoefficientRow
-        Coefficients in the reference's convention, and parameters of the effects, SI.
+        Coefficients in the reference's convention (of craft SI), and parameters of the effects and thrusters, SI.
     trials : tuple
     members : int
         Size of the ensembles behind the deviations of the figures.
@@ -190,12 +191,12 @@ class CardComparison:
         }
 
 
-def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> CardComparison:
+def compare_cards(cards: Sequence[SteeredCard], count: int = MEMBERS) -> CardComparison:
     """Compare cards of a ship, or of ships and models of the same form, at the size of the first, the reference.
 
     Parameters
     ----------
-    cards : sequence of ManoeuvringCard
+    cards : sequence of SteeredCard
         Two or more.
     count : int
         Members of the ensemble behind each figure's deviation; 0 for none.
@@ -203,13 +204,17 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
     Raises
     ------
     InputError
-        There is only one card.
+        There is only one card, ships and craft are mixed, or craft are not of one size.
     """
     if len(cards) < 2:
         raise InputError("CARD", "", "is one alone", "give two cards or more; the first is the reference")
+    craft = _craft_of(cards)
     labels = labels_of(cards)
     ships = [ship_of(card) for card in cards]
-    rows, notes = compare_coefficients(cards)
+    if craft:
+        rows, notes = compare_craft(craft), tuple[str, ...]()
+    else:
+        rows, notes = compare_coefficients([card for card in cards if isinstance(card, ManoeuvringCard)])
     drawn = [members(ship.card, ship.model, count) for ship in ships]
     messages = [f"{label}: {message}" for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
     notices, trials = [*_notices(cards, labels), *messages, *notes], []
@@ -224,8 +229,33 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
     return CardComparison(labels, names, sources, rows, effects, tuple(trials), count, unique)
 
 
-def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
-    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates."""
+def _craft_of(cards: Sequence[SteeredCard]) -> list[CraftCard]:
+    """The cards, if they are of craft of one size; none of ships.
+
+    Raises
+    ------
+    InputError
+        Ships and craft are mixed, or craft are not of one size.
+    """
+    craft = [card for card in cards if isinstance(card, CraftCard)]
+    for card in cards if craft else ():
+        if isinstance(card, ManoeuvringCard):
+            remedy = "compare craft with craft, and ships with ships"
+            raise InputError(card.source, "model.kind", "is of a ship with a rudder, and another card is not", remedy)
+        length, reference = card.ship.length_m, craft[0].ship.length_m
+        if not math.isclose(length, reference, rel_tol=SAME_SIZE):
+            problem = f"is {length:g} m, and that of {craft[0].source} {reference:g} m"
+            raise InputError(card.source, "ship.length_m", problem, "compare cards of one craft")
+    return craft
+
+
+def labels_of(cards: Sequence[SteeredCard]) -> tuple[str, ...]:
+    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates.
+
+    Parameters
+    ----------
+    cards : sequence of SteeredCard
+    """
     stems = []
     for card in cards:
         path = Path(card.source)
@@ -234,8 +264,15 @@ def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
     return tuple(f"{stem} ({place + 1})" if stem in doubled else stem for place, stem in enumerate(stems))
 
 
-def differences_of_size(first: ManoeuvringCard, second: ManoeuvringCard, scale: float = 1.0) -> list[str]:
-    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more; `scale` is that of `first`."""
+def differences_of_size(first: SteeredCard, second: SteeredCard, scale: float = 1.0) -> list[str]:
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more; `scale` is that of `first`.
+
+    Parameters
+    ----------
+    first, second : SteeredCard
+    scale : float
+        Factor on the sizes of `first`.
+    """
     found = []
     for what, size, reference in (
         ("length", first.ship.length_m, second.ship.length_m),
@@ -266,7 +303,7 @@ def _trial(
     tracks, messages = [], []
     for ship, label, draws in zip(ships, labels, drawn, strict=True):
         ratio = reference.ship.length_m / ship.card.ship.length_m
-        start = {"initial.u": _approach(reference, ship.card)}
+        start = _start(reference, ship.card)
         run = ship.run(manoeuvre, start)
         if isinstance(run, str):
             messages.append(f"{label}: {name}: {run}")
@@ -301,10 +338,13 @@ def _numbers(run: Run | str) -> Numbers:
     return {} if isinstance(run, str) else figure_numbers(run.figures)
 
 
-def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:
-    """The reference's speed at the size of the card's ship, m/s; the card's if both are equal except for rounding."""
+def _start(reference: SteeredCard, card: SteeredCard) -> dict[str, float]:
+    """Start at the reference's speed at the size of the card's ship, m/s; at the card's own if both are equal except
+    for rounding. A craft starts at its own cruising speed or at rest."""
+    if isinstance(card, CraftCard):
+        return {}
     speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
-    return card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed
+    return {"initial.u": card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed}
 
 
 def _scaled(figures: Numbers, ratio: float) -> Numbers:
@@ -317,7 +357,7 @@ def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
     return CardTrack(label, np.sqrt(ratio) * run.t, ratio * x, ratio * y)
 
 
-def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[str]:
+def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[str]:
     messages = []
     reference = cards[0]
     for card, label in zip(cards, labels, strict=True):
@@ -336,7 +376,7 @@ def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[st
             messages.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):
             messages.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
-        speed = _approach(reference, card)
+        speed = _start(reference, card).get("initial.u", card.model.speed_mps)
         if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
             messages.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
         if _effects(card) != _effects(reference):
@@ -344,10 +384,11 @@ def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[st
             messages.append(
                 f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them"
             )
-        if (card.propulsion is None) != (reference.propulsion is None):
+        engines = [ship.propulsion is None for ship in (card, reference) if isinstance(ship, ManoeuvringCard)]
+        if len(set(engines)) > 1:
             messages.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
     return messages
 
 
-def _effects(card: ManoeuvringCard) -> list[str]:
+def _effects(card: SteeredCard) -> list[str]:
     return sorted(effect.name for effect in card.effects)

@@ -10,7 +10,8 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import CraftCard, ManoeuvringCard, SteeredCard
+from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import undisturbed_inputs
@@ -22,6 +23,8 @@ from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun, ThrusterManoeuvre
+from tank2sim.units import from_si, to_si
 
 MEMBERS = 40
 """Members of an ensemble: their deviation has an uncertainty of about 15 %. Project choice."""
@@ -35,6 +38,9 @@ LEAST_SHARE = 0.9
 _OVERSHOOTS = 2
 """Number of evaluated overshoots: those of IMO MSC.137(76)."""
 
+CRAFT_SHARE = 0.5
+"""Difference and revolutions of the turns of a craft over the largest. Project choice: the middle of what it does."""
+
 _SIGMA_QUANTILES = (0.158655, 0.841345)
 
 
@@ -44,14 +50,20 @@ class TrialShip:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     model : Model
     integrator : Integrator
     """
 
-    card: ManoeuvringCard
+    card: SteeredCard
     model: Model
     integrator: Integrator
+
+    @property
+    def manoeuvring(self) -> ManoeuvringCard:
+        """The card of a ship with a rudder."""
+        assert isinstance(self.card, ManoeuvringCard)
+        return self.card
 
     @property
     def has_engine(self) -> bool:
@@ -61,7 +73,7 @@ class TrialShip:
     @property
     def largest_rudder(self) -> float:
         """Rudder of the turning circles, rad: 35 deg, or the largest of the gear."""
-        gear = self.card.steering_gear
+        gear = self.manoeuvring.steering_gear
         return min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER)
 
     def run(
@@ -92,14 +104,20 @@ class TrialShip:
             return f"{error.place}: {error.problem}" if error.place else error.problem
 
 
-def ship_of(card: ManoeuvringCard) -> TrialShip:
+def ship_of(card: SteeredCard) -> TrialShip:
     """A card ready to run."""
     model = build(card)
     return TrialShip(card, model, Integrator(model))
 
 
 def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
-    """Name to trial: turns at the largest rudder, zigzags 10/10 and 20/20, and the stop if all have an engine."""
+    """Name to trial: turns at the largest rudder, zigzags 10/10 and 20/20, and the stop if all have an engine.
+
+    Of craft with thrusters :func:`craft_trials`.
+    """
+    craft = [ship.card for ship in ships if isinstance(ship.card, CraftCard)]
+    if craft:
+        return dict(craft_trials(craft))
     rudder = min(ship.largest_rudder for ship in ships)
     shown = f"{math.degrees(rudder):.3g}"
     ten, twenty = math.radians(10.0), math.radians(20.0)
@@ -114,6 +132,40 @@ def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
     return trials
 
 
+def craft_trials(cards: Sequence[CraftCard]) -> dict[str, ThrusterManoeuvre]:
+    """Name to trial of craft: full ahead from rest, turns by :data:`CRAFT_SHARE` of the largest difference, a spin.
+
+    The revolutions are those that all craft reach, in tens of rpm. A craft without thrusters at both sides has the
+    straight run alone.
+
+    Parameters
+    ----------
+    cards : sequence of CraftCard
+    """
+    ahead = [
+        [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
+        for card in cards
+    ]
+    full = min(thruster.max_radps for thrusters in ahead for thruster in thrusters)
+    astern = min(-thruster.lowest_radps for thrusters in ahead for thruster in thrusters)
+    rooms = [min(full - cruising, cruising + astern) for cruising in map(cruising_revolutions, cards)]
+    difference, spin = CRAFT_SHARE * 2 * min(rooms), CRAFT_SHARE * min(full, astern)
+    trials: dict[str, ThrusterManoeuvre] = {"straight": StraightRun(_tens(full))}
+    if all({1.0, -1.0} <= {math.copysign(1, one.y_m) for one in thrusters if one.y_m} for thrusters in ahead):
+        trials |= {
+            "difference to starboard": DifferenceTurn(_tens(difference)),
+            "difference to port": DifferenceTurn(-_tens(difference)),
+            "spin to starboard": Spin(_tens(spin)),
+        }
+    return {f"{name} ({trial.words})": trial for name, trial in trials.items()}
+
+
+def _tens(revolutions: float) -> float:
+    """Revolutions (rad/s) rounded down to tens of rpm, if there are as many."""
+    rpm = from_si("n_rpm", revolutions)
+    return to_si("n_rpm", 10 * math.floor(rpm / 10))[1] if rpm >= 10 else revolutions
+
+
 def figure_numbers(figures: Figures) -> Numbers:
     """The figures of a run that are single numbers, with the first overshoots, without missing ones."""
     overshoots = {entry_name("overshoots_deg", place) for place in range(_OVERSHOOTS)}
@@ -123,7 +175,7 @@ def figure_numbers(figures: Figures) -> Numbers:
 
 
 def members(
-    card: ManoeuvringCard, model: Model, count: int, seed: int = SEED
+    card: SteeredCard, model: Model, count: int, seed: int = SEED
 ) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
     """Parameters of `count` ships drawn within the errors of the card, with notices.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
-from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, kalman
+from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, kalman
 from tank2sim.identification.trials.methods.kalman_gains import smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import Levels
 from tank2sim.identification.trials.methods.kalman_search import SearchPoint, SearchTask, normal, task_of
@@ -125,7 +125,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """
     settings = KalmanSettings(drifting=True, scale_prior=False)
     first = _first_estimate(problem, settings, progress)
-    problem = with_disturbances(problem, *_disturbances_of(problem, first))
+    problem = with_disturbances(problem, *_disturbances_of(problem, first.smoothed))
     estimate = kalman(problem, first.values, settings, progress)
     levels = levels_of(problem, estimate)
     by_run = np.stack([information(problem.with_runs((run,)), estimate.values, levels) for run in problem.runs])
@@ -153,11 +153,11 @@ def _first_estimate(problem: Problem, settings: KalmanSettings, progress: Search
     raise np.linalg.LinAlgError("the covariance of the filter is not a number")
 
 
-def _disturbances_of(problem: Problem, estimate: KalmanEstimate) -> tuple[Array, Array]:
+def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array, Array]:
     """Mean and spread (5,) of the disturbances over the trials; the spread is within what is known without them."""
     places = [problem.model.state_names.index(name) for name in DISTURBANCES]
     wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
-    found = np.stack([smoothed.states[0, places] for smoothed in estimate.smoothed])
+    found = np.stack([smoothed.states[0, places] for smoothed in runs])
     if len(found) < FEWEST_TRIALS:
         return np.zeros(len(wide)), wide
     return found.mean(axis=0), np.clip(found.std(axis=0, ddof=1), LEAST_SPREAD * wide, wide)
@@ -200,12 +200,15 @@ class FreePrediction:
         Instants predicted.
     predicted, smoothed : array (m, 3)
         u, v (m/s through the water) and r (rad/s).
+    ends : array (p, 3)
+        Error of x, y (m) and psi (rad) at the end of each prediction: predicted less measured, nan if not measured.
     """
 
     run: SampledRun
     rows: Sequence[int]
     predicted: Array
     smoothed: Array
+    ends: Array
 
 
 def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePrediction]:
@@ -226,11 +229,13 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     tangents = filtered.tangents
     states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
     motion = [names.index(f"motion.{letter}") for letter in "uvr"]
+    pose = ("motion.x", "motion.y", "motion.psi")
+    placed, measured = [names.index(name) for name in pose], [problem.seen.index(name) for name in pose]
     sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
     p = problem.parameters(fit.estimate.values)
     found = []
     for number, run in enumerate(runs):
-        rows, predicted = [], []
+        rows, predicted, ends = [], [], []
         count, length = len(run.measured), round(PREDICTED_S / run.step_s)
         begin = round(PREDICTION_LEAD_S / run.step_s)
         while count - begin >= SHORTEST_PREDICTION_S / run.step_s:
@@ -238,10 +243,37 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
             free = sensitivity.motion(filtered.after[number, begin, :nx], run.inputs[begin : end - 1], p, run.step_s)
             rows.append(np.arange(begin + 1, end))
             predicted.append(free[1:, motion])
+            ends.append(free[-1, placed] - run.measured[end - 1, measured])
             begin = end
         if rows:
             at = np.concatenate(rows)
-            found.append(FreePrediction(run, at.tolist(), np.concatenate(predicted), states[number, at][:, motion]))
+            motions = np.concatenate(predicted), states[number, at][:, motion]
+            found.append(FreePrediction(run, at.tolist(), *motions, np.array(ends)))
+    return found
+
+
+def predict_by_card(problem: Problem) -> list[FreePrediction]:
+    """Predictions of each run as :func:`predict_free`, by the numbers of the card; noise levels are those of the runs.
+
+    Current and wind of a run are known beforehand by those of the other runs, if there are enough of them.
+
+    Parameters
+    ----------
+    problem : Problem
+        By :func:`.craft_problem`.
+    """
+    # The filter estimates something: one number of the card, within a millionth.
+    first, error = problem.prior_mean[:1], 1e-6 * (np.abs(problem.prior_mean[:1]) + 1e-6)
+    held = replace(problem, free=problem.free[:1], prior_mean=first, prior_error=error)
+    estimate = kalman(held, first, KalmanSettings(drifting=True, scale_prior=False))
+    levels = levels_of(held, estimate)
+    found = []
+    for number, run in enumerate(problem.runs):
+        smoothed = (*estimate.smoothed[:number], *estimate.smoothed[number + 1 :])
+        alone = held.with_runs((run,))
+        if smoothed:
+            alone = with_disturbances(alone, *_disturbances_of(held, smoothed))
+        found += predict_free(CraftFit(alone, estimate, levels, np.zeros((1, 1, 1))), [run])
     return found
 
 

@@ -73,7 +73,7 @@ OBSERVED_STEP_S = 0.2
 (project choice)."""
 
 
-def craft_fit_model(card: CraftCard, driven_by: str = "revolutions") -> Model:
+def craft_fit_model(card: CraftCard, driven_by: str = "revolutions", *, turned: bool = False) -> Model:
     """The model of a card driven by measured or ordered revolutions, with disturbances as constant states.
 
     Parameters
@@ -82,6 +82,8 @@ def craft_fit_model(card: CraftCard, driven_by: str = "revolutions") -> Model:
     driven_by : str
         ``revolutions``: lag and dead band of the card are left out, for both lie before the revolutions; ``orders``:
         they are in, except a lag shorter than a step.
+    turned : bool
+        The directions of thrusters that turn were measured: their lag is left out.
     """
     thrusters = tuple(
         thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0})
@@ -89,6 +91,8 @@ def craft_fit_model(card: CraftCard, driven_by: str = "revolutions") -> Model:
         else thruster.model_copy(update={"time_constant_s": _felt(thruster.time_constant_s)})
         for thruster in card.thrusters
     )
+    if turned:
+        thrusters = tuple(thruster.model_copy(update={"azimuth_time_constant_s": None}) for thruster in thrusters)
     model = build(replace(card, thrusters=thrusters))
     # Added masses are symmetric in theory (Fossen 2021, 6.3).
     if card.derivatives.get("Yrdot", 0.0) == card.derivatives.get("Nvdot", 0.0):
@@ -205,7 +209,8 @@ def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
         A trial is too short, or some trials have revolutions and others orders alone.
     """
     by = craft_driven_by(card, trials)
-    model = _unbounded(craft_fit_model(card, by))
+    turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
+    model = _unbounded(craft_fit_model(card, by, turned=turned))
     unused = "order_" if by == "revolutions" else "n_"
     trials = [
         replace(trial, signals={key: values for key, values in trial.signals.items() if not key.startswith(unused)})

@@ -101,6 +101,12 @@ RESULT_TYPES = (
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
     ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),
     ResultType("Validation", "validate", ("verification", "counts", "figures"), ("verdict",)),
+    ResultType(
+        "Validation of a craft",
+        "validate",
+        ("determination", "end_distance_m", "trials"),
+        ("determination.u", "determination.v", "determination.r"),
+    ),
     ResultType("Bridge", "poster pilotcard", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
     ResultType("Ship to steer", "steer", ("ship", "steerable"), ("steerable",)),
     ResultType("Signals", "signals", ("trials", "spectra"), ()),

@@ -110,7 +110,9 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
         raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
     inputs = np.tile(model.input_values(), (count, 1))
     for name, values in _input_signals(model, trial).items():
-        held = (name == "rudder.command" and "delta_rad" not in trial.signals) or _ordered_signal(name) in trial.signals
+        held = (name == "rudder.command" and "delta_rad" not in trial.signals) or any(
+            signal in trial.signals for signal in (_ordered_signal(name), _ordered_azimuth(name))
+        )
         inputs[:, model.input_names.index(name)] = _means(trial.time_s, values, grid, step, held=held)
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
     measured = np.full((count, len(seen)), np.nan)
@@ -164,7 +166,8 @@ def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
         given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
     for name in model.input_names:  # revolutions of a craft's thrusters, as measured, else as ordered
         ordered = _ordered_signal(name)
-        for signal in (ordered, ordered.replace("order_", "n_", 1)):
+        azimuth = _ordered_azimuth(name)
+        for signal in (ordered, ordered.replace("order_", "n_", 1), azimuth, azimuth.replace("order_", "", 1)):
             if signal in trial.signals:
                 given[name] = trial.signals[signal]
     return {
@@ -177,6 +180,11 @@ def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
 def _ordered_signal(name: str) -> str:
     """Signal of a trial with the ordered revolutions of an input ``thrusters.<name>.command``; of other inputs none."""
     return f"order_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
+
+
+def _ordered_azimuth(name: str) -> str:
+    """Signal of a trial with the order of an input ``thrusters.<name>.azimuth_command``; of other inputs none."""
+    return f"azimuth_order_{name.removeprefix('thrusters.').removesuffix('.azimuth_command')}_rad"
 
 
 def _continuous(direction: Array) -> Array:

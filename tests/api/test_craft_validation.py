@@ -1,0 +1,55 @@
+"""A craft's card validated by trials: right cards predict, wrong ones do not, and what cannot be is said."""
+
+from __future__ import annotations
+
+import craft_log
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.errors import InputError
+from tests.craft_trials import written
+
+
+class _Exact:
+    """In place of a random number generator: the card is not off."""
+
+    def normal(self) -> float:
+        return 0.0
+
+
+@pytest.fixture(scope="module")
+def truth() -> dict[str, float]:
+    return craft_log.random_craft(np.random.default_rng(7))
+
+
+@pytest.fixture(scope="module")
+def ship(truth) -> t2s.Ship:
+    loss = {f"thrusters.{number}.speed_loss_kg": truth["loss"] for number in (0, 1)}
+    terms = {f"derivatives.{name}": truth[name] for name in ("Yrdot", "Yr", "Nv", "Nrabsu")}
+    terms["derivatives.Nvdot"] = truth["Yrdot"]
+    return craft_log.first_card(truth, _Exact()).replace({**terms, **loss})
+
+
+@pytest.mark.slow
+def test_the_true_card_predicts_and_one_of_half_the_thrust_does_not(truth, ship, tmp_path) -> None:
+    paths = written(tmp_path, truth, ["zigzag"])
+    right = t2s.validate(ship, paths)
+    assert min(right.determination.values()) > 0.97
+    content = right.content()
+    # 1 cm and 0.1 deg of noise, in the state from which the prediction begins, too
+    assert content["end_distance_m"] < 1.0 and content["end_heading_deg"] < 3.0
+    half = {f"thrusters.{number}.ahead_Ns2": 0.5 * truth["ahead"] for number in (0, 1)}
+    wrong = t2s.validate(ship.replace(half), paths)
+    assert wrong.content()["end_distance_m"] > 3 * content["end_distance_m"]
+    assert wrong.determination["u"] < right.determination["u"] - 0.1
+
+
+def test_a_trial_that_is_too_short_is_said(truth, ship, tmp_path) -> None:
+    with pytest.raises(InputError, match="longer than 20 s"):
+        t2s.validate(ship, written(tmp_path, truth, ["straight"]))
+
+
+def test_without_trials_nothing_is_validated(ship) -> None:
+    with pytest.raises(InputError, match="there are none"):
+        t2s.validate(ship)

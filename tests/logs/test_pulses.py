@@ -1,0 +1,215 @@
+"""Orders as pulses of 1000 to 2000 us: of the columns of a table, of PX4 and of ArduPilot without its parameters."""
+
+from __future__ import annotations
+
+import struct
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tank2sim.api.log import log
+from tank2sim.logs import px4
+from tank2sim.logs.pulses import pulses_of
+from tank2sim.logs.reading import read_log
+from tank2sim.logs.streams import LogStream
+from tests.logs.made_logs import ORIGIN, T0, frame, stamp, voyage
+
+STEP = 0.2
+
+
+def craft() -> dict[str, np.ndarray]:
+    """Ten minutes of a craft that the difference of its orders (shares) turns, a first-order lag behind."""
+    rng = np.random.default_rng(3)
+    count = 3000
+    time = STEP * np.arange(count)
+    legs = np.repeat(rng.uniform(-0.2, 0.9, (count // 50, 2)), 50, axis=0)
+    port, starboard = np.where(np.abs(legs) < 0.1, 0.0, legs).T
+    rate, speed, psi = np.zeros(count), np.zeros(count), np.full(count, 0.5)
+    for k in range(1, count):
+        rate[k] = rate[k - 1] + STEP * (0.4 * (port[k - 1] - starboard[k - 1]) - rate[k - 1]) / 2.0
+        speed[k] = speed[k - 1] + STEP * (1.2 * (port[k - 1] + starboard[k - 1]) - speed[k - 1]) / 4.0
+        psi[k] = psi[k - 1] + STEP * rate[k]
+    x, y = np.cumsum(STEP * speed * np.cos(psi)), np.cumsum(STEP * speed * np.sin(psi))
+    return {"time": time, "port": port, "starboard": starboard, "rate": rate, "psi": psi, "x": x, "y": y}
+
+
+def motion(made: dict[str, np.ndarray]) -> pd.DataFrame:
+    metres = 111_194.9
+    return pd.DataFrame(
+        {
+            "utc": [stamp(t) for t in made["time"]],
+            "latitude": ORIGIN[0] + made["x"] / metres,
+            "longitude": ORIGIN[1] + made["y"] / metres / np.cos(np.radians(ORIGIN[0])),
+            "heading_deg": np.degrees(made["psi"]) % 360,
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("port", "starboard", "span"),
+    [("pwm_left", "pwm_right", 400), ("servo3_raw", "servo1_raw", 500), ("ch1out", "ch2out", 400), ("C3", "C1", 400)],
+)
+def test_sides_and_shares_of_two_thrusters_are_found(tmp_path, port, starboard, span) -> None:
+    made, path = craft(), tmp_path / "craft.csv"
+    table = motion(made)
+    for name, share in sorted({port: made["port"], starboard: made["starboard"]}.items()):
+        table[name] = np.round(1500 + span * share).astype(int)
+    table["C9"] = 1500
+    if span == 500:
+        table.loc[0, port] = 2000  # beyond 1900: the whole range
+    table.to_csv(path, index=False)
+    found = log(path)
+    used = {channel.quantity: channel for channel in found.voyage.channels.channels if channel.use}
+    assert used["thrust_order_port"].stream == port and used["thrust_order_starboard"].stream == starboard
+    assert used["thrust_order_port"].confidence >= 0.9
+    for quantity, truth in (("thrust_order_port", made["port"]), ("thrust_order_starboard", made["starboard"])):
+        assert found.voyage.series[quantity].values[1:] == pytest.approx(truth[1:], abs=0.002)
+    assert any("1500 us" in notice for notice in found.notices)
+    again = log(path, channels=found.voyage.channels)  # the channels file is of what was recorded
+    assert np.array_equal(
+        again.voyage.series["thrust_order_port"].values, found.voyage.series["thrust_order_port"].values
+    )
+    assert used["thrust_order_port"].offset == 1500 and used["thrust_order_port"].scale == pytest.approx(1 / span)
+
+
+def test_a_rudder_by_pulses_keeps_its_side(tmp_path) -> None:
+    table = frame().drop(columns=["rudder_deg"])
+    table["rudder_pwm"] = np.round(1500 - np.degrees(voyage().rudder) * 400 / 35)  # longer to port
+    table.to_csv(tmp_path / "ship.csv", index=False)
+    found = log(tmp_path / "ship.csv")
+    assert found.voyage.series["rudder_angle"].values == pytest.approx(voyage().rudder, abs=0.005)
+
+
+def stream(name: str, values: list[float], unit: str = "", quantity: str = "") -> LogStream:
+    return LogStream(name, np.arange(float(len(values))), np.array(values, dtype=float), unit, quantity)
+
+
+def shares(recorded: LogStream) -> np.ndarray:
+    pulses, scale = pulses_of(recorded)
+    assert scale is not None
+    return scale.share(pulses.values)
+
+
+def test_a_controller_that_turns_one_way_rests_at_its_shortest_pulse() -> None:
+    pulses = stream("motor_left", [1100, 1100, 1100, 1500, 1900], "", "thrust_order_port")
+    assert shares(pulses).tolist() == [0, 0, 0, 0.5, 1]
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        stream("shaft_rpm", [900, 1500, 1800], "rpm", "rpm"),
+        stream("esc1_rpm", [900, 1500, 1800], "", "rpm"),
+        stream("pressure", [1013, 1014, 1015]),
+        stream("pwm_left", [0.1, 0.5, -0.5]),
+        stream("pwm_left", [1500, 1500, 1500]),
+    ],
+)
+def test_what_is_no_pulse_stays(kept) -> None:
+    assert pulses_of(kept) == (kept, None)
+
+
+class TestPx4:
+    """The library's object in place of a file: topics as pyulog gives them."""
+
+    @pytest.fixture
+    def read(self, monkeypatch, tmp_path):
+        def reading(topics: dict[str, dict[str, np.ndarray]], **parameters: float):
+            entries = [SimpleNamespace(name=name, multi_id=0, data=data) for name, data in topics.items()]
+            found = SimpleNamespace(
+                data_list=entries, initial_parameters=parameters, dropouts=[], file_corruption=False
+            )
+            monkeypatch.setattr(px4, "optional_library", lambda *_: SimpleNamespace(ULog=lambda _: found))
+            return {one.name: one for one in px4.read_px4_ulog(tmp_path / "log.ulg").streams}
+
+        return reading
+
+    @staticmethod
+    def gps(made, *, old: bool = False, fix: int = 3) -> dict[str, np.ndarray]:
+        table = motion(made)
+        micros = (made["time"] * 1e6).astype(np.int64)
+        places = {"latitude_deg": table.latitude.to_numpy(), "longitude_deg": table.longitude.to_numpy()}
+        if old:
+            keys = (("lat", "latitude_deg"), ("lon", "longitude_deg"))
+            places = {key: np.round(1e7 * places[name]).astype(np.int32) for key, name in keys}
+        return {
+            "timestamp": micros + 5_000_000,
+            "time_utc_usec": (micros + int(T0 * 1e6)).astype(np.uint64),
+            "fix_type": np.full(len(micros), fix),
+            **places,
+        }
+
+    @pytest.mark.parametrize(("topic", "old"), [("sensor_gps", False), ("vehicle_gps_position", True)])
+    def test_positions_of_either_age_are_the_same(self, read, topic, old) -> None:
+        made = craft()
+        found = read({topic: self.gps(made, old=old)})
+        latitude = found[f"{topic}.{'lat' if old else 'latitude_deg'}"]
+        scale = 1e-7 if latitude.unit == "1e-7 deg" else 1.0
+        assert latitude.values * scale == pytest.approx(motion(made).latitude.to_numpy(), abs=1e-7)
+        assert latitude.time_s == pytest.approx(T0 + made["time"], abs=1e-5)
+
+    def test_a_receiver_without_a_fix_shows_no_place(self, read) -> None:
+        found = read({"sensor_gps": self.gps(craft(), fix=1)})
+        assert np.isnan(found["sensor_gps.latitude_deg"].values).all()
+
+    @pytest.mark.parametrize("both", [False, True])
+    def test_pulses_are_orders_where_the_log_has_no_others(self, read, both) -> None:
+        made = craft()
+        time = (made["time"] * 1e6).astype(np.int64) + 5_000_000
+        sides = np.where(made["port"] == 0, 0, 1500 + 400 * made["port"]), 1500 + 400 * made["starboard"]
+        topics = {"sensor_gps": self.gps(made)}
+        topics["actuator_outputs"] = {"timestamp": time, "output[0]": sides[1], "output[1]": sides[0]}
+        if both:
+            topics["actuator_motors"] = {
+                "timestamp": time,
+                "control[0]": made["starboard"],
+                "control[1]": made["port"],
+            }
+        found = read(topics, CA_AIRFRAME=6)
+        assert ("actuator_outputs.output[0]" in found) != both
+        if both:
+            assert found["actuator_motors.control[1]"].quantity == "thrust_order_port"
+            return
+        found_shares = shares(found["actuator_outputs.output[1]"])
+        turning = made["port"] != 0
+        assert found_shares[turning] == pytest.approx(made["port"][turning], abs=0.002)
+        assert np.isnan(found_shares[~turning]).all()
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_telemetry_log_gives_its_sides_with_and_without_parameters(tmp_path, known) -> None:
+    mavlink = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
+    made, path = craft(), tmp_path / "craft.tlog"
+    table, writer = motion(made), mavlink.MAVLink(None)
+    parts: list[bytes] = []
+
+    def put(time_s: float, message) -> None:
+        parts.append(struct.pack(">Q", int((T0 + time_s) * 1e6)) + message.pack(writer))
+
+    for number, function in ((1, 74), (3, 73)) if known else ():
+        put(0.0, mavlink.MAVLink_param_value_message(f"SERVO{number}_FUNCTION".encode(), function, 2, 10, 0))
+    for k, time in enumerate(made["time"]):
+        boot, at = int(time * 1000), 1e7
+        place = int(at * table.latitude[k]), int(at * table.longitude[k])
+        put(time, mavlink.MAVLink_global_position_int_message(boot, *place, 0, 0, 0, 0, 0, 0))
+        yaw = (made["psi"][k] + np.pi) % (2 * np.pi) - np.pi
+        put(time, mavlink.MAVLink_attitude_message(boot, 0, 0, yaw, 0, 0, made["rate"][k]))
+        sides = [round(1500 + 400 * made[side][k]) for side in ("starboard", "port")]
+        put(time, mavlink.MAVLink_servo_output_raw_message(boot, 0, sides[0], 0, sides[1], 0, 0, 0, 0, 0))
+    path.write_bytes(b"".join(parts))
+    found = log(path).voyage
+    assert found.series["thrust_order_port"].values == pytest.approx(made["port"], abs=0.002)
+    assert found.series["heading"].values % (2 * np.pi) == pytest.approx(made["psi"] % (2 * np.pi), abs=1e-5)
+
+
+def test_a_dataflash_log_without_parameters_keeps_its_rudder(tmp_path) -> None:
+    pytest.importorskip("pymavlink")
+    from tests.logs.recorders import dataflash
+
+    path = dataflash(tmp_path / "servo.log", reversed_servo=0)
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("PARM")]
+    path.write_text("\n".join(lines) + "\n")
+    (pulses,) = (one for one in read_log(path).streams if one.name == "RCOU.C1")
+    assert shares(pulses) * 400 * 35 / 500 == pytest.approx(np.degrees(voyage().rudder), abs=0.2)
