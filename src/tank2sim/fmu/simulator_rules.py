@@ -51,7 +51,7 @@ def simulator_rules(model: Model, *, manoeuvres: bool, errors: bool) -> tuple[Ru
     if "rudder.command" not in model.input_names:
         return ()
     inputs = set(model.input_names)
-    run = "turning circle and zigzag below" if manoeuvres else "the motion leaves all bounds"
+    run = "turning circle and zigzag in this passport" if manoeuvres else "the motion leaves all bounds"
     wind, waves = "wind.speed" in inputs, "waves.height" in inputs
     motions = "surge, sway, yaw and roll" if "motion.phi" in model else "surge, sway and yaw"
     current = bool({"current.speed", "current.north"} & inputs)
