@@ -127,7 +127,8 @@ def test_rows_of_rules_follow_from_the_model(mariner_card: ManoeuvringCard, mari
         return {row.subject: str(row.shown) for row in made.rules}
 
     calm = shown(mariner)
-    assert calm["tidal stream, currents"] == calm["effects of weather"] == "not shown"
+    assert calm["tidal stream, currents"] == calm["effects of weather: wind"] == "not shown"
+    assert calm["motion in six degrees of freedom"] == calm["effects of weather: waves"] == "not shown"
     assert calm["simulated manoeuvres"] == calm["potential causes of prediction error"] == "not shown"
     assert calm["visual scenario as seen from the bridge"] == "not applicable"
     added = '\n[[effects]]\nname = "current"\nparameters = { speed_mps = 0.4, direction_deg = 120.0 }\n'

@@ -35,7 +35,8 @@ from tank2sim.simulation.trial_file import trial_csv
 from tank2sim.units import in_words
 
 MANOEUVRES = {"turn-35": "turn:35", "zigzag-20-20": "zigzag:20/20"}
-THIRD, FIRST, IN_FMU = "third order", "linear", "third order, FMU through fmpy"
+IN_WORDS = {"turn:35": "turning circle, 35 deg of rudder", "zigzag:20/20": "20/20 zigzag"}
+THIRD, FIRST, IN_FMU = "third order", "linear", "third order, FMU"
 
 
 def mariner(workshop: Workshop) -> DemoOutcome:
@@ -82,28 +83,28 @@ def _manoeuvre_section(
     third, first = run[THIRD].trajectory, run[FIRST].trajectory
     tracks = track_chart(
         [
-            track_data(f"{THIRD}, CasADi", third),
+            track_data(THIRD, third),
             TrackData(label=IN_FMU, x_m=fmu["motion.x"], y_m=fmu["motion.y"], time_s=third.t),
-            track_data(f"{FIRST}, CasADi", first),
+            track_data(FIRST, first),
         ],
-        title=f"{text}: tracks",
+        title=f"{IN_WORDS[text]}: tracks".capitalize(),
     )
     in_fmu = History(label=IN_FMU, time_s=third.t, values=dict(fmu))
     histories = history_chart(
         [
-            history_of(f"{THIRD}, CasADi", third, SHIP_SIGNALS),
+            history_of(THIRD, third, SHIP_SIGNALS),
             in_fmu,
-            history_of(f"{FIRST}, CasADi", first, SHIP_SIGNALS),
+            history_of(FIRST, first, SHIP_SIGNALS),
         ],
         signals_of(third.model, SHIP_SIGNALS),
-        title=f"{text}: time histories",
+        title=f"{IN_WORDS[text]}: time histories".capitalize(),
     )
     workshop.write(f"mariner-{name}-track.png", chart_png(tracks))
     workshop.write(f"mariner-{name}-history.png", chart_png(histories))
     apart = np.hypot(fmu["motion.x"] - third["motion.x"], fmu["motion.y"] - third["motion.y"])
     return PageSection(
-        heading=f"Mariner: {text}",
-        text=f"The FMU, given the same orders through fmpy, stays within {apart.max():.1e} m of the CasADi model.",
+        heading=f"Mariner: {IN_WORDS[text]}",
+        text=f"The FMU, given the same orders by FMPy, stays within {apart.max():.1e} m of the model.",
         tables=[_figure_table(run)],
         charts=[
             Illustration(
@@ -223,16 +224,16 @@ def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stabili
             label="Mariner's FMUs, Co-Simulation",
             value=error_words(same),
             verdict=Verdict.PASSED,
-            note="same scheme, relative",
+            note="largest difference from the model, relative",
         ),
         KeyFigure(
             label="Mariner's FMUs, Model Exchange",
             value=error_words(exact),
             verdict=Verdict.PASSED,
-            note="exact solution, relative",
+            note="largest difference from the exact solution, relative",
         ),
-        KeyFigure(label="Tactical diameter at 35°", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
-        KeyFigure(label="First overshoot of 20/20", value=overshoots[0], unit="deg"),
+        KeyFigure(label="Tactical diameter, 35 deg", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
+        KeyFigure(label="First overshoot, 20/20", value=overshoots[0], unit="deg"),
         KeyFigure(
             label="Straight-line stability",
             value=_verdict(judged),

@@ -27,10 +27,16 @@ def write_demo(folder: Path, begin: Callable[[str], None]) -> dict[str, object]:
     workshop = Workshop(folder, begin)
     towed, ship = towed_vehicle(workshop), mariner(workshop)
     begin("writing the page")
+    mass = towed.figures[0]
+    diameter = next(figure for figure in ship.figures if figure.label.startswith("Tactical diameter"))
     page = Page(
         title="From tank to simulator",
         subtitle="Five tows of a vehicle and the Mariner: measured, identified, simulated, exported, checked",
-        verdict="Measured tows and a published ship have become FMUs, each checked against an independent solution.",
+        verdict=(
+            "Measured tows and a published ship have become FMUs, each checked against an independent solution. "
+            f"The vehicle moves as {mass.value} {mass.unit}; the Mariner's tactical diameter at 35 deg of rudder is "
+            f"{diameter.value:.4g} {diameter.unit}."
+        ),
         figures=[*towed.figures, *ship.figures],
         sections=[*towed.sections, *ship.sections],
     )

@@ -94,11 +94,7 @@ def _section(
             _estimates(chosen, "Two unknowns, as in the card"),
             _miss_table(misses),
         ],
-        charts=[
-            Illustration(
-                chart=chart, caption="Points were measured; the line is the exported FMU, co-simulated through fmpy."
-            )
-        ],
+        charts=[Illustration(chart=chart, caption="Points were measured; the line is the exported FMU, run by FMPy.")],
         notes=[*paper.warnings[:1], *chosen.warnings],
     )
 
@@ -119,10 +115,10 @@ def _figures(chosen: TowIdentification, misses: list[dict[str, float]], reports:
             note="largest difference of any reading",
         ),
         KeyFigure(
-            label="Vehicle's FMU against CasADi",
+            label="Vehicle's FMU, Co-Simulation",
             value=error_words(largest_error(reports, "CoSimulation")),
             verdict=Verdict.PASSED,
-            note="same scheme, relative",
+            note="largest difference from the model, relative",
         ),
     ]
 

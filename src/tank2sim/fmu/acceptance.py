@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -78,6 +79,23 @@ def replay_in_fmu(fmu: bytes, reference: ReferenceRun | None, model: Model, fmi:
     return Replay(run=reference.title, platform=platform, max_error=errors[worst], output=worst)
 
 
+_CARDS = (("turn_35", "advance_m"), ("turn_35", "tactical_diameter_m"), ("zigzag_20_20", "overshoots_deg"))
+"""Figures at the top of the page."""
+
+
+def _cards(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Label, value and unit of what stands at the top of the page; of several overshoots the first."""
+    cards = []
+    for run, name in _CARDS:
+        value = figures.get(run, {}).get(name)
+        first = value[0] if isinstance(value, list) and value else value
+        if isinstance(first, float):
+            words, unit = in_words(name)
+            label = "first overshoot" if name == "overshoots_deg" else words
+            cards.append((f"{_TITLES[run].partition(',')[0]}: {label}", f"{first:.4g}", unit))
+    return cards
+
+
 def passport_files(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], replay: Replay) -> dict[str, str]:
     """Name in the FMU to text: the passport for machines and as a page."""
     made = passport(model, documents, manoeuvres, replay)
@@ -87,6 +105,7 @@ def passport_files(model: Model, documents: Documents, manoeuvres: Mapping[str, 
         "file": PASSPORT_FILE,
         "titles": _TITLES,
         "pictures": passport_pictures(manoeuvres),
+        "cards": _cards(made.figures),
         "words": in_words,
         "shown": _shown,
     }

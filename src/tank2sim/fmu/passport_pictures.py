@@ -126,7 +126,8 @@ def picture(
         if len(lines) > 1:
             at = _LEFT + 110.0 * number
             parts.append(f'<path d="M{at:.1f} 10h26" {look}/><text x="{at + 32:.1f}" y="14">{line.name}</text>')
-    size = f'width="{right + _RIGHT:.0f}" height="{bottom + _BOTTOM:.0f}"'
+    across, down = f"{right + _RIGHT:.0f}", f"{bottom + _BOTTOM:.0f}"
+    size = f'width="{across}" height="{down}" viewBox="0 0 {across} {down}"'
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-size="12" fill="#222" role="img">{"".join(parts)}</svg>'
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tank2sim.report.autopilot.page import exported_section
+from tank2sim.report.autopilot.page import exported_section, gains_table
 from tank2sim.report.kit.analysis_charts import PolesZeros, pole_zero_chart
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
@@ -119,12 +119,11 @@ def _controller(found: Json) -> PageSection:
         "takes what the thrusters have left. Thrusts become revolutions by the thrust curves of the card, at the speed "
         "of the moment."
     )
-    rows: list[list[Cell]] = [[name, value] for name, value in found["gains"].items()]
     poles = [complex(*pole) for pole in found["poles"]]
     drawn = [PolesZeros(label=f"{found['speed_mps']:.3g} m/s", poles=poles)]
     return PageSection(
         heading="Controller",
         text=text,
-        tables=[PageTable(caption="Gains", columns=[Column(title="gain"), Column(title="value")], rows=rows)],
+        tables=[gains_table(found["gains"])],
         charts=[Illustration(chart=pole_zero_chart(drawn, title="Poles of the closed loop"))],
     )

@@ -24,6 +24,19 @@ from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page
 HIGHEST_PEAK = 2.0
 """Ms above which a loop is thought to be weak: Astrom & Hagglund (2006), Advanced PID Control, take 1.2 to 2."""
 
+_UNITS = {
+    "_per_s": "1/s",
+    "_s": "s",
+    "_radpmps": "rad s/m",
+    "_radps": "rad/s",
+    "_Nms": "N m s",
+    "_Nmps": "N m/s",
+    "_Nm": "N m",
+    "_kgps": "kg/s",
+    "_Npm": "N/m",
+}
+"""Ends of the names of gains in JSON to their units."""
+
 _SIGNALS = (
     Signal(name="psi_deg", title="heading", unit="rad"),
     Signal(name="delta_deg", title="rudder", unit="rad"),
@@ -36,7 +49,7 @@ def autopilot_page(found: Json) -> Page:
     sections = [_calm(found)]
     if found["track"]:
         sections.append(_track(found))
-    sections += [_weather(found), _controller(found), _loop(found)]
+    sections += [_weather(found), _loop(found), _controller(found)]
     if exported := found.get("export"):
         sections.append(exported_section(exported))
     if found["notices"]:
@@ -44,8 +57,26 @@ def autopilot_page(found: Json) -> Page:
     return Page(
         title=f"{found['ship']}: heading autopilot",
         subtitle=found["source"],
+        verdict=_verdict(found),
         figures=_figures(found),
         sections=sections,
+    )
+
+
+def _verdict(found: Json) -> str:
+    """What the autopilot does in calm and in weather, and how far its loop is from its limits."""
+    change, keeping = found["closed_loop"]["course_changes"]["change"], found["closed_loop"]["course_keeping"]
+    first, speeds = found["margins"]["at_design"], found["margins"]["at_speeds"]
+    unstable = [f"{one['speed_mps']:.3g}" for one in speeds if not one["stable"]]
+    if unstable:
+        return f"The loop is unstable at {', '.join(unstable)} m/s."
+    turned = f"A change of course by {change['ordered_deg']:.3g} deg"
+    seconds = change["settling_time_s"]
+    settled = "does not settle in the run," if seconds is None else f"settles in {seconds:.3g} s"
+    return (
+        f"{turned} {settled} with {change['overshoot_deg']:.2g} deg of overshoot. In weather the heading is "
+        f"{keeping['heading_error_rms_deg']:.2g} deg off (rms), by {keeping['rudder_rms_deg']:.2g} deg of rudder. The "
+        f"loop has {first['phase_margin_deg']:.3g} deg of phase margin."
     )
 
 
@@ -81,7 +112,6 @@ def _figures(found: Json) -> list[KeyFigure]:
 
 
 def _controller(found: Json) -> PageSection:
-    rows: list[list[Cell]] = [[name, value] for name, value in found["gains"].items()]
     alone, limits = found["ship_alone"], found["limits"]
     text = (
         f"The ship at {alone['speed_mps']:.4g} m/s: K = {alone['K_per_s']:.4g} 1/s, T = {alone['T_s']:.4g} s, "
@@ -98,12 +128,18 @@ def _controller(found: Json) -> PageSection:
     return PageSection(
         heading="Controller",
         text=text,
-        tables=[
-            PageTable(
-                caption="Figures of the controller", columns=[Column(title="figure"), Column(title="value")], rows=rows
-            )
-        ],
+        tables=[gains_table(found["gains"])],
+        folded=True,
     )
+
+
+def gains_table(gains: Mapping[str, float]) -> PageTable:
+    """The gains of a controller by the names that the JSON has, units apart."""
+    rows: list[list[Cell]] = []
+    for name, value in gains.items():
+        suffix = next((suffix for suffix in _UNITS if name.endswith(suffix)), "")
+        rows.append([name.removesuffix(suffix).replace("_", " "), value, _UNITS.get(suffix, "")])
+    return PageTable(caption="Gains", columns=[Column(title=title) for title in ("gain", "value", "unit")], rows=rows)
 
 
 def _loop(found: Json) -> PageSection:
@@ -195,9 +231,17 @@ def _margins(margins: Sequence[Mapping[str, Json]]) -> PageTable:
     return PageTable(caption="Margins, the first at the speed of the design", columns=columns, rows=rows)
 
 
-def _history(label: str, columns: Mapping[str, Json]) -> History:
-    values = {signal.name: np.radians(np.array(columns[signal.name], dtype=float)) for signal in _SIGNALS}
-    return History(label=label, time_s=columns["t_s"], values=values)
+def _history(label: str, columns: Mapping[str, Json], until_s: float = math.inf) -> History:
+    time = np.array(columns["t_s"], dtype=float)
+    shown = time <= until_s
+    values = {signal.name: np.radians(np.array(columns[signal.name], dtype=float)[shown]) for signal in _SIGNALS}
+    return History(label=label, time_s=time[shown], values=values)
+
+
+def _shown_until(*changes: Mapping[str, Json]) -> float:
+    """Time, s, from which on the charts of course changes would show a steady course: twice the settling time."""
+    settled = [change["settling_time_s"] for change in changes]
+    return math.inf if None in settled else 2 * max(settled)
 
 
 def _calm(found: Json) -> PageSection:
@@ -212,13 +256,15 @@ def _calm(found: Json) -> PageSection:
         Column(title="at full rate", unit="s", digits=3),
     ]
     rows: list[list[Cell]] = [[name, *change.values()] for name, change in changes.items()]
-    large = [_history(name, one) for name, one in found["histories"].items() if name.startswith("large")]
+    names = [name for name in found["histories"] if name.startswith("large")]
+    until = _shown_until(*(changes[name] for name in names))
+    large = [_history(name, found["histories"][name], until) for name in names]
+    course = _history("change", found["histories"]["change"], _shown_until(changes["change"]))
     ordinary = f"{changes['change']['ordered_deg']:.3g} deg"
     charts = [
         Illustration(
-            chart=history_chart(
-                [_history("change", found["histories"]["change"])], _SIGNALS, title=f"Course change by {ordinary}"
-            )
+            chart=history_chart([course], _SIGNALS, title=f"Course change by {ordinary}"),
+            caption="Up to twice the settling time.",
         ),
         Illustration(
             chart=history_chart(large, _SIGNALS, title="A change that takes the rudder to its limit"),

@@ -339,7 +339,7 @@ def _runs_axis(place: str, runs: Sequence[str], *, named: bool, bars: bool = Fal
     size = 8 if len(runs) > _CROWDED else 11
     axis = alt.Axis(
         title=None, labels=named, ticks=named, grid=False,
-        labelAngle=-90, labelFontSize=size, labelLimit=140, labelOverlap=False,
+        labelAngle=-90, labelFontSize=size, labelLimit=140, labelOverlap=True,
     )  # fmt: skip
     apart = {"paddingInner": 0.25} if bars else {}
     return alt.X(place, scale=alt.Scale(domain=list(runs), **apart), axis=axis)

@@ -22,6 +22,7 @@ from tank2sim.report.kit.chart_parts import (
 )
 from tank2sim.report.kit.charts import History, Signal, history_chart
 from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import (
     Cell,
     Column,
@@ -54,6 +55,7 @@ def run_page(found: Json) -> Page:
     odd = [row for row in found["repeats"] if row["chance"] < _ODD]
     faults = sum(len(run["faults"]) for run in runs)
     figures = [
+        *_derivative_figures(runs),
         KeyFigure(label="Runs", value=len(runs), note=", ".join(dict.fromkeys(_words(run["type"]) for run in runs))),
         KeyFigure(label="Speed", value=runs[0]["speed_mps"], unit="m/s"),
         KeyFigure(label="Periods", value=sum(run["periods"] for run in runs)),
@@ -62,7 +64,7 @@ def run_page(found: Json) -> Page:
     if found["repeats"]:
         verdict = Verdict.CAUTION if odd else Verdict.PASSED
         figures.append(KeyFigure(label="Coefficients in which repeats differ", value=len(odd), verdict=verdict))
-    sections = [*notices_section(found["notices"])]
+    sections: list[PageSection] = []
     charts = run_charts(found)
     for heading, stem, caption in (
         ("Averaged cycle", "cycle", "Points: mean by phase; shaded: ± one standard deviation; line: harmonics."),
@@ -81,11 +83,60 @@ def run_page(found: Json) -> Page:
     sections.insert(len(sections) - 2, PageSection(heading="Fourier coefficients", text=text, tables=tables))
     if derivatives := [run for run in runs if run["derivatives"]]:
         heading = "Derivatives of the run alone"
-        sections.append(PageSection(heading=heading, tables=[_derivatives(derivatives)]))
+        sections.insert(1, PageSection(heading=heading, tables=[_derivatives(derivatives)]))
     if found["repeats"]:
-        sections.append(PageSection(heading="Repeats", tables=[_repeats(found["repeats"])]))
+        sections.insert(1, PageSection(heading="Repeats", tables=[_repeats(found["repeats"])]))
+    sections += notices_section(found["notices"])
     title = ", ".join(str(run["name"]).rpartition("/")[2] for run in runs)
-    return Page(title=f"Run: {title}", subtitle="Captive run, reduced by itself", figures=figures, sections=sections)
+    return Page(
+        title=f"Run: {title}",
+        subtitle="Captive run, reduced by itself",
+        verdict=_verdict(runs, len(found["repeats"]), len(odd)),
+        figures=figures,
+        sections=sections,
+    )
+
+
+def _verdict(runs: Sequence[Json], compared: int, odd: int) -> str:
+    """Whether the runs are good, and which derivative each is surest of."""
+    faults = sum(len(run["faults"]) for run in runs)
+    parts = [f"{faults} faults: not to be used as they are." if faults else "No fault is found."]
+    if compared:
+        parts.append(
+            f"The repeats differ by more than their noise in {odd} of {compared} coefficients."
+            if odd
+            else "The repeats differ by no more than their noise."
+        )
+    if surest := _surest(runs[0]):
+        name = surest[0]
+        value, error = (runs[0]["derivatives"][key][name] for key in ("values", "standard_errors"))
+        percent = 100 * abs(error / value)
+        parts.append(f"By the {'first ' if len(runs) > 1 else ''}run alone {name} is known to {percent:.2g} %.")
+    return " ".join(parts)
+
+
+def _surest(run: Json) -> list[str]:
+    """Names of the derivatives of a run alone, the one with the least relative standard error first."""
+    found = run["derivatives"]
+    if not found:
+        return []
+    errors = found["standard_errors"]
+    known = [name for name, value in found["values"].items() if value and errors.get(name)]
+    return sorted(known, key=lambda name: abs(errors[name] / found["values"][name]))
+
+
+def _derivative_figures(runs: Sequence[Json]) -> list[KeyFigure]:
+    """The two surest derivatives of a run that is alone."""
+    if len(runs) > 1:
+        return []
+    return [
+        KeyFigure(
+            label=f"{name}, times 10⁵",
+            value=1e5 * runs[0]["derivatives"]["values"][name],
+            note=f"standard error {format_number(1e5 * runs[0]['derivatives']['standard_errors'][name], 2)}",
+        )
+        for name in _surest(runs[0])[:2]
+    ]
 
 
 _ODD = 0.01

@@ -122,10 +122,13 @@ def polar_chart(polar: Json, marked: Mapping[str, Mapping[str, Json]], *, title:
         }
         for label, glide in marked.items()
     ]
+    best = max(points, key=lambda point: point["x"] / point["y"])
+    tangent = Chart(data([{"x": 0.0, "y": 0.0}, best])).mark_line(style="reference")
     look = series_look(list(marked), as_points=list(marked))
     dots = Chart(data(points)).mark_point(size=90, strokeWidth=2)
     layers = [
         line,
+        tangent.encode(x=x, y=y),
         hover.encode(x=x, y=y, tooltip=tooltip),
         dots.encode(
             x=x, y=y, color=look.colour, shape=look.shape, tooltip=[alt.Tooltip("run:N", title="glide"), *tooltip]

@@ -76,8 +76,8 @@ _HEADS = (
     Column(title="path angle", unit="deg"),
     Column(title="roll", unit="deg"),
     Column(title="net buoyancy", unit="kg"),
-    Column(title="incidence", unit="deg", digits=5),
-    Column(title="pitch", unit="deg", digits=5),
+    Column(title="incidence", unit="deg"),
+    Column(title="pitch", unit="deg"),
     Column(title="speed", unit="m/s"),
     Column(title="C_L"),
     Column(title="C_D"),
@@ -121,7 +121,7 @@ def _design(found: Json) -> PageSection:
         f"net buoyancy, here {found['buoyancy_kg']:g} kg. Below the smallest angle the drag is too large for "
         "the lift at any incidence."
     )
-    caption = "From the best glide to almost straight down. A line from the origin has the angle of the path."
+    caption = "From the best glide to almost straight down. Grey: the path of the best glide; no path is less steep."
     polar = Illustration(chart=polar_chart(found["polar"], marked, title="Glide polar"), caption=caption)
     return PageSection(heading="What is best", text=text, tables=tables, charts=[polar])
 
@@ -162,22 +162,26 @@ def _ranges(ranges: Sequence[Json]) -> PageTable:
 
 
 def _glides(glides: Sequence[Json], printed: Sequence[Json]) -> PageSection:
-    columns = [*_HEADS, Column(title="with added mass", unit="m")]
-    rows = [[*_row(glide), glide["turning_radius_with_added_mass_m"]] for glide in glides]
+    turning = any(glide["turning_radius_m"] is not None for glide in glides)
+    heads, last = (_HEADS, len(_HEADS)) if turning else (_HEADS[:-1], -1)
+    columns, rows = [*heads], [_row(glide)[:last] for glide in glides]
+    if turning:
+        columns.append(Column(title="with added mass", unit="m"))
+        rows = [[*row, glide["turning_radius_with_added_mass_m"]] for row, glide in zip(rows, glides, strict=True)]
     tables = [PageTable(caption="Steady glides at the angles asked for", columns=columns, rows=rows)]
     if printed:
-        columns = [*_HEADS, Column(title="speed over that of the corrected equations", digits=3)]
+        columns = [*heads, Column(title="speed over that above", digits=3)]
         pairs = zip(printed, glides, strict=True)
-        rows = [[*_row(row), row["speed_mps"] / glide["speed_mps"]] for row, glide in pairs]
+        rows = [[*_row(row)[:last], row["speed_mps"] / glide["speed_mps"]] for row, glide in pairs]
         caption = "The same by the equations as printed"
         tables.append(PageTable(caption=caption, columns=columns, rows=rows))
-    return PageSection(
-        heading="Steady glides",
-        text="Angles + up, incidence + when the flow comes from below, roll + starboard side down: it turns a dive to "
-        "starboard and a climb to port. The turning radius neglects the added mass, as published; the last column "
-        "is that of the transient model, which has it.",
-        tables=tables,
-    )
+    text = "Angles + up, incidence + when the flow comes from below"
+    if turning:
+        text += (
+            ", roll + starboard side down: it turns a dive to starboard and a climb to port. The turning radius "
+            "neglects the added mass, as published; the last column is that of the transient model, which has it"
+        )
+    return PageSection(heading="Steady glides", text=f"{text}.", tables=tables)
 
 
 def _path(found: Json) -> PageSection:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import altair as alt
@@ -12,14 +13,16 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.report.kit.json_values import Json
+from tank2sim.units import in_words
 
 EXACT, DIFFERENCE = "exact slope", "10 % difference"
 
 _MOST_ROWS = 24
-"""Parameters in a chart: those that move some figure most. The table has all."""
+"""Parameters in a chart of all figures, or of tuning. The table has all."""
 
-PANELS = 4
-"""Figures side by side in one chart: as many as leave their bars readable on a sheet of paper."""
+_MOST_BARS = 12
+"""Parameters in the chart of one figure: those that move it most. Project choice: two charts side by side are half a
+screen high."""
 
 _WIDTH = 600
 
@@ -56,46 +59,33 @@ def short_name(key: str, parameter: Mapping[str, Json]) -> str:
     return str(parameter.get("name") or key.removeprefix("derivatives."))
 
 
-def most_influential(result: InfluenceData, limit: int = _MOST_ROWS) -> list[int]:
-    """Places of the parameters with the largest K % on any figure, each figure measured by its own largest."""
-    sizes = np.nan_to_num(np.abs(result.exact))
-    largest = sizes.max(axis=1, keepdims=True)
-    relative = np.divide(sizes, largest, out=np.zeros_like(sizes), where=largest > 0).max(axis=0)
-    order = [int(place) for place in np.argsort(-relative, kind="stable") if relative[place] > 1e-6]
-    return order[:limit]
+def figure_label(text: str) -> str:
+    """Words for a figure, without its unit: ``advance_m@35`` is ``advance, 35 deg``."""
+    kind, _, argument = text.partition("@")
+    words = re.sub(r"(?<=[a-z])(?=\d)", " ", in_words(kind)[0])
+    return f"{words}, {argument} deg" if argument else words
 
 
-def influence_charts(result: InfluenceData) -> list[alt.HConcatChart]:
-    """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures next to
-    each other, :data:`PANELS` to a chart."""
-    order = most_influential(result)
-    return [_bars(result, order, rows) for rows in figure_groups(len(result.figures), PANELS)]
+def most_influential(result: InfluenceData, row: int) -> list[int]:
+    """Places of the parameters with the largest K % on one figure, largest first."""
+    sizes = np.nan_to_num(np.abs(result.exact[row]))
+    order = [int(place) for place in np.argsort(-sizes, kind="stable") if sizes[place] > 1e-6 * sizes.max()]
+    return order[:_MOST_BARS]
 
 
-def figure_groups(count: int, most: int) -> list[range]:
-    """Places of `count` figures in groups of `most` at most, as even as it goes."""
-    each = -(-count // -(-count // most))
-    return [range(first, min(first + each, count)) for first in range(0, count, each)]
+def influence_charts(result: InfluenceData) -> list[alt.LayerChart]:
+    """One chart for each figure, of the parameters that move it most: bars by exact slopes, points by the 10 %
+    difference."""
+    return [_bars(result, row) for row in range(len(result.figures))]
 
 
-def _bars(result: InfluenceData, order: Sequence[int], rows: Sequence[int]) -> alt.HConcatChart:
+def _bars(result: InfluenceData, row: int) -> alt.LayerChart:
+    exact, difference, order = result.exact[row], result.difference[row], most_influential(result, row)
     names = [result.names[place] for place in order]
-    panels = [_panel(result, order, names, row, first=row == rows[0], width=_WIDTH // len(rows)) for row in rows]
-    shown = ", ".join(result.figures[row] for row in rows)
-    return alt.hconcat(*panels, spacing=12).properties(
-        title=f"Influence on {shown}",
-        description=f"K per cent of {len(names)} parameters on {shown}, by exact slopes and by a 10 % difference.",
-    )
-
-
-def _panel(
-    result: InfluenceData, order: Sequence[int], names: list[str], row: int, *, first: bool, width: int
-) -> alt.LayerChart:
-    exact, difference = result.exact[row], result.difference[row]
     bars = [_record(result, place, EXACT, exact[place], difference[place]) for place in order]
     points = [record | {"run": DIFFERENCE, "k": record["step"]} for record in bars if record["step"] is not None]
     look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
-    axis = alt.Axis(title=None, grid=True, labelLimit=170) if first else alt.Axis(title=None, labels=False, ticks=False)
+    axis = alt.Axis(title=None, grid=True, labelLimit=170)
     y = alt.Y("name:N", sort=names, scale=alt.Scale(domain=names), axis=axis)
     x = alt.X("k:Q", title="K (%)", axis=alt.Axis(tickCount=4))
     tooltip = [
@@ -107,8 +97,12 @@ def _panel(
     drawn = Chart(data(bars)).mark_bar(height=9, opacity=0.65).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
     marks = Chart(data(points)).mark_point(size=34, strokeWidth=1.6)
     marked = marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+    figure = figure_label(result.figures[row])
     return alt.layer(drawn, zero, marked).properties(
-        width=width, height=19 * len(names), title=alt.Title(result.figures[row], fontSize=12, anchor="middle")
+        width=_WIDTH,
+        height=19 * len(names),
+        title=f"Influence on {figure}",
+        description=f"K per cent of {len(names)} parameters on {figure}, by exact slopes and by a 10 % difference.",
     )
 
 
@@ -127,7 +121,7 @@ def variance_chart(result: InfluenceData) -> alt.Chart:
     shares = 100 * result.shares
     order = [int(k) for k in np.argsort(-shares.max(axis=0), kind="stable") if shares[:, k].max() >= 1][:_MOST_ROWS]
     names = [result.names[place] for place in order]
-    figures = list(result.figures)
+    figures = [figure_label(text) for text in result.figures]
     rows: list[ChartRecord] = [
         {"figure": figures[row], "name": result.names[place], "share": plain(float(shares[row, place]))}
         for row in range(len(figures))

@@ -10,10 +10,10 @@ from tank2sim.arrays import Array
 from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.sections import figures_section
 from tank2sim.report.influence.charts import (
-    PANELS,
     InfluenceData,
-    figure_groups,
+    figure_label,
     influence_charts,
+    most_influential,
     moves_chart,
     short_name,
     variance_chart,
@@ -43,7 +43,8 @@ def influence_page(found: Json) -> Page:
     tuned = found.get("tuned")
     if tuned:
         sections.append(_tuning(found, tuned))
-    charts = [Illustration(chart=chart) for chart in influence_charts(coefficients)]
+    drawn = influence_charts(coefficients)
+    charts = [Illustration(chart=chart, half=len(drawn) > 1) for chart in drawn]
     heading = "Influence coefficients"
     sections.append(PageSection(heading=heading, text=_COEFFICIENTS, charts=charts, notes=found["notices"]))
     sections.append(_uncertainty(found, coefficients))
@@ -56,10 +57,25 @@ def influence_page(found: Json) -> Page:
         sections.append(figures_section(found["ensemble"]))
     return Page(
         title=f"{found['ship']}: influence coefficients",
-        subtitle=f"{len(coefficients.names)} parameters on {len(coefficients.figures)} figures",
+        subtitle=f"Parameters: {len(coefficients.names)}. Figures: {len(coefficients.figures)}.",
+        verdict=_verdict(coefficients, tuned),
         figures=[_key_figure(text, figure, tuned or {}) for text, figure in found["figures"].items()],
         sections=sections,
     )
+
+
+def _verdict(result: InfluenceData, tuned: Mapping[str, Json] | None) -> str:
+    """Which number moves each of the first three figures most, or how many targets tuning has met."""
+    if tuned and tuned.get("targets"):
+        count, missed = len(tuned["targets"]), len(tuned["contradiction"])
+        if missed:
+            return f"Of {count} targets {missed} cannot be met within the bounds; the nearest is shown."
+        return f"Every target is met by {len(tuned['parameters'])} numbers within the bounds."
+    parts = []
+    for row, text in list(enumerate(result.figures))[:3]:
+        if order := most_influential(result, row):
+            parts.append(f"{figure_label(text)} by {result.names[order[0]]} ({result.exact[row][order[0]]:+.2g} %)")
+    return f"What 10 % more of one number moves most: {'; '.join(parts)}." if parts else ""
 
 
 def _targets_of(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json], Verdict]]:
@@ -70,10 +86,12 @@ def _targets_of(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json]
     }
 
 
+def _unit(text: str) -> str:
+    return in_words(text.partition("@")[0])[1]
+
+
 def _key_figure(text: str, figure: Mapping[str, Json], tuned: Mapping[str, Json]) -> KeyFigure:
-    kind, _, argument = text.partition("@")
-    words, unit = in_words(kind)
-    label = f"{words}, {argument} deg" if argument else words
+    unit, label = _unit(text), figure_label(text)
     after, (target, verdict) = tuned.get("figures", {}).get(text), _targets_of(tuned).get(text, ({}, Verdict.NONE))
     if after is None:
         note = f"standard error {format_number(figure['standard_error'], 2)}"
@@ -84,21 +102,27 @@ def _key_figure(text: str, figure: Mapping[str, Json], tuned: Mapping[str, Json]
     return KeyFigure(label=label, value=after, unit=unit, verdict=verdict, note=note)
 
 
+_COLUMNS = 4
+"""Figures in a table of coefficients: as many as a sheet of paper is wide."""
+
+
 def _all_coefficients(result: InfluenceData) -> PageSection:
-    tables = [
-        _table(caption, result, K, rows)
-        for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference))
-        for rows in figure_groups(len(result.figures), PANELS)
-    ]
+    count = len(result.figures)
+    tables = []
+    for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference)):
+        for first in range(0, count, _COLUMNS):
+            rows = range(first, min(first + _COLUMNS, count))
+            part = f", figures {rows[0] + 1} to {rows[-1] + 1}" if count > _COLUMNS else ""
+            tables.append(_table(f"{caption}{part}", result, K, rows))
     return PageSection(heading="Coefficients of all parameters", tables=tables)
 
 
 def _table(caption: str, result: InfluenceData, K: Array, rows: Sequence[int]) -> PageTable:
-    """K of some figures, as many as are as wide as the page at most."""
+    labels = [figure_label(result.figures[row]) for row in rows]
     return PageTable(
         caption=caption,
-        columns=[Column(title="parameter"), *(Column(title=result.figures[n], unit="%", digits=3) for n in rows)],
-        rows=[[name, *(_cell(K[n, place]) for n in rows)] for place, name in enumerate(result.names)],
+        columns=[Column(title="parameter"), *(Column(title=label, unit="%", digits=3) for label in labels)],
+        rows=[[name, *(_cell(K[row, place]) for row in rows)] for place, name in enumerate(result.names)],
     )
 
 
@@ -112,11 +136,12 @@ def _uncertainty(found: Json, coefficients: InfluenceData) -> PageSection:
     rows: list[Sequence[Cell]] = []
     for name, figure in figures.items():
         relative = 100 * abs(figure["standard_error"] / figure["value"]) if figure["value"] else None
-        rows.append([name, figure["value"], figure["standard_error"], _cell(relative)])
+        rows.append([figure_label(name), figure["value"], figure["standard_error"], _unit(name), _cell(relative)])
     columns = [
         Column(title="figure"),
         Column(title="value"),
         Column(title="standard error", digits=3),
+        Column(title="unit"),
         Column(title="relative", unit="%", digits=3),
     ]
     known = any(figure["standard_error"] > 0 for figure in figures.values())
@@ -136,7 +161,7 @@ def _together(agreed: Mapping[str, Json]) -> PageSection:
         "direct": "direct",
     }
     figures: list[Sequence[Cell]] = [
-        [text, *(_cell(figure[way]) for way in ways)] for text, figure in agreed["figures"].items()
+        [figure_label(text), *(_cell(figure[way]) for way in ways)] for text, figure in agreed["figures"].items()
     ]
     percent = [Column(title=title, unit="%") for title in ways.values()]
     return PageSection(
@@ -160,8 +185,9 @@ def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
     for text, figure in found["figures"].items():
         target, verdict = targets.get(text, ({}, None))
         wanted = f"{target['relation']} {target['wanted']:g}" if target else ""
-        figures.append([text, wanted, figure["value"], tuned["figures"].get(text), verdict])
-    heads = ("figure", "target", "before", "after", "")
+        after = tuned["figures"].get(text)
+        figures.append([figure_label(text), wanted, figure["value"], after, _unit(text), verdict])
+    heads = ("figure", "target", "before", "after", "unit", "")
     notes = []
     if contradiction := tuned["contradiction"]:
         several = len(contradiction) > 1

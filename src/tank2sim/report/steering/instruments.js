@@ -53,6 +53,7 @@ class Dial {
       this.most = this.larger.find((one) => one > this.most);
     }
     const { pen, width, height } = prepared(this.canvas);
+    if (height <= 42 || width <= 32) return; // hidden, as on paper
     const colour = colours(paper);
     const radius = Math.min((height - 42) / (1 - Math.cos(Dial.SWEEP)), (width / 2 - 16) / Math.sin(Dial.SWEEP));
     const [middle, base] = [width / 2, 13 + radius];

@@ -145,7 +145,11 @@ def _influence(found: Json) -> PageSection:
         columns.append(Column(title=f"printed, {printed['draught_m']:g} m", digits=3))
         rows = [[*row, printed["K_percent"].get(str(row[0]))] for row in rows]
     models = {found["titles"][model]: table["K_percent"] for model, table in tables.items()}
-    text = f"K: change of the radius in % at {found['rudder_deg']:g} deg of rudder when one coefficient grows by 10 %."
+    text = (
+        f"K: change of the radius in % at {found['rudder_deg']:g} deg of rudder when one coefficient grows by 10 %. "
+        "C_y are coefficients of the lateral force, C_m of the yaw moment, by powers of drift angle b, yaw rate w and "
+        "rudder angle d: C_m_wwb is that of b w²."
+    )
     return PageSection(
         heading="Influence on the steady radius",
         text=text,

@@ -60,6 +60,7 @@ def validation_page(found: Json) -> Page:
     return Page(
         title=found["ship"],
         subtitle="Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03",
+        verdict=found["verdict"],
         figures=_figures(found),
         sections=[
             _comparison(found["figures"], found["verdict"]),
@@ -84,7 +85,7 @@ def _figures(found: Json) -> list[KeyFigure]:
         incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED] else Verdict.CAUTION
         verdict = Verdict.PASSED if validated == len(figures) else incomplete
         value = f"{validated} of {len(figures)}"
-        shown = [KeyFigure(label="Figures validated", value=value, verdict=verdict, note=found["verdict"])]
+        shown = [KeyFigure(label="Figures validated", value=value, verdict=verdict)]
         errors = [
             abs(figure["error"] / figure["measured"])
             for figure in figures
