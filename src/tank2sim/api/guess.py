@@ -81,7 +81,7 @@ class GuessResult(PagedResult):
         helpful: list[list[object]] = [[key, 100 * share] for key, share in self.guess.next_figures.items()]
         return (
             ResultTable("Figures: nine of ten such ships lie between 5 and 95 %", columns, rows),
-            ResultTable("Numbers of the card", ("number", "by dimensions", "with the figures", ""), numbers),
+            ResultTable("Numbers of the card", ("number", "by dimensions", "with the figures", ""), numbers, wide=True),
             ResultTable("Which further figure would help most", ("figure", "variance gone (%)"), helpful),
         )
 
