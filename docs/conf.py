@@ -45,7 +45,9 @@ napoleon_use_param = False  # types are words for people; each would be looked u
 napoleon_use_rtype = False
 add_module_names = False
 
-exclude_patterns = ["_build"]
+_LIVE = Path(__file__).parent / "live"  # what page_pictures.py wrote, if it was run
+exclude_patterns = ["_build", "live"]
+html_extra_path = [str(_LIVE)] if _LIVE.is_dir() else []
 html_theme = "furo"
 html_title = "tank2sim"
 html_static_path = ["static"]
@@ -65,6 +67,17 @@ def _tables_of_the_program(app: Sphinx, tree: nodes.document) -> None:
             block["classes"].append("drawn")
 
 
+def _thumbnails_open_pages(app: Sphinx, tree: nodes.document) -> None:
+    """A thumbnail of the gallery leads to the page that it is of, if that is there."""
+    for image in list(tree.findall(nodes.image)):
+        path = Path(image["uri"])
+        if path.parent.name == "pages" and (_LIVE / "pages" / f"{path.stem}.html").is_file():
+            link = nodes.reference(refuri=f"pages/{path.stem}.html")
+            image.replace_self(link)
+            link += image
+
+
 def setup(app: Sphinx) -> None:
     """What is done to every page."""
+    app.connect("doctree-read", _thumbnails_open_pages)
     app.connect("doctree-read", _tables_of_the_program)

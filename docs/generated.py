@@ -280,11 +280,22 @@ def _named_by_theory() -> frozenset[str]:
 
 
 def reference(package: str) -> str:
-    """All public modules of a package by their docstrings."""
-    text: list[str] = []
-    for name in modules(package):
+    """All public modules of a package by their docstrings, with what each is for as a table before them."""
+    names = modules(package)
+    text = ["| module | what is in it |", "|---|---|"]
+    for name in names:
+        anchor = re.sub(r"[^\w-]", "", name)
+        text.append(f"| [`{name.removeprefix('tank2sim.')}`](#{anchor}) | {_first_sentence(name)} |")
+    text.append("")
+    for name in names:
         text += [f"## `{name}`", "", "```{eval-rst}", f".. automodule:: {name}", "```", ""]
     return "\n".join(text)
+
+
+def _first_sentence(module: str) -> str:
+    """The summary of a module, without marks of reStructuredText."""
+    paragraph = " ".join((importlib.import_module(module).__doc__ or "").split("\n\n")[0].split())
+    return _text(re.sub(r":\w+:`[~.]*([^`<]*)[^`]*`", r"\1", paragraph).replace("`", ""))
 
 
 def _fill(app: Sphinx, page: str, source: list[str]) -> None:

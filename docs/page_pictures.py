@@ -1,6 +1,7 @@
-"""Makes the thumbnails of the manual's gallery of pages, ``docs/static/pages/``, from bundled ships alone.
+"""Makes the pages of the manual's gallery, ``docs/live/pages/``, and their thumbnails, ``docs/static/pages/``.
 
-Needs Chromium::
+Bundled ships alone are in them. The pages, some 15 MB, are not kept: a manual that is built while they are there has
+them, and its thumbnails open them. Needs Chromium::
 
     python docs/page_pictures.py
 """
@@ -14,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / "static" / "pages"
+LIVE = Path(__file__).parent / "live" / "pages"
 PAGES = {
     "turn": "simulate mariner-nominal --manoeuvre turn:35",
     "zigzag": "simulate kvlcc2-l7 --manoeuvre zigzag:-10/10 --ensemble 200",
@@ -43,10 +45,11 @@ def main() -> int:
     if chromium is None:
         print("Chromium, which opens the pages, is not installed")
         return 2
-    FOLDER.mkdir(parents=True, exist_ok=True)
+    for folder in (FOLDER, LIVE):
+        folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         for stem, command in PAGES.items():
-            page, picture = Path(name) / f"{stem}.html", FOLDER / f"{stem}.png"
+            page, picture = LIVE / f"{stem}.html", FOLDER / f"{stem}.png"
             program = Path(sys.executable).with_name("tank2sim")
             subprocess.run([program, *command.split(), "--page", page], check=True, capture_output=True, cwd=name)
             size = f"--window-size={WIDTH_PX},{HEIGHT_PX}"

@@ -60,7 +60,7 @@ def test_the_result_is_json_and_the_page_is_there(demo) -> None:
     folder, result, _ = demo
     assert json.loads(json.dumps(result))["mariner"]["stability"]["third order"]["stability_criterion"]["stable"]
     page = (folder / PAGE).read_text(encoding="utf-8")
-    assert "zigzag:20/20" in page and page.rstrip().endswith("</html>")
+    assert "20/20 zigzag" in page and page.rstrip().endswith("</html>")
 
 
 def test_the_result_has_the_page_and_fits_a_screen(demo) -> None:

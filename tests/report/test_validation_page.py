@@ -77,7 +77,7 @@ def test_a_trial_that_made_the_card_is_no_validation() -> None:
     figures = tuple(replace(figure, made_card=True) for figure in FIGURES[:1])
     page = validation_page(validation_json(**Validation(figures, 40).as_json()))
     assert page.figures[0].value == "0 of 1" and page.figures[0].verdict is Verdict.CAUTION
-    assert "only fitted" in page.figures[0].note
+    assert "only fitted" in page.verdict
 
 
 def test_a_criterion_beyond_the_card_has_no_verdict() -> None:

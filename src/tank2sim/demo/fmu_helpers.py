@@ -15,6 +15,7 @@ from tank2sim.fmu.check import CheckReport, compare_with_model
 from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import write_fmu
 from tank2sim.report.kit.charts import OutputError
+from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import KeyFigure, PageSection
 
 
@@ -85,7 +86,7 @@ def demo_output_errors(reports: Sequence[CheckReport]) -> list[OutputError]:
 
 def error_words(error: float) -> str:
     """A relative error for a reader."""
-    return f"{error:.1e}" if error else "no difference"
+    return format_number(error, 2) if error else "no difference"
 
 
 def largest_error(reports: Sequence[CheckReport], kind: str) -> float:

@@ -27,6 +27,7 @@ from tank2sim.report.kit.charts import (
     history_chart,
     track_chart,
 )
+from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
 from tank2sim.report.kit.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
@@ -198,7 +199,7 @@ def _stability_section(
     )
     return PageSection(
         heading="Mariner: stability",
-        text=f"C′ = {judged[THIRD].criterion:.3g}: {_verdict(judged[THIRD])} on a straight course.",
+        text=f"C′ = {format_number(judged[THIRD].criterion, 3)}: {_verdict(judged[THIRD])} on a straight course.",
         tables=[_nomoto_table(judged), imo],
         charts=[Illustration(chart=chart)],
     )
@@ -238,7 +239,7 @@ def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stabili
             label="Straight-line stability",
             value=_verdict(judged),
             verdict=Verdict.PASSED if judged.stable else Verdict.CAUTION,
-            note=f"C′ = {judged.criterion:.2e}",
+            note=f"C′ = {format_number(judged.criterion, 3)}",
         ),
     ]
 

@@ -84,7 +84,7 @@ _CARDS = (("turn_35", "advance_m"), ("turn_35", "tactical_diameter_m"), ("zigzag
 
 
 def _cards(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
-    """Label, value and unit of what stands at the top of the page; of several overshoots the first."""
+    """Label, value and unit of the figures at the top of the page; of the overshoots, the first one alone."""
     cards = []
     for run, name in _CARDS:
         value = figures.get(run, {}).get(name)

@@ -320,7 +320,7 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
     assert tank2sim("report", "i.json", "-o", "r.html", cwd=tmp_path).returncode == 0
     assert (tmp_path / "i.html").read_bytes() == (tmp_path / "r.html").read_bytes()
     reported = json.loads((tmp_path / "i.json").read_text())
-    chart = charts_of(result_page(reported, "i.json"))["Influence on criterion_C, K_per_s"]
+    chart = charts_of(result_page(reported, "i.json"))["Influence on criterion C"]
     bars = {(row["name"], row["exact"]) for row in rows_of(chart.chart) if row.get("run") == "exact slope"}
     exact = reported["influence_percent"]["criterion_C"]["derivatives.Nr"]["exact"]
     assert any(name == "Nr" and value == pytest.approx(exact, rel=1e-5) for name, value in bars)

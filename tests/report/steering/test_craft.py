@@ -106,7 +106,9 @@ class TestInABrowser:
         assert voyage["order_starboard"][-1] == pytest.approx(-1, abs=2e-3)
 
     def test_keys_move_the_levers_and_a_zigzag_turns_by_difference(self, page, tmp_path):
+        # The dials are hidden, as on paper: there is nothing to draw on, and nothing to say in the console.
         steps = """
+          document.querySelector(".instruments").style.display = "none";
           press("x");
           press("w"); press("w"); press("ArrowRight");
           seen.keys = [at("set-thrusters.port.command").value, at("set-thrusters.starboard.command").value];

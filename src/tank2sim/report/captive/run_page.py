@@ -100,7 +100,11 @@ def run_page(found: Json) -> Page:
 def _verdict(runs: Sequence[Json], compared: int, odd: int) -> str:
     """Whether the runs are good, and which derivative each is surest of."""
     faults = sum(len(run["faults"]) for run in runs)
-    parts = [f"{faults} faults: not to be used as they are." if faults else "No fault is found."]
+    parts = [
+        f"{faults} {'fault' if faults == 1 else 'faults'}: not to be used as recorded."
+        if faults
+        else "No fault is found."
+    ]
     if compared:
         parts.append(
             f"The repeats differ by more than their noise in {odd} of {compared} coefficients."

@@ -31,6 +31,7 @@ from tank2sim.report.gap.text import (
     as_percent,
     effect_in_words,
     effects_of,
+    found_in_words,
     meaning,
     or_nan,
     parameter_cells,
@@ -38,7 +39,6 @@ from tank2sim.report.gap.text import (
     sizes_of_candidates,
     trial_name,
     verdict_context,
-    verdict_in_words,
     with_error,
 )
 from tank2sim.report.kit.json_values import Json
@@ -86,8 +86,8 @@ def gap_page(found: Json) -> Page:
 
     sections = [
         PageSection(
-            heading="Verdict",
-            text=verdict_in_words(found),
+            heading="What was found",
+            text="\n\n".join(f"Caution: {caution}." for caution in found["cautions"]),
             tables=[*_parameters(found), *_by_trial(found)],
             charts=drawn("worst_tracks"),
         ),
@@ -131,7 +131,13 @@ def gap_page(found: Json) -> Page:
     held_out = len(found["trials"]) - fitting
     subtitle = f"What the model lacks, from {_count(fitting, 'trial')} and {held_out or 'none'} held out"
     shown = [section for section in sections if section.text or section.tables or section.charts]
-    return Page(title=found["ship"], subtitle=subtitle, figures=_key_figures(found), sections=shown)
+    return Page(
+        title=found["ship"],
+        subtitle=subtitle,
+        verdict=found_in_words(found),
+        figures=_key_figures(found),
+        sections=shown,
+    )
 
 
 def _coefficients(found: Json) -> PageTable | None:

@@ -58,7 +58,7 @@ def set_misfit(found: Json, version: str, *, held_out: bool) -> float | None:
 
 def verdict_in_words(found: Json) -> str:
     """What was found, in a sentence or two, and what is to be said against it."""
-    return " ".join([_found(found), *(f"Caution: {caution}." for caution in found["cautions"])])
+    return " ".join([found_in_words(found), *(f"Caution: {caution}." for caution in found["cautions"])])
 
 
 def probabilities_in_words(found: Json) -> list[str]:
@@ -106,7 +106,8 @@ def as_percent(probability: float | None) -> str:
     return "< 1 %" if percent < 1 else "> 99 %" if percent > 99 else f"{percent:.0f} %"
 
 
-def _found(found: Json) -> str:
+def found_in_words(found: Json) -> str:
+    """What was found, in a sentence or two."""
     verdict, effects = found["verdict"], found["effects"]
     after = set_misfit(found, "after", held_out=False)
     follows = "" if after is None else f" follows the fitting trials to {noises(after)}"

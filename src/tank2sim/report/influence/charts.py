@@ -59,17 +59,20 @@ def short_name(key: str, parameter: Mapping[str, Json]) -> str:
     return str(parameter.get("name") or key.removeprefix("derivatives."))
 
 
+_ORDINALS = ("first", "second", "third", "fourth")
+
+
 def figure_label(text: str) -> str:
     """Words for a figure, without its unit: ``advance_m@35`` is ``advance, 35 deg``."""
     kind, _, argument = text.partition("@")
-    words = re.sub(r"(?<=[a-z])(?=\d)", " ", in_words(kind)[0])
+    words = re.sub(r"^overshoot(\d)$", lambda found: f"{_ORDINALS[int(found[1]) - 1]} overshoot", in_words(kind)[0])
     return f"{words}, {argument} deg" if argument else words
 
 
 def most_influential(result: InfluenceData, row: int) -> list[int]:
     """Places of the parameters with the largest K % on one figure, largest first."""
     sizes = np.nan_to_num(np.abs(result.exact[row]))
-    order = [int(place) for place in np.argsort(-sizes, kind="stable") if sizes[place] > 1e-6 * sizes.max()]
+    order = [int(place) for place in np.argsort(-sizes, kind="stable") if sizes[place] > 1e-3 * sizes.max()]
     return order[:_MOST_BARS]
 
 

@@ -74,7 +74,11 @@ def _verdict(result: InfluenceData, tuned: Mapping[str, Json] | None) -> str:
     parts = []
     for row, text in list(enumerate(result.figures))[:3]:
         if order := most_influential(result, row):
-            parts.append(f"{figure_label(text)} by {result.names[order[0]]} ({result.exact[row][order[0]]:+.2g} %)")
+            parts.append(
+                f"{figure_label(text)} by {result.names[order[0]]} ({result.exact[row][order[0]]:+.2g} %)".replace(
+                    "-", "−"
+                )
+            )
     return f"What 10 % more of one number moves most: {'; '.join(parts)}." if parts else ""
 
 
@@ -112,7 +116,7 @@ def _all_coefficients(result: InfluenceData) -> PageSection:
     for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference)):
         for first in range(0, count, _COLUMNS):
             rows = range(first, min(first + _COLUMNS, count))
-            part = f", figures {rows[0] + 1} to {rows[-1] + 1}" if count > _COLUMNS else ""
+            part = f", from {figure_label(result.figures[first])} on" if count > _COLUMNS else ""
             tables.append(_table(f"{caption}{part}", result, K, rows))
     return PageSection(heading="Coefficients of all parameters", tables=tables)
 

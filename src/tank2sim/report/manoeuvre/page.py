@@ -94,6 +94,9 @@ def _title(result: Json) -> str:
         "zigzag": f"zigzag {size}, first to {side}",
         "pullout": f"pull-out from {size}° of rudder",
         "spiral": "direct spiral",
+        "difference": f"turning circle to {side}, {size} rpm between the sides",
+        "spin": f"turn on the spot to {side}, {size} rpm",
+        "straight": f"straight course from rest, {argument} rpm",
         "stop": f"stop with {argument} rpm" if argument else "full astern stop",
     }
     return titles.get(kind, str(result["manoeuvre"]))
@@ -153,13 +156,20 @@ def _verdict(result: Json, tiles: Sequence[KeyFigure]) -> str:
         return "The yaw rates from both sides stay apart: the ship is unstable on a straight course, or very slow."
     judged = [tile for tile in tiles if tile.limit is not None]
     if not judged:
-        return _loop_words(result) if _kind(result) == "spiral" else ""
+        return (_loop_words(result) if _kind(result) == "spiral" else "") or _first_figures(tiles)
     if failed := [tile.label.lower() for tile in judged if tile.verdict is Verdict.FAILED]:
         return f"Beyond the limit of IMO MSC.137(76): {' and '.join(failed)}."
     if any(tile.verdict is Verdict.CAUTION for tile in judged):
         return "The run leaves the range of the card: figures that were settled there have no verdict."
     names = " and ".join(tile.label.lower() for tile in judged)
     return f"Within the limits of IMO MSC.137(76): {names}."
+
+
+def _first_figures(tiles: Sequence[KeyFigure]) -> str:
+    """The first three figures as a sentence; empty without any."""
+    shown = [f"{tile.label.lower()}: {format_number(float(tile.value), 3)} {tile.unit}".strip() for tile in tiles[:3]]
+    text = "; ".join(shown)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def _both_sides(result: Json) -> tuple[Json, Json]:
