@@ -230,6 +230,36 @@ def test_a_log_of_nmea_2000_holds_what_was_written(tmp_path) -> None:
     assert [stretch.kind.value for stretch in log(path).found if stretch.kind.excites] == ["zigzag", "turn"]
 
 
+@pytest.mark.parametrize("form", ["canboat", "actisense", "gateway"])
+def test_a_log_of_nmea_2000_is_the_same_in_every_form(tmp_path, form) -> None:
+    pytest.importorskip("nmea2000")
+    begin = 86400 - T0 % 86400 - 300  # midnight falls into the log
+    lines = []
+    for line in candump_lines():
+        stamp_s, _, frame_hex = line.split()
+        number, data = int(frame_hex[:8], 16), bytes.fromhex(frame_hex[9:])
+        pgn, source = number >> 8 & 0x1FFFF, number & 0xFF  # all are broadcast
+        moment = pd.Timestamp(float(stamp_s[1:-1]) + begin, unit="s")
+        milli = f"{moment.microsecond // 1000:03d}"
+        lines.append(
+            {
+                "canboat": f"{moment:%Y-%m-%dT%H:%M:%S}.{milli}Z,2,{pgn},{source},255,{len(data)},"
+                + ",".join(f"{byte:02x}" for byte in data),
+                "actisense": f"A{moment:%H%M%S}.{milli} {source:02X}FF2 {pgn:05X} {data.hex().upper()}",
+                "gateway": f"{moment:%H:%M:%S}.{milli} R {number:08X} " + " ".join(f"{byte:02X}" for byte in data),
+            }[form]
+        )
+    (tmp_path / "voyage.log").write_text("\n".join(lines) + "\n", encoding="ascii")
+    (tmp_path / "candump.log").write_text("\n".join(candump_lines()) + "\n", encoding="ascii")
+    found, expected = read_log(tmp_path / "voyage.log"), read_log(tmp_path / "candump.log")
+    assert found.dated == (form == "canboat")
+    assert {one.name for one in found.streams} == {one.name for one in expected.streams}
+    for quantity in ("heading", "rudder_angle", "latitude"):
+        one, other = stream_of(found, quantity), stream_of(expected, quantity)
+        assert np.array_equal(one.values, other.values)
+        assert one.time_s - one.time_s[0] == pytest.approx(other.time_s - other.time_s[0], abs=1.1e-3)
+
+
 def test_a_telemetry_log_holds_what_was_written(tmp_path) -> None:
     pytest.importorskip("pymavlink")
     import struct

@@ -38,6 +38,9 @@ _FIELDS: dict[int, dict[str, tuple[str, str]]] = {
 """Fields of the messages (PGN) by the names of canboat, with the unit of the library and the quantity."""
 
 _SYSTEM_TIME = 126992
+_CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
+"""Time of day of Actisense's ASCII and of the raw format of gateways, without a date."""
+
 _TIMED = re.compile(r"^\(\d+\.\d+\)|^\d{4}-\d\d-\d\d|^\d\d:\d\d:\d\d\.|^A\d{6}\.")
 _LINES = (
     re.compile(rb"^\([\d.]+\)\s+\S+\s+[0-9A-Fa-f]{8}#"),
@@ -58,7 +61,8 @@ def read_nmea2000(path: Path) -> VesselLog:
     """Read a text log of NMEA 2000: headings, rates of turn, rudders, engines, speeds, positions and wind.
 
     Times are those of the recorder, set to UTC by the system time (PGN 126992) where the log holds it; without a time
-    stamp of the recorder they are those of the system times before and after.
+    stamp of the recorder they are those of the system times before and after. Time stamps without a date and without a
+    system time give a log without a date.
 
     Raises
     ------
@@ -93,7 +97,8 @@ class _Reader:
         self.columns: dict[tuple[int, int, str, str], _Column] = defaultdict(_Column)
         self.units: dict[tuple[int, str], str] = {}
         self.ticks = _Column()
-        self.timed = True
+        self.timed = self.dated = True
+        self.days, self.last_s = 0, 0.0
 
     def take(self, number: int, line: str) -> None:
         """Take a line."""
@@ -106,7 +111,8 @@ class _Reader:
             return
         if message is None:
             return
-        stamp = message.timestamp.replace(tzinfo=dt.UTC).timestamp()
+        clock = _CLOCK.match(line)
+        stamp = self._of_day(clock) if clock else message.timestamp.replace(tzinfo=dt.UTC).timestamp()
         values = {entry.id: entry.value for entry in message.fields}
         if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
             moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)
@@ -116,6 +122,14 @@ class _Reader:
                 self.units[message.PGN, name] = unit
                 where = _quantity(message.PGN, quantity, values)
                 _append(self.columns[message.PGN, message.source, name, where], stamp, float(value), number)
+
+    def _of_day(self, clock: re.Match[str]) -> float:
+        """Time of day, s, which goes on over midnight."""
+        hours, minutes, seconds = (float(part) for part in clock.groups() if part is not None)
+        time = 3600 * hours + 60 * minutes + seconds
+        self.days += time < self.last_s - 43200
+        self.last_s, self.dated = time, False
+        return 86400 * self.days + time
 
     def log(self) -> VesselLog:
         """The log after the last line."""
@@ -144,7 +158,8 @@ class _Reader:
         if spoilt := self.counts["corrupted"]:
             text = f"{spoilt} of {self.counts['lines']} lines are corrupted and left out"
             findings.append(LogFinding("note", text))
-        return VesselLog(self.path, "NMEA 2000", tuple(streams), dict(self.counts), tuple(findings))
+        dated = self.dated or len(ticks.values) > 0
+        return VesselLog(self.path, "NMEA 2000", tuple(streams), dict(self.counts), tuple(findings), dated)
 
 
 def _append(column: _Column, stamp: float, value: float, number: int) -> None:
