@@ -104,7 +104,7 @@ class SteadyTurning:
     ended: tuple[str, str]
     notices: tuple[str, ...]
 
-    @property
+    @cached_property
     def stable(self) -> NDArray[np.bool_]:
         """True (k,) where the turn is stable with the rudder held; on a fold it is not."""
         return np.asarray(self.growth_per_s < -1e-9 * np.max(np.abs(self.growth_per_s)))
@@ -113,10 +113,13 @@ class SteadyTurning:
     def _along(self) -> CubicHermiteSpline:
         return CubicHermiteSpline(self.arc, np.column_stack([self.rudder_rad, self.yaw_rate_radps]), self.slope)
 
+    @cached_property
+    def _rudder_along(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, self.rudder_rad, self.slope[:, 0])
+
     def turns_at(self, rudder_rad: float) -> list[tuple[float, bool]]:
         """Yaw rate (rad/s) and stability of every steady turn of the curve at a rudder angle, along the curve."""
-        rudder = CubicHermiteSpline(self.arc, self.rudder_rad, self.slope[:, 0])
-        places = np.unique(np.round(rudder.solve(rudder_rad, extrapolate=False), 12))
+        places = np.unique(np.round(self._rudder_along.solve(rudder_rad, extrapolate=False), 12))
         before = np.clip(np.searchsorted(self.arc, places, side="right") - 1, 0, len(self.arc) - 2)
         stable = self.stable
         # Between a fold and its neighbour the neighbour's word holds.
