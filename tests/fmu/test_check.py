@@ -23,7 +23,7 @@ from tank2sim.fmu.check import LIMITS, compare_with_model
 from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
-from tank2sim.fmu.reference import by_scheme, exactly
+from tank2sim.fmu.reference import by_scheme, exactly, reference_errors
 from tank2sim.fmu.unpacking import embedded_card
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -95,6 +95,18 @@ def test_a_wrong_equation_fails(
     assert not report.passed
     for kind in KINDS:
         assert max(report.errors[kind].values()) > LIMITS[kind]  # type: ignore[index]
+
+
+@pytest.mark.parametrize(("share", "weight"), [(0.0, 0.0), (0.5, 0.5), (2.0, 1.0)])
+def test_an_error_of_a_direction_counts_by_the_size_of_its_velocity(share: float, weight: float, hull: Model) -> None:
+    place, speed = (hull.outputs.index(name) for name in ("motion.beta", "motion.speed"))
+    expected = np.zeros((2, len(hull.outputs)))
+    expected[1, speed] = share * hull["motion.speed"].nominal
+    found = expected.copy()
+    found[1, place] = 1e-3
+    errors = reference_errors(hull, expected, dict(zip(hull.outputs, found.T, strict=True)))
+    assert errors.pop("motion.beta") == pytest.approx(weight * 1e-3 / hull["motion.beta"].nominal)
+    assert not any(errors.values())
 
 
 def test_a_sign_changed_in_the_generated_code_fails(

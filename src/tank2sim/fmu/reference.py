@@ -16,6 +16,13 @@ from tank2sim.simulation.scheme import runge_kutta_step
 _TOLERANCE = 1e-11
 _STEP_COUNT_ROUNDING = 1e-9
 
+DIRECTIONS = {
+    "motion.beta": "motion.speed",
+    "motion.cog": "motion.sog",
+    "wind.relative_direction": "wind.relative_speed",
+}
+"""Output that is the direction of a velocity to the one that is its size: as that vanishes, any rounding turns it."""
+
 
 def by_scheme(model: Model, run: InputSequence) -> Array:
     """Outputs (K + 1, ny) at the communication points, by the internal steps that Co-Simulation takes.
@@ -65,14 +72,25 @@ def exactly(model: Model, run: InputSequence) -> Array:
 
 
 def reference_errors(model: Model, expected: Array, found: Mapping[str, Array]) -> dict[str, float]:
-    """:func:`relative_errors` of a model's outputs, `expected` (K + 1, ny) in their order."""
+    """:func:`relative_errors` of a model's outputs, `expected` (K + 1, ny) in their order.
+
+    Errors of :data:`DIRECTIONS` count by the size of their velocity over its nominal value, 1 at most.
+    """
     columns = dict(zip(model.outputs, expected.T, strict=True))
     angles = {name for name in model.outputs if model[name].unit == "rad" and name not in model.state_names}
-    return relative_errors(columns, found, {name: model[name].nominal for name in model.outputs}, angles)
+    sizes = {
+        name: columns[size] / model[size].nominal for name, size in DIRECTIONS.items() if {name, size} <= {*columns}
+    }
+    weights = {name: np.minimum(np.abs(share), 1.0) for name, share in sizes.items()}
+    return relative_errors(columns, found, {name: model[name].nominal for name in model.outputs}, angles, weights)
 
 
 def relative_errors(
-    expected: Mapping[str, Array], found: Mapping[str, Array], nominals: Mapping[str, float], angles: Collection[str]
+    expected: Mapping[str, Array],
+    found: Mapping[str, Array],
+    nominals: Mapping[str, float],
+    angles: Collection[str],
+    weights: Mapping[str, Array] | None = None,
 ) -> dict[str, float]:
     """Name to the largest error, relative to the larger of the signal's range in the run and its nominal value.
 
@@ -84,12 +102,16 @@ def relative_errors(
         Their nominal values; 0 counts as 1.
     angles : collection of str
         Those (rad) that are calculated again at each point: they may jump by a full turn, a moment sooner or later.
+    weights : mapping, optional
+        Name to the weight of each error (K + 1,), by default 1.
     """
     errors = {}
     for name, signal in expected.items():
         difference = np.abs(found[name] - signal)
         if name in angles:
             difference = np.minimum(difference, np.abs(difference - 2 * np.pi))
+        if weights and name in weights:
+            difference = difference * weights[name]
         errors[name] = float(np.max(difference)) / max(float(np.ptp(signal)), abs(nominals[name]) or 1.0)
     return errors
 
