@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.report.kit.numbers import format_column, format_number, is_number_text
+from tank2sim.report.kit.numbers import format_column, format_number, is_number_text, without_exponents
 
 
 @pytest.mark.parametrize(
@@ -61,3 +61,8 @@ def test_a_column_keeps_gaps_and_zeros():
 def test_truth_values_are_no_numbers():
     assert is_number_text(np.float32(1)) and is_number_text(3)
     assert not is_number_text(True) and not is_number_text("3")
+
+
+def test_numbers_in_text_lose_their_exponents_and_all_else_stays() -> None:
+    text = "B1, B2: 2.2e+04 (qr) and -3e-09 kg, above 225; 1e5 and file_2e+04x"
+    assert without_exponents(text) == "B1, B2: 22\u202f000 (qr) and −3×10⁻⁹ kg, above 225; 1e5 and file_2e+04x"

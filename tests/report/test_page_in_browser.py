@@ -129,11 +129,12 @@ const measure = () => {
   document.body.dataset.seen = JSON.stringify(pages.map((page) => {
     page.querySelector("details.part").open = true;
     const tops = (found) => [...found].map((one) => one.getBoundingClientRect())
-      .filter((box) => box.width > 100).map((box) => Math.round(box.top));
+      .filter((box) => box.width > 100 && box.height > 100).map((box) => Math.round(box.top));
     return {
       page: page.documentElement.scrollWidth,
       halves: tops(page.querySelectorAll("figure.half")),
-      panels: tops(page.querySelector("figure:not(.half)").querySelectorAll(".background")),
+      panels: [...page.querySelectorAll("figure:not(.half)")].slice(0, 3)
+        .map((figure) => tops(figure.querySelectorAll(".background"))),
       folded: page.querySelector("details.part svg").getBoundingClientRect().width,
     };
   }));
@@ -145,9 +146,16 @@ measure();
 def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_charts_are_drawn(charts, tmp_path):
     half = Illustration(chart=charts["track"], half=True)
     panel = alt.Chart(alt.Data(values=[{"a": 1}])).mark_point().encode(x="a:Q", y="a:Q").properties(width=300)
-    beside = Illustration(chart=alt.hconcat(panel, panel, usermeta=STACKS))
+    kinds = (
+        alt.Chart(alt.Data(values=[{"a": 1, "k": "one"}, {"a": 2, "k": "two"}])).mark_point().encode(x="a:Q", y="a:Q")
+    )
+    grids = [
+        alt.hconcat(panel, panel, usermeta=STACKS),
+        alt.concat(panel, panel, columns=3),
+        alt.vconcat(kinds.properties(width=300).facet(column="k:N"), usermeta=STACKS),
+    ]
     sections = [
-        PageSection(heading="First", charts=[half, half, beside]),
+        PageSection(heading="First", charts=[half, half, *(Illustration(chart=grid) for grid in grids)]),
         PageSection(heading="Folded", charts=[Illustration(chart=charts["history"])], folded=True),
     ]
     inner = escape(render_page(Page(title="Places", verdict="It fits.", sections=sections)))
@@ -156,4 +164,5 @@ def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_
     wide, narrow = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
     assert narrow["page"] <= 400 and wide["folded"] > 400 and 200 < narrow["folded"] < 400
     assert wide["halves"][0] == wide["halves"][1] and narrow["halves"][0] < narrow["halves"][1]
-    assert len(set(wide["panels"])) == 1 and narrow["panels"][0] < narrow["panels"][-1]
+    for side_by_side, stacked in zip(wide["panels"], narrow["panels"], strict=True):
+        assert len(set(side_by_side)) == 1 and stacked[0] < stacked[-1]

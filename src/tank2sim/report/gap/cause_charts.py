@@ -15,7 +15,17 @@ from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
 from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.charts import SETS, small
 from tank2sim.report.gap.text import as_percent, or_nan, trial_name
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, extent, plain, series_look, with_unit
+from tank2sim.report.kit.chart_parts import (
+    NUMBER,
+    STACKS,
+    Chart,
+    ChartRecord,
+    data,
+    extent,
+    plain,
+    series_look,
+    with_unit,
+)
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
 from tank2sim.units import in_words
@@ -35,7 +45,7 @@ _MISSING = {
     "east": ("velocity to east", "m/s"),
     "ahead": ("velocity ahead", "m/s"),
     "starboard": ("velocity to starboard", "m/s"),
-    "turning": ("turning (rate of heading less yaw rate)", "deg/s"),
+    "turning": ("rate of heading", "deg/s"),
 }
 
 
@@ -91,7 +101,9 @@ def lacking_chart(lacking: Json, *, title: str = "") -> alt.HConcatChart:
     main = alt.layer(*layers).properties(width=400, height=280)
     shares = alt.hconcat(main, _explained(lacking), spacing=24)
     return shares.properties(
-        title=title, description=f"Missing {what.words} over {words}, and what each state explains."
+        title=title,
+        description=f"Missing {what.words} over {words}, and what each state explains.",
+        usermeta=STACKS,
     )
 
 
@@ -213,7 +225,7 @@ def expected_chart(test: Json, *, title: str = "") -> alt.LayerChart | None:
     rows: list[ChartRecord] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
     if not rows:
         return None
-    chart = _bars(rows, "expected difference between the explanations (noise units, all readings together)", width=430)
+    chart = _bars(rows, "expected difference (noise units)", width=430)
     return chart.properties(title=title, description="Expected difference in each manoeuvre.")
 
 
@@ -230,7 +242,9 @@ def agreement_chart(found: Json, *, title: str = "") -> alt.HConcatChart | None:
         return None
     chart = alt.hconcat(*panels, spacing=20).resolve_scale(color="shared", shape="shared")
     return chart.properties(
-        title=title, description="Each trial's own estimate of the parameters, with 95 % intervals."
+        title=title,
+        description="Each trial's own estimate of the parameters, with 95 % intervals.",
+        usermeta=STACKS,
     )
 
 

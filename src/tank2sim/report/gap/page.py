@@ -215,8 +215,8 @@ _CAPTIONS = {
     "force": f"The force that the given card needs in addition to follow the measurements. {_MEANS}",
     "agreement": "Points: each trial's own estimate; bars: 95 % intervals. Grey: all fitting trials together. Trials "
     "that determine little may leave the picture.",
-    "expected": "The larger, the clearer the manoeuvre would decide; the difference is beyond what uncertain "
-    "parameters can make up for.",
+    "expected": "Difference between the explanations, of all readings together, beyond what uncertain parameters can "
+    "make up for: the larger, the clearer the manoeuvre would decide.",
 }
 
 

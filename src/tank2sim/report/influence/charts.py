@@ -141,7 +141,7 @@ def variance_chart(result: InfluenceData) -> alt.Chart:
         Chart(data(rows))
         .mark_rect()
         .encode(
-            x=alt.X("name:N", sort=names, axis=alt.Axis(title=None, labelAngle=-60, ticks=False)),
+            x=alt.X("name:N", sort=names, axis=alt.Axis(title=None, labelAngle=-90, ticks=False)),
             y=alt.Y("figure:N", sort=figures, axis=axis),
             color=alt.Color("share:Q", scale=scale, legend=alt.Legend(title="share of the variance (%)")),
             tooltip=tooltip,

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import Chart, ChartRecord, data
+from tank2sim.report.kit.chart_parts import STACKS, Chart, ChartRecord, data
 
 BOTH, ALL = "both", "all"
 """The first setting of a switch, and that on paper: two series together, or more of them."""
@@ -63,6 +63,7 @@ def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: st
     return alt.vconcat(*maps, spacing=18, params=switch(models)).properties(
         title=alt.Title(title, subtitle=subtitle),
         description=f"Misfit by trial and signal in noise units, {' and '.join(models)}.",
+        usermeta=STACKS,
     )
 
 

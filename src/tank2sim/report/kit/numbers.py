@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from numbers import Integral, Real
 
@@ -33,6 +34,17 @@ def format_number(value: float, digits: int = 4) -> str:
         return _scientific(value, digits)
     decimals = _decimals(abs(value), digits)
     return _grouped(f"{value:.{_needed([value], decimals)}f}")
+
+
+def without_exponents(text: str) -> str:
+    """Text whose numbers with an exponent are as :func:`format_number` shows them.
+
+    Examples
+    --------
+    >>> without_exponents("off by 5e-06 m/s")
+    'off by 5×10⁻⁶ m/s'
+    """
+    return re.sub(r"-?\b\d+(\.\d+)?e[+-]\d+\b", lambda number: format_number(float(number[0]), 6), text)
 
 
 def format_column(values: Sequence[float], digits: int = 4) -> list[str]:

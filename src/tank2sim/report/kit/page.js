@@ -83,14 +83,19 @@
     return { ...config, legend: { ...legend, columns, layout: { ...layout, top } } };
   }
 
+  function inARow(chart) {
+    return Math.min(chart.columns, chart.concat?.length ?? chart.columns); // a row may have room for more panels than there are
+  }
+
   // Panels side by side that are wider than the page: fewer in a row, before they become too small to be read.
   function inFewerColumns(chart, width, room) {
-    return { ...chart, columns: Math.max(1, Math.floor((chart.columns * room) / width)) };
+    return { ...chart, columns: Math.max(1, Math.floor((inARow(chart) * room) / width)) };
   }
 
   // Panels side by side of a chart that says so go under each other, each with the labels of its own axis.
   function withStackedPanels(node) {
     const { hconcat, ...copy } = node;
+    if (copy.facet?.column) Object.assign(copy, { facet: copy.facet.column, columns: 1 });
     if (copy.vconcat) copy.vconcat = copy.vconcat.map(withStackedPanels);
     if (hconcat) copy.vconcat = hconcat.map(withLabels);
     return copy;
@@ -127,7 +132,7 @@
         before = null;
         continue;
       }
-      if (chart === charts[place] && chart.columns > 1 && room < LEAST_SHRINK * width) {
+      if (chart === charts[place] && inARow(chart) > 1 && room < LEAST_SHRINK * width) {
         chart = inFewerColumns(chart, width, room);
         before = null;
         continue;

@@ -14,7 +14,7 @@ from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.fit import DELAY, TOW_PARAMETERS
 from tank2sim.identification.tow.force import force_words
 from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
+from tank2sim.report.kit.numbers import format_number, without_exponents
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 from tank2sim.report.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
 
@@ -152,7 +152,8 @@ def _polynomials(found: Json) -> PageTable:
 
 def _speeds(found: Json) -> PageSection:
     """Readings, simulated speeds and their differences, and what the reader of the result must not miss."""
-    heading, speeds, notes = "Measured and computed speeds", found["speeds"], found["warnings"]
+    heading, speeds = "Measured and computed speeds", found["speeds"]
+    notes = [without_exponents(note) for note in found["warnings"]]
     if not speeds["simulated_mps"]:
         return PageSection(heading=heading, notes=notes)
     chart = tow_speed_chart(speeds, title="Speeds of the tows and of the models")
