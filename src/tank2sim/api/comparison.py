@@ -11,7 +11,7 @@ from tank2sim.analysis.validation.comparison import CardComparison, compare_card
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.cards import Card, SteeredCard
+from tank2sim.cards import Card, CraftCard, SteeredCard
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -21,17 +21,8 @@ if TYPE_CHECKING:
 _MOST = 10
 """Coefficients of each card that the tables show; JSON and page have all. Project choice: they fit a screen."""
 
-_SHOWN = (
-    "final_speed_mps",
-    "steady_rate_degps",
-    "steady_diameter_m",
-    "final_rate_degps",
-    "advance_m",
-    "tactical_diameter_m",
-    "overshoot_1_deg",
-    "overshoot_2_deg",
-    "track_reach_m",
-)
+_SHOWN = ("advance_m", "tactical_diameter_m", "overshoot_1_deg", "overshoot_2_deg", "track_reach_m")
+_SHOWN_OF_CRAFT = ("final_speed_mps", "steady_diameter_m", "steady_rate_degps", "final_rate_degps")
 
 
 class ComparisonResult(Result):
@@ -132,6 +123,7 @@ class ComparisonResult(Result):
     @property
     def tables(self) -> tuple[ResultTable, ...]:
         """Of each card the coefficients farthest from the reference, and the main figures of all."""
+        shown = _SHOWN_OF_CRAFT if isinstance(self.ships[0].card, CraftCard) else _SHOWN
         figures = ResultTable(
             "Figures (standard deviation)",
             ("trial", "figure", *self.labels),
@@ -143,7 +135,7 @@ class ComparisonResult(Result):
                 ]
                 for trial in self.comparison.trials
                 for row in trial.figures
-                if row.name in _SHOWN
+                if row.name in shown
             ],
         )
         return *(self._farthest(place, label) for place, label in self._others()), figures

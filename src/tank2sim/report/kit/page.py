@@ -79,7 +79,7 @@ class Column:
     digits: int = 4
 
 
-_SHORT = 28
+_SHORT = 24
 """Characters of text in a table that are not broken into lines."""
 
 _LONG = 10
