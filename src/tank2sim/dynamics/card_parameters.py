@@ -75,8 +75,8 @@ def study_model(card: SteeredCard) -> Model:
 
 def card_parameters(card: SteeredCard, model: Model) -> tuple[CardParameter, ...]:
     """Parameters of a card that are in its model, except for those that are zero without a standard error."""
-    own = _of_craft(card) if isinstance(card, CraftCard) else _of_ship(card, model)
-    found = (*own, *_effects(card, model))
+    hull = _of_craft(card) if isinstance(card, CraftCard) else _of_ship(card, model)
+    found = (*hull, *_effects(card, model))
     known = set(model.parameter_names)
     return tuple(
         parameter

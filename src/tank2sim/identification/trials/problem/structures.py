@@ -17,6 +17,7 @@ from tank2sim.cards.reading import linear_card, revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.effects import hull, loaded_rudder
+from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.plugins import Registry
 
@@ -128,9 +129,12 @@ def structure_that_adds(card: ManoeuvringCard, effects: Collection[str]) -> str 
     """
     if card.model.kind == "mmg":
         return None  # its structure is its own
-    there = {entry.name for entry in card.effects}
+    present = {entry.name for entry in card.effects}
     for name, structure in STRUCTURES.items():
-        added = {entry.name for entry in structure.start(card).effects} - there
+        try:
+            added = {entry.name for entry in structure.start(card).effects} - present
+        except InputError:  # a structure of an installed package that does not take this card
+            continue
         if added and added == set(effects):
             return name
     return None
