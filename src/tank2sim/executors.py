@@ -19,6 +19,7 @@ from contextlib import contextmanager
 
 from tank2sim.cluster import EXECUTOR_OPTION, connected, working_for_another
 from tank2sim.errors import InputError
+from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
 PROCESSES = "processes"
@@ -120,6 +121,7 @@ def _prepare() -> None:
     is busy for minutes does not outlive, unseen, the one that began it and was killed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keep_freed_memory()
     warnings.simplefilter("ignore", PluginWarning)  # the process that began it has printed them
     import scipy.linalg  # noqa: F401  loads the libraries whose threads are limited: each processor has its process
     from threadpoolctl import threadpool_limits

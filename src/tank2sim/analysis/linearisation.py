@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import casadi as ca
-import control
 import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.straight_course import OperatingPoint, straight_course
+
+if TYPE_CHECKING:
+    import control
 
 __all__ = ["OperatingPoint", "following_states", "jacobians", "signal_name", "state_space", "straight_course"]
 
@@ -66,6 +69,8 @@ def state_space(
     settled : sequence of str
         Omitted states that follow the others at once (:func:`jacobians`).
     """
+    import control  # slow to load
+
     states = list(model.state_names if states is None else states)
     inputs = [v.name for v in model.inputs if not v.boolean] if inputs is None else list(inputs)
     outputs = list(model.outputs if outputs is None else outputs)

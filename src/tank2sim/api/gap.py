@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -20,7 +21,7 @@ from tank2sim.cards.covariance import not_referring
 from tank2sim.cards.derived import derived_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
-from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin
 from tank2sim.gap.diagnosis.error_intervals import acting
 from tank2sim.gap.fleet.search import nonlinear_card
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
@@ -382,9 +383,9 @@ def find_gap(
     """
     ship = nonlinear_card(as_ship(card).card)
     options = gap_options(effects, without, max_effects, workers, false_discovery)
-    fitted, held = fitted_and_held(trials, holdout, ship)
-    fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
-    with _cluster(executor) as pool:
+    with _workers(executor, workers) as pool:
+        fitted, held = fitted_and_held(trials, holdout, ship)
+        fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
         return GapResult(run_workflow(ship, fitted, held, options, progress, pool), fitted, held)
 
 
@@ -433,10 +434,14 @@ def gap_options(
 
 
 @contextmanager
-def _cluster(executor: str) -> Iterator[Executor | None]:
-    """The cluster; None for processes of this machine, which the search begins itself if it needs them."""
-    if check_executor(executor) == PROCESSES:
+def _workers(executor: str, workers: int | None) -> Iterator[Executor | None]:
+    """The cluster, or processes of this machine, which load what they need while the trials are read; None for one."""
+    local = check_executor(executor) == PROCESSES
+    count = processes_to_begin(workers)
+    if local and count == 1:
         yield None
         return
-    with executing(executor) as pool:
+    with executing(executor, count) as pool:
+        for _ in range(count if local else 0):
+            pool.submit(importlib.import_module, "tank2sim.gap.workflow")
         yield pool

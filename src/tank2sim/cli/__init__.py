@@ -22,6 +22,7 @@ import click
 
 from tank2sim import __version__
 from tank2sim.errors import InputError, close_name
+from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
 GROUPS = {
@@ -112,6 +113,7 @@ def tank2sim(ctx: click.Context) -> None:
 
 def main() -> None:
     """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
+    keep_freed_memory()
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
         code = _run()

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space
 from tank2sim.analysis.stability.straight_line import Nomoto, steering_states
 from tank2sim.dynamics.model import Model
+
+if TYPE_CHECKING:
+    import control
 
 HULL, GEAR, FIRST_ORDER = "rudder angle to yaw rate", "rudder order to yaw rate", "Nomoto, first order"
 
@@ -72,6 +75,8 @@ class SteeringResponse:
 
 def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> tuple[SteeringResponse, ...]:
     """The systems about a straight course that respond to the rudder (without one in the play of its gear)."""
+    import control  # slow to load
+
     steering = steering_states(model)
     hull = state_space(model, point, states=steering, inputs=["rudder.angle"], outputs=["motion.r"])
     systems = {HULL: hull}
@@ -105,6 +110,8 @@ def _times(poles: NDArray[np.complex128], slowest: float) -> NDArray[np.float64]
 def _response(
     label: str, system: control.StateSpace, omega: NDArray[np.float64], time: NDArray[np.float64]
 ) -> SteeringResponse:
+    import control
+
     response = np.asarray(system(1j * omega), dtype=complex).ravel()
     step = np.asarray(control.step_response(system, T=time).outputs, dtype=float).ravel()
     return SteeringResponse(

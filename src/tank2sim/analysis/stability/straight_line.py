@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
-import control
 import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians, state_space, straight_course
 from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.dynamics.model import Model
+
+if TYPE_CHECKING:
+    import control
 
 _ROUNDING = 1e-9
 """Relative size, by rounding, of a neutral mode or of the difference of equal slopes."""

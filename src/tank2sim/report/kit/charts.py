@@ -58,10 +58,14 @@ __all__ = [
 VEGALITE_VERSION = ".".join(alt.SCHEMA_VERSION.lstrip("v").split(".")[:2])
 """Version of Vega-Lite that Altair writes, and in which its charts are drawn: ``6.1``."""
 
+CHECKED_AGAINST_SCHEMA = False
+"""Whether each chart is held against the schema of Vega-Lite, which takes more than half of the time of a page. No
+chart's form depends on what a user gives: the tests of the pages set this, and a page is not delayed by it."""
+
 
 def chart_specification(chart: alt.TopLevelMixin) -> dict[str, Any]:
     """The Vega-Lite specification of a chart, without its looks; the same chart gives the same specification."""
-    specification: dict[str, Any] = chart.to_dict()
+    specification: dict[str, Any] = chart.to_dict(validate=CHECKED_AGAINST_SCHEMA)
     specification.pop("config", None)
     return specification
 

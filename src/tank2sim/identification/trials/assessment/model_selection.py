@@ -12,7 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from statsmodels.tsa.stattools import acovf
+from scipy.signal import correlate
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
@@ -99,7 +99,7 @@ def effective_samples(series: Sequence[Array]) -> float:
     sums = np.zeros(longest)
     for piece in series:
         for column in (piece / np.where(size > 0, size, 1.0)).T:
-            sums[: len(piece)] += len(piece) * acovf(column, demean=False, fft=True)
+            sums[: len(piece)] += correlate(column, column, method="fft")[len(piece) - 1 :]  # by lag, from 0
     correlations = sums[1:] / sums[0]
     negative = np.flatnonzero(correlations <= 0)
     positive = correlations[: negative[0]] if len(negative) else correlations
