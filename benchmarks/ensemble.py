@@ -52,7 +52,7 @@ from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.bands import figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, AskTogether, Draws, Ensemble, Question, _prepared, ensemble
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.run import simulate
 
 HERE = Path(__file__).parent
@@ -250,6 +250,7 @@ def users(rounds: int, together: int = 256, alone: int = 4) -> None:
         "simulate --ensemble, turn:35": (mariner, OfManoeuvre(ship, Turn(float(RUDDER)), None, none)),
         "simulate --ensemble, zigzag:10/10": (mariner, OfManoeuvre(ship, Zigzag(ten, ten), None, none)),
         "simulate --ensemble, stop (Esso Osaka)": (tanker, OfManoeuvre(other_ship, Stop(), None, none)),
+        "simulate --ensemble, spiral": (mariner, OfManoeuvre(ship, parse_manoeuvre("spiral"), None, none)),
         "stability --ensemble, all IMO criteria": (mariner, OfCriteria(ship)),
         "the same with a stop (Esso Osaka)": (tanker, OfCriteria(other_ship)),
         "influence --ensemble, advance and overshoot": (

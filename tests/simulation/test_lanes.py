@@ -15,12 +15,13 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
 from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
 from tank2sim.native.library import cached_library
 from tank2sim.simulation import lane_runs
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
-from tank2sim.simulation.manoeuvres import PullOut, Stop, Turn, Zigzag
+from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.run import simulate
 
@@ -68,6 +69,45 @@ def test_figures_in_lanes_are_those_of_single_runs(name: str, manoeuvre, duratio
         for place, state in enumerate(model.state_names):
             values = np.interp(times, run.trajectory.t, run.trajectory[state])
             np.testing.assert_allclose(found.states[number, :, place], values, rtol=1e-11, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+def test_spirals_in_lanes_are_those_of_single_runs_to_the_error_of_their_steps(name: str) -> None:
+    card = read_card(name)
+    assert isinstance(card, ManoeuvringCard)
+    model = build(card)
+    members, p = ships(card, model, 3)
+    spiral = SpiralManoeuvre((TWENTY, TEN, 0.0, -TEN, 0.0, TEN, TWENTY))
+    times = np.linspace(0.0, 3000.0, 31)
+    found = LaneManoeuvres(model).run(spiral, p, None, times)
+    assert found.fine.all() and np.isinf(found.left_s).all()
+    for number, member in enumerate(members):
+        run = simulate(model, spiral, parameters=member)
+        expected = single_figures(run.figures)
+        assert set(found.figures) == set(expected)
+        for figure, value in expected.items():
+            assert found.figures[figure][number] == pytest.approx(value, rel=1e-7, abs=1e-9), figure
+        inside = times <= run.trajectory.t[-1]
+        assert np.isnan(found.states[number, ~inside]).all()
+        for place, state in enumerate(model.state_names):
+            values = np.interp(times[inside], run.trajectory.t, run.trajectory[state])
+            # Steps begin anew where the steadiness is judged: states are interpolated between other samples.
+            np.testing.assert_allclose(found.states[number, inside, place], values, rtol=1e-5, atol=1e-2)
+    assert (found.figures["loop_width_deg"] > 0).all() == (name == "kvlcc2")
+
+
+def test_a_ship_that_leaves_all_bounds_in_a_spiral_and_the_range_of_its_card_are_found(mariner_card, mariner) -> None:
+    speed = mariner_card.model.speed_mps
+    narrow = build(revised(mariner_card, {}, {"model.valid_speed_mps": [0.79 * speed, 1.2 * speed]}))
+    spiral = SpiralManoeuvre((LARGE, 0.0, LARGE))
+    lost = {"derivatives.Nr": 5.0 * narrow.parameter_values()[narrow.parameter_names.index("derivatives.Nv")] * -1.0}
+    p = np.array([narrow.parameter_values(), narrow.parameter_values(lost)])
+    found = LaneManoeuvres(narrow).run(spiral, p)
+    assert found.fine.tolist() == [True, False]
+    assert np.isnan([values[1] for values in found.figures.values()]).all()
+    assert found.left_s[0] == pytest.approx(simulate(narrow, spiral).reading.exit_s, abs=narrow.step_s)
+    with pytest.raises(InputError):
+        simulate(narrow, spiral, parameters=lost)
 
 
 @pytest.mark.parametrize(("manoeuvre", "slowest"), [(Turn(LARGE), 0.79), (Zigzag(TWENTY, TWENTY), 0.87)])
@@ -206,7 +246,7 @@ def test_a_zigzag_with_more_executes_than_are_kept_is_run_by_itself(mariner_card
 
 def test_what_lanes_do_not_have_is_left_to_single_runs(mariner) -> None:
     assert runs_in_lanes(Turn(TEN)) and runs_in_lanes(Zigzag(TEN, TEN)) and runs_in_lanes(Stop())
-    assert not runs_in_lanes(Stop(), 100.0)
+    assert runs_in_lanes(SpiralManoeuvre((TEN, 0.0, TEN)), 100.0) and not runs_in_lanes(Stop(), 100.0)
     assert not runs_in_lanes(PullOut(TEN)) and not runs_in_lanes(Zigzag(TEN, TEN, lag_s=1.0))
     assert not runs_in_lanes(Turn(TEN, wait_s=2.0)) and not runs_in_lanes(Zigzag(TEN, TEN, course=0.1))
     with pytest.raises(NoLanesError):

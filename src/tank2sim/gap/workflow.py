@@ -60,7 +60,11 @@ from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, TEMPER, Decision, Strange, decide
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.problem_from_card import lowered_bound_notice, polynomial_over_trials
+from tank2sim.identification.trials.problem.problem_from_card import (
+    above_low_speed,
+    lowered_bound_notice,
+    polynomial_over_trials,
+)
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.identification.trials.problem.structures import structure_that_adds
 from tank2sim.records.trials import Trial
@@ -169,6 +173,7 @@ def run_gap_workflow(
     """
     options = options or GapOptions()
     given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
+    fitted, held = above_low_speed(card, fitted), above_low_speed(card, held)
     if card.roll is not None:
         fitted, held = _without_heel(fitted), _without_heel(held)
     # Small matrices: threads of the linear algebra library would wait for each other.

@@ -236,23 +236,35 @@ def zero_rate_rudders(rudders: Array, rates: Array) -> tuple[float, float]:
     return outward, back
 
 
+def spiral_loop(rudders: Array, rates: Array) -> tuple[float, float]:
+    """Width and height of the loop of a spiral, in the units of its arguments; zero of a ship without one.
+
+    Where the two ways give different rates at one rudder angle, the ship has two steady turns there: a loop, as wide as
+    the rudder has to go beyond one crossing of zero rate to reach the other.
+
+    Parameters
+    ----------
+    rudders, rates : array (n,)
+        As of :func:`zero_rate_rudders`.
+    """
+    half = len(rudders) // 2
+    height = float(np.max(np.abs(rates[: half + 1] - rates[half:][::-1])))
+    if not height > LOOP_HEIGHT * np.max(np.abs(rates)):
+        return 0.0, 0.0
+    crossings = zero_rate_rudders(rudders, rates)
+    return abs(crossings[0] - crossings[1]), height
+
+
 def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
     changes = np.flatnonzero(np.diff(run["rudder.command"]) != 0)
     ends = np.append(changes[len(changes) - len(rudders) + 1 :] + 1, len(run.t) - 1)
-    rates = np.degrees(run["motion.r"][ends])
-    angles = np.degrees(rudders)
-    half = len(angles) // 2
-    outward, back = rates[: half + 1], rates[half:][::-1]
-    # Where the two ways give different rates at one rudder angle, the ship has two steady turns there: a loop, as wide
-    # as the rudder has to go beyond one crossing of zero rate to reach the other.
-    height = float(np.max(np.abs(outward - back)))
-    loop = height > LOOP_HEIGHT * np.max(np.abs(rates))
-    crossings = zero_rate_rudders(angles, rates)
+    rates, angles = np.degrees(run["motion.r"][ends]), np.degrees(rudders)
+    width, height = spiral_loop(angles, rates)
     return {
         "rudder_deg": [float(angle) for angle in np.round(angles, 9)],
         "rate_degps": [float(rate) for rate in rates],
-        "loop_width_deg": float(abs(crossings[0] - crossings[1])) if loop else 0.0,
-        "loop_height_degps": height if loop else 0.0,
+        "loop_width_deg": width,
+        "loop_height_degps": height,
     }
 
 

@@ -1,4 +1,4 @@
-"""Figures of turns, zigzags and stops of many ships, from what their runs in lanes keep.
+"""Figures of turns, zigzags, stops and spirals of many ships, from what their runs in lanes keep.
 
 They are those of :mod:`tank2sim.simulation.figures` for a trajectory with a sample at each step, to rounding: the same
 Hermite cubics at crossings, the same cubics through four samples, for all ships at once.
@@ -23,12 +23,14 @@ from tank2sim.native.lanes import NoLanesError
 from tank2sim.simulation.card_range import entry_name, read_with, single_figures
 from tank2sim.simulation.figures import REST_SPEED, STEADY_SHARE
 from tank2sim.simulation.lane_runs import CROSSINGS, FINE, UNKNOWN, LanePlan, LaneResults, LaneRunner
+from tank2sim.simulation.lane_spirals import LaneSpirals, spiral_figures
 from tank2sim.simulation.manoeuvres import (
     LONGEST_LENGTHS,
     LONGEST_STOP,
     TURN_HEADING,
     ZIGZAG_EXECUTES,
     Manoeuvre,
+    SpiralManoeuvre,
     Stop,
     Turn,
     Zigzag,
@@ -104,12 +106,17 @@ class LaneFigures:
         return LaneFigures(figures, states, fine, left, self.doubtful)
 
 
-LaneManoeuvre = Turn | Zigzag | Stop
+LaneManoeuvre = Turn | Zigzag | Stop | SpiralManoeuvre
 """Manoeuvres that lanes have."""
+
+_Switched = Turn | Zigzag | Stop
 
 
 def runs_in_lanes(manoeuvre: Manoeuvre, duration_s: float | None = None) -> TypeGuard[LaneManoeuvre]:
-    """Whether lanes have this manoeuvre: a turn or a zigzag without delays of helm and gear, or a stop to its end."""
+    """Whether lanes have this manoeuvre: a turn or a zigzag without delays of helm and gear, a stop to its end, or a
+    direct spiral."""
+    if isinstance(manoeuvre, SpiralManoeuvre):
+        return True
     if isinstance(manoeuvre, Stop):
         return duration_s is None
     if isinstance(manoeuvre, Turn):
@@ -120,7 +127,7 @@ def runs_in_lanes(manoeuvre: Manoeuvre, duration_s: float | None = None) -> Type
 
 
 class LaneManoeuvres:
-    """Runs turns, zigzags and stops of a model in lanes.
+    """Runs turns, zigzags, stops and spirals of a model in lanes.
 
     Parameters
     ----------
@@ -169,7 +176,7 @@ class LaneManoeuvres:
 
         Parameters
         ----------
-        manoeuvre : Turn, Zigzag or Stop
+        manoeuvre : Turn, Zigzag, Stop or SpiralManoeuvre
             One of those for which :func:`runs_in_lanes` is true.
         p : array (n, np)
             Parameters of the model.
@@ -180,7 +187,8 @@ class LaneManoeuvres:
         inputs : mapping, optional
             Values in place of the model's, by name.
         pace : Pace
-            Step and precision. Ships that are `doubtful` are run again with the model's step in double precision.
+            Step and precision. Ships that are `doubtful` are run again with the model's step in double precision, and
+            so are all spirals.
         """
         u = self.model.input_values(inputs)
         if isinstance(manoeuvre, Stop):
@@ -188,6 +196,10 @@ class LaneManoeuvres:
         p = np.ascontiguousarray(p, dtype=float)
         (starts,) = self._start(p)
         place = self.model.parameter_names.index
+        if isinstance(manoeuvre, SpiralManoeuvre):
+            runs = LaneSpirals(self._runner).run(manoeuvre, p, starts, u, duration_s, times)
+            doubtful = np.zeros(len(p), dtype=np.bool_)
+            return LaneFigures(spiral_figures(manoeuvre, runs.rates), runs.states, runs.fine, runs.left, doubtful)
         ship_times = p[:, place("ship.length")] / p[:, place("ship.speed")]
         longest = LONGEST_STOP if isinstance(manoeuvre, Stop) else self._longest
         ends = longest * ship_times if duration_s is None else np.full(len(p), duration_s)
@@ -211,10 +223,10 @@ class LaneManoeuvres:
         doubtful = np.isfinite(left) | np.any([np.isnan(values) for values in figures.values()], axis=0)
         if isinstance(manoeuvre, Turn):
             doubtful |= self._unsteadiness(found) >= NEAR_STEADY * STEADY_SHARE
-        runs = LaneFigures(figures, found.states, fine, left, doubtful)
+        result = LaneFigures(figures, found.states, fine, left, doubtful)
         if pace == USUAL_PACE or not doubtful.any():
-            return runs
-        return runs.replaced(np.flatnonzero(doubtful), self.run(manoeuvre, p[doubtful], duration_s, times, inputs))
+            return result
+        return result.replaced(np.flatnonzero(doubtful), self.run(manoeuvre, p[doubtful], duration_s, times, inputs))
 
     def _by_itself(
         self,
@@ -238,7 +250,7 @@ class LaneManoeuvres:
             figures.setdefault(name, np.full(count, np.nan))[number] = value
         return True, math.inf if run.reading.exit_s is None else run.reading.exit_s
 
-    def _plan(self, manoeuvre: LaneManoeuvre, inputs: Array, starts: Array, *, timed: bool) -> tuple[LanePlan, Array]:
+    def _plan(self, manoeuvre: _Switched, inputs: Array, starts: Array, *, timed: bool) -> tuple[LanePlan, Array]:
         """The plan of a manoeuvre, and the levels (n, 2) at which its order changes."""
         if isinstance(manoeuvre, Stop):
             amidships = float(inputs[self.model.input_names.index("rudder.command")])
@@ -256,7 +268,7 @@ class LaneManoeuvres:
         goals = course + side * np.array([change, -change])
         return LanePlan(orders, "motion.psi", side, limit, watched, most, inputs), goals
 
-    def _levels(self, manoeuvre: LaneManoeuvre, starts: Array) -> Array:
+    def _levels(self, manoeuvre: _Switched, starts: Array) -> Array:
         """Levels (n, watches) of the watched states."""
         course = self._column(starts, "motion.psi")[:, None]
         if isinstance(manoeuvre, Turn):

@@ -56,7 +56,7 @@ enum {{ KEPT = NX }};
 #endif
 typedef struct {{
   double h, first, second, side;
-  long changing, limit, kept, watches, most, times;
+  long changing, limit, kept, watches, most, times, own; /* own: from the times of one ship to those of the next */
   const double *inputs, *limits, *at;
 }} Plan;
 typedef struct {{
@@ -138,6 +138,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
   for (long begin = 0; begin < members; begin += LANES) {{
     Group g;
     long member[LANES], due[LANES], events[LANES], open[LANES][2][2];
+    const double *at[LANES];
     V goal = all(0), sides = all(plan->side), end, level[2] = {{all(0), all(0)}}, steps = all(0), soon = all(INFINITY);
     V approach, slowest, fastest, speed, valid, left, way = all(0), lost = all(0);
     M active = ~none, waiting = none;
@@ -153,7 +154,8 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       LANE(end, l) = ends[k];
       LANE(goal, l) = goals[2 * k];
       for (int w = 0; w < plan->watches; ++w) LANE(level[w], l) = levels[k * plan->watches + w];
-      if (plan->times) LANE(soon, l) = plan->at[0];
+      at[l] = plan->at + k * plan->own;
+      if (plan->times) LANE(soon, l) = at[l][0];
     }}
     for (int i = 0; i < NU; ++i) g.u[i] = all(plan->inputs[i]);
     g.u[RUDDER] = all(plan->first);
@@ -213,12 +215,12 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
           if (!LANE(active, l)) continue;
           const double t = LANE(g.t, l), t_next = LANE(g.t_next, l), old = LANE(before_rudder, l);
           int finished = LANE(over, l) != 0;
-          for (; due[l] < plan->times && plan->at[due[l]] <= t_next; ++due[l]) {{
+          for (; due[l] < plan->times && at[l][due[l]] <= t_next; ++due[l]) {{
             double *row = found->states + (k * plan->times + due[l]) * NX;
-            const double share = t_next > t ? (plan->at[due[l]] - t) / (t_next - t) : 0.0;
+            const double share = t_next > t ? (at[l][due[l]] - t) / (t_next - t) : 0.0;
             for (int i = 0; i < NX; ++i) row[i] = LANE(g.x[i], l) + share * (LANE(g.next[i], l) - LANE(g.x[i], l));
           }}
-          if (plan->times) LANE(soon, l) = due[l] < plan->times ? plan->at[due[l]] : INFINITY;
+          if (plan->times) LANE(soon, l) = due[l] < plan->times ? at[l][due[l]] : INFINITY;
           if (LANE(bad, l)) {{
             found->ended[k] = {runaway};
             LANE(active, l) = 0;
@@ -297,7 +299,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
 class _Plan(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_double) for name in ("h", "first", "second", "side")),
-        *((name, ctypes.c_long) for name in ("changing", "limit", "kept", "watches", "most", "times")),
+        *((name, ctypes.c_long) for name in ("changing", "limit", "kept", "watches", "most", "times", "own")),
         *((name, ctypes.c_void_p) for name in ("inputs", "limits", "at")),
     )
 
@@ -343,8 +345,8 @@ class LanePlan:
         Crossings of each that are kept: 1, with the motion two lengths before the end, or up to :data:`CROSSINGS`.
     inputs : array (nu,)
         Inputs of the model; the rudder order among them is not used.
-    times : array (m,)
-        Times at which states are kept, s, rising.
+    times : array (m,) or (n, m)
+        Times at which states are kept, s, rising; of all ships, or of each.
     step_factor : int
         Length of an integration step over the model's.
     """
@@ -457,7 +459,7 @@ class LaneRunner:
             order_times=np.full((n, kept), np.nan),
             order_states=np.full((n, kept, nx), np.nan),
             windows=np.full((*shape, plan.most, SAMPLES, 2 + nx), np.nan),
-            states=np.full((n, len(at), nx), np.nan),
+            states=np.full((n, at.shape[-1], nx), np.nan),
             ended=np.zeros(n, dtype=np.int32),
             orders=np.zeros(n, dtype=np.int32),
             crossings=np.zeros(shape, dtype=np.int32),
@@ -474,7 +476,8 @@ class LaneRunner:
             kept,
             len(watched),
             plan.most,
-            len(at),
+            at.shape[-1],
+            at.shape[-1] if at.ndim == 2 else 0,
             inputs.ctypes.data,
             limits.ctypes.data,
             at.ctypes.data,

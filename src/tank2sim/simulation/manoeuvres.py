@@ -15,6 +15,7 @@ from itertools import cycle
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model
@@ -62,7 +63,13 @@ COASTING_END = 0.2
 then lost most of its effect. Project choice."""
 
 STEADY_CHANGE = 1e-3
-"""Largest change of a steady yaw rate over two ship lengths, relative to itself, or to 0.01 u0/L if larger."""
+"""Largest change of a steady yaw rate over :data:`STEADY_AFTER`, relative to itself, or to 0.01 u0/L if larger."""
+
+STEADY_AFTER = 2.0
+"""Time after which the yaw rate is judged again, L/u0. Project choice."""
+
+SPIRAL_HOLD = 100.0
+"""Longest time for which a spiral holds a rudder, L/u0. Project choice: slow ships near neutral stability need it."""
 
 
 def _degrees(angle: float) -> str:
@@ -212,10 +219,10 @@ class SpiralManoeuvre:
         return f"spiral:{_degrees(self.rudders[0])}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Hold each rudder until steady, at most `duration` s (by default 100 L/u0)."""
+        """Hold each rudder until steady, at most `duration` s (by default :data:`SPIRAL_HOLD` L/u0)."""
         for rudder in self.rudders:
             running.order({"rudder.command": rudder})
-            _until_steady(running, ship_time, at_most=100 * ship_time if duration is None else duration)
+            _until_steady(running, ship_time, at_most=SPIRAL_HOLD * ship_time if duration is None else duration)
 
 
 @dataclass(frozen=True)
@@ -468,13 +475,27 @@ def _spiral_rudders(largest: float) -> tuple[float, ...]:
     return tuple(math.radians(angle) for angle in (*outward, *outward[-2::-1]))
 
 
+def is_steady(before: Array, rate: Array, ship_time: Array) -> NDArray[np.bool_]:
+    """Whether the yaw rate (rad/s) has not changed since :data:`STEADY_AFTER` before, by :data:`STEADY_CHANGE`.
+
+    Parameters
+    ----------
+    before, rate : arrays (n,)
+        Yaw rate then and now, rad/s.
+    ship_time : array (n,)
+        L/u0, s.
+    """
+    near: NDArray[np.bool_] = np.abs(rate - before) < STEADY_CHANGE * np.maximum(np.abs(rate), 0.01 / ship_time)
+    return near
+
+
 def _until_steady(running: Running, ship_time: float, at_most: float) -> None:
-    """Run until the yaw rate has not changed over two ship lengths (:data:`STEADY_CHANGE`)."""
+    """Run until the yaw rate is steady (:func:`is_steady`), for `at_most` s."""
     end = running.time + at_most
     before = math.inf
     while end - running.time > 1e-6 * ship_time:  # ignore a remainder by rounding
-        running.run(min(2 * ship_time, end - running.time))
+        running.run(min(STEADY_AFTER * ship_time, end - running.time))
         rate = running.state("motion.r")
-        if abs(rate - before) < STEADY_CHANGE * max(abs(rate), 0.01 / ship_time):
+        if is_steady(np.array([before]), np.array([rate]), np.array([ship_time])).all():
             return
         before = rate

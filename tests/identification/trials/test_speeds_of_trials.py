@@ -9,7 +9,9 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
+    above_low_speed,
     lowered_bound_notice,
     polynomial_over_trials,
     slowest_speed,
@@ -79,3 +81,19 @@ def test_the_polynomial_acts_at_the_slowest_speed_of_the_trials() -> None:
 def test_a_stated_range_and_stops_leave_the_card_as_it_is(given: ManoeuvringCard, trials: list[Trial]) -> None:
     assert polynomial_over_trials(given, trials) is given
     assert lowered_bound_notice(given, given) == ()
+
+
+@pytest.mark.parametrize("signals", [("u_mps", "v_mps"), ("x_m", "y_m")])
+def test_what_is_slower_than_the_end_of_the_polynomial_is_cut_off(signals: tuple[str, ...]) -> None:
+    whole, stop = slowing(2.6, signals), slowing(0.1, signals)
+    kept = above_low_speed(card(low_speed_below_mps=1.0), Measured((whole, stop), "angle", ("read",)))
+    assert kept.trials[0] is whole
+    assert kept.trials[1].time_s[0] == 0.0
+    assert kept.trials[1].time_s[-1] == pytest.approx(60.0 * np.log(7.6 / 0.9), rel=0.03)  # where the speed is 1 m/s
+    assert all(len(values) == len(kept.trials[1].time_s) for values in kept.trials[1].signals.values())
+    assert len(kept.notices) == 2
+
+
+def test_a_trial_of_low_speeds_alone_and_one_without_speeds_stay_whole() -> None:
+    group = Measured((slowing(0.1), slowing(2.6, ())), "angle", ())
+    assert above_low_speed(card(low_speed_below_mps=7.0), group) is group

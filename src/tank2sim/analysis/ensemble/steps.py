@@ -9,7 +9,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.card_parameters import study_model
 from tank2sim.simulation.ensemble import Draws
 from tank2sim.simulation.lane_figures import USUAL_PACE, LaneFigures, Pace, runs_in_lanes
-from tank2sim.simulation.manoeuvres import Zigzag
+from tank2sim.simulation.manoeuvres import SpiralManoeuvre, Zigzag
 
 STEP_FACTORS = (6, 4, 3, 2)
 """Lengths of steps of turns and stops over the model's that are tried, the longest first (project choice)."""
@@ -46,7 +46,7 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
         Of the members.
     """
     manoeuvre = question.manoeuvre
-    if not runs_in_lanes(manoeuvre, question.duration_s):
+    if isinstance(manoeuvre, SpiralManoeuvre) or not runs_in_lanes(manoeuvre, question.duration_s):
         return USUAL_PACE
     model = study_model(question.ship.card())
     lanes = lanes_of(model)

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import TORQUE_COEFFICIENTS, ManoeuvringCard, MmgCard
@@ -27,8 +28,9 @@ from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
 
 NEARLY_SINGULAR = 1e-6
@@ -52,6 +54,10 @@ ASSUMED_EFFECT_ERROR = 0.25
 SLOWEST_OF_TURNS = 0.2
 """Speed over the speed of expansion below which a trial is taken for a stop and not for a manoeuvre: a tanker at full
 rudder keeps 0.3 to 0.4 of its speed (project choice)."""
+
+SHORTEST_AHEAD = 5.0
+"""L/u0 for which a trial must last above the low speeds to be used without its rest (project choice: a quarter of a
+turn)."""
 
 
 def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> ManoeuvringCard:
@@ -89,9 +95,55 @@ def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple
     return (f"{text} m/s, near the slowest of the trials (model.low_speed_below_mps)",)
 
 
+def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
+    """Trials up to where the ship falls below the speed at which the polynomial of the card ends.
+
+    The forces at low speed are estimates from the ship's particulars: what they leave would be taken for a physical
+    effect that is missing. A trial that is left with less than :data:`SHORTEST_AHEAD` remains whole.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        ``abkowitz``; trials of others remain as they are.
+    group : Measured
+    """
+    if card.model.kind != "abkowitz":
+        return group
+    ship_time = card.ship.length_m / card.model.speed_mps
+    trials, notices = [], []
+    for trial in group.trials:
+        time, speed = speeds(trial, ship_time)
+        if len(time):
+            speed = uniform_filter1d(speed, 1 + 2 * int(np.searchsorted(time, time[0] + 0.25 * ship_time)))
+        below = np.flatnonzero(speed < card.model.low_speed_bound_mps)
+        if len(below) and time[below[0]] - trial.time_s[0] >= SHORTEST_AHEAD * ship_time:
+            end = float(time[below[0]])
+            notices.append(
+                f"{trial.name}: compared up to {end:.0f} s; from then on the ship is slower than "
+                f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends (model.low_speed_below_mps)"
+            )
+            trials.append(window(trial, trial.time_s[0], end))
+        else:
+            trials.append(trial)
+    return replace(group, trials=tuple(trials), notices=(*group.notices, *notices)) if notices else group
+
+
 def slowest_speed(trial: Trial, ship_time: float) -> float:
-    """Lowest speed (m/s) of a trial, noise apart: through the water if it is known, else over the ground; infinite if
-    neither was measured.
+    """Lowest speed (m/s) of a trial, noise apart; infinite if :func:`speeds` knows none.
+
+    Parameters
+    ----------
+    trial : Trial
+    ship_time : float
+        L/u0, s.
+    """
+    speed = speeds(trial, ship_time)[1]
+    return float(np.quantile(speed, 0.01)) if len(speed) else np.inf
+
+
+def speeds(trial: Trial, ship_time: float) -> tuple[Array, Array]:
+    """Instants (n,), s, and the ship's speed then (n,), m/s: through the water if it is known, else over the ground;
+    none if neither was measured.
 
     Parameters
     ----------
@@ -99,19 +151,19 @@ def slowest_speed(trial: Trial, ship_time: float) -> float:
     ship_time : float
         L/u0, s: positions are compared over a quarter of it.
     """
-    signals = trial.signals
+    signals, time = trial.signals, trial.time_s
     if "u_mps" in signals:
         speed = np.hypot(signals["u_mps"], signals.get("v_mps", 0.0))
     elif "x_m" in signals and "y_m" in signals:
-        far = np.searchsorted(trial.time_s, trial.time_s + 0.25 * ship_time)
-        begin = np.flatnonzero(far < len(trial.time_s))
+        far = np.searchsorted(time, time + 0.25 * ship_time)
+        begin = np.flatnonzero(far < len(time))
         end = far[begin]
         travelled = np.hypot(*(signals[name][end] - signals[name][begin] for name in ("x_m", "y_m")))
-        speed = travelled / (trial.time_s[end] - trial.time_s[begin])
+        speed, time = travelled / (time[end] - time[begin]), time[begin]
     else:
-        return np.inf
-    speed = speed[np.isfinite(speed)]
-    return float(np.quantile(speed, 0.01)) if len(speed) else np.inf
+        return np.zeros(0), np.zeros(0)
+    known = np.isfinite(speed)
+    return time[known], speed[known]
 
 
 def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
