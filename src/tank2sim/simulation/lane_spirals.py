@@ -95,7 +95,7 @@ class LaneSpirals:
                 held[some] += lengths
                 elapsed[some] += lengths
                 rate = found.last[:, yaw_rate]
-                over = longest[some] - held[some] <= 1e-6 * ship_times[some]  # but for rounding
+                over = longest[some] - held[some] <= 1e-6 * ship_times[some]  # apart from rounding
                 steady = is_steady(before[some], rate, ship_times[some])
                 before[some] = rate
                 some = some[fine[some] & ~over & ~steady]

@@ -36,6 +36,18 @@ def test_the_slipstream_keeps_up_the_rudder_as_speed_is_lost(at) -> None:
     np.testing.assert_allclose(found, with_rudder(1 + 1.5 * (1 - at["motion.u"] / U0), at), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("turns", "gain", "expected"), [(0.6, 0.8, 0.88), (1.2, 0.8, 1.36), (-0.5, 0.8, 0.4), (0.0, 2.0, 0.0)]
+)
+def test_the_slipstream_falls_with_the_revolutions(turns: float, gain: float, expected: float) -> None:
+    at = {**STATES[0], "motion.u": 0.75 * U0, "propeller.speed": turns * N0}
+    model = ship({"rudder_slipstream": {"gain": gain, "revolutions": 1.0}})
+    bare = values(ship(), ["rudder.Y", "rudder.N"], at)
+    np.testing.assert_allclose(
+        values(model, ["rudder.Y", "rudder.N"], at), expected * bare, atol=1e-9 * abs(bare).max()
+    )
+
+
 @pytest.mark.parametrize(("angle_deg", "lost"), [(15.0, 0.0), (-22.5, 0.2), (30.0, 0.4), (21.25, 0.4 * 5 / 32)])
 def test_a_rudder_loses_its_share_over_five_degrees_past_stall(angle_deg: float, lost: float) -> None:
     at = {**STATES[0], "rudder.angle": angle_deg * DEG}

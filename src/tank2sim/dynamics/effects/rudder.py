@@ -76,13 +76,18 @@ RUDDER_EFFECTIVENESS = Effect(
 
 
 def _in_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """F_delta (1 + gain (1 - u/u0)): the propeller keeps up the flow over the rudder while the ship loses speed.
+    """F_delta (1 + gain (1 - u/u0 + s (n/n0 - 1))): the propeller keeps up the flow over the rudder while the ship
+    loses speed, s is ``revolutions``; n is not negative, and the second part in s does not turn the force round.
 
-    First order in the loss of speed of the slipstream of momentum theory: Brix (ed.) (1993), Manoeuvring Technical
-    Manual; Ogawa and Kasai (1978), Int. Shipbuilding Progress 25 (292).
+    First order in the loss of speed and in the revolutions of the slipstream of momentum theory: Brix (ed.) (1993),
+    Manoeuvring Technical Manual; Ogawa and Kasai (1978), Int. Shipbuilding Progress 25 (292).
     """
-    loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
-    return with_rudder_force(model, 1 + given["gain"] * loss)
+    by_speed = 1 + given["gain"] * (1 - model.symbol("motion.u") / model.symbol("ship.speed"))
+    if "propeller.speed_actual" not in model:
+        return with_rudder_force(model, by_speed)
+    revolutions = ca.fmax(model.symbol("propeller.speed_actual"), 0) / model.symbol("propulsion.nominal_speed")
+    by_both = by_speed + given["gain"] * given["revolutions"] * (revolutions - 1)
+    return with_rudder_force(model, ca.fmax(by_both, ca.fmin(by_speed, 0)))
 
 
 RUDDER_SLIPSTREAM = Effect(
@@ -98,6 +103,15 @@ RUDDER_SLIPSTREAM = Effect(
             5.0,
             absent=0.0,
             typical=(0.7,),  # below the 1 or 2 of a jet that keeps its speed altogether (project choice)
+        ),
+        EffectParameter(
+            "revolutions",
+            "gain by revolutions over the nominal ones as a share of that by loss of speed; 1: a jet of their speed",
+            0.0,
+            1.0,
+            0.0,
+            optional=True,
+            spread=1.0,  # nothing says beforehand how far they count (project choice)
         ),
     ),
     equations=_in_slipstream,

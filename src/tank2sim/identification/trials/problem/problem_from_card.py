@@ -112,7 +112,7 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
     ship_time = card.ship.length_m / card.model.speed_mps
     trials, notices = [], []
     for trial in group.trials:
-        time, speed = speeds(trial, ship_time)
+        time, speed = speed_history(trial, ship_time)
         if len(time):
             speed = uniform_filter1d(speed, 1 + 2 * int(np.searchsorted(time, time[0] + 0.25 * ship_time)))
         below = np.flatnonzero(speed < card.model.low_speed_bound_mps)
@@ -129,7 +129,7 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
 
 
 def slowest_speed(trial: Trial, ship_time: float) -> float:
-    """Lowest speed (m/s) of a trial, noise apart; infinite if :func:`speeds` knows none.
+    """Lowest speed (m/s) of a trial, noise apart; infinite if :func:`speed_history` knows none.
 
     Parameters
     ----------
@@ -137,11 +137,11 @@ def slowest_speed(trial: Trial, ship_time: float) -> float:
     ship_time : float
         L/u0, s.
     """
-    speed = speeds(trial, ship_time)[1]
+    speed = speed_history(trial, ship_time)[1]
     return float(np.quantile(speed, 0.01)) if len(speed) else np.inf
 
 
-def speeds(trial: Trial, ship_time: float) -> tuple[Array, Array]:
+def speed_history(trial: Trial, ship_time: float) -> tuple[Array, Array]:
     """Instants (n,), s, and the ship's speed then (n,), m/s: through the water if it is known, else over the ground;
     none if neither was measured.
 
