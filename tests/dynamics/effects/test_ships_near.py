@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 
@@ -14,7 +15,7 @@ from tank2sim.dynamics.effects.ships_near import kernels
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
-from .ships import CB, RHO, U0, B, L, T, added_forces, mariner_text, ship, state, values
+from .ships import CB, RHO, U0, B, L, T, mariner_text, ship, state, values
 
 SECTION = 0.98 * B * T
 EXPONENT = CB / 0.98 / (1 - CB / 0.98)
@@ -28,14 +29,61 @@ def other(
     return {"forward_m": forward, "starboard_m": starboard, "heading_rad": heading, "speed_mps": speed, **more}
 
 
-def forces_by(given: dict[str, float], u: float, v: float = 0.0, r: float = 0.0, text: str | None = None) -> np.ndarray:
-    return added_forces("other_ship", given, state(u, v, r), text)
+@functools.cache
+def shown(names: tuple[str, ...], depth: float | None = None, text: str | None = None) -> tuple[Model, ca.Function]:
+    """A ship with the effect, in water of a depth, and the function that gives these quantities at x, u, p."""
+    effects = {"finite_depth": {"depth_m": depth}} if depth else {}
+    model = ship({**effects, "other_ship": NEAR}, text)
+    expression = model.expand(ca.vcat([model.symbol(name) for name in names]))
+    return model, ca.Function("shown", [model.x, model.u, model.p], [expression])
+
+
+def seen(
+    names: tuple[str, ...],
+    given: dict[str, float],
+    at: dict[str, float],
+    depth: float | None = None,
+    text: str | None = None,
+) -> np.ndarray:
+    """Quantities with the effect's parameters `given`, as cards have them, at a state."""
+    model, function = shown(names, depth, text)
+    variables = {f"other_ship.{key.removesuffix('_m').removesuffix('_rad').removesuffix('_mps')}": value
+                 for key, value in given.items()}  # fmt: skip
+    x = [at.get(name, 0.0) for name in model.state_names]
+    u = model.input_values({key: value for key, value in variables.items() if key in model.input_names})
+    p = model.parameter_values({key: value for key, value in variables.items() if key in model.parameter_names})
+    return np.array(function(x, u, p)).ravel()
+
+
+FORCES = ("other_ship.X", "other_ship.Y", "other_ship.N")
+
+
+def forces_by(
+    given: dict[str, float],
+    u: float,
+    v: float = 0.0,
+    r: float = 0.0,
+    depth: float | None = None,
+    text: str | None = None,
+) -> np.ndarray:
+    return seen(FORCES, given, state(u, v, r), depth, text)
+
+
+@functools.cache
+def big_ship() -> str:
+    """A card of the KVLCC2's sizes with the added masses of the bodies of benchmarks/ship_ship.py."""
+    sizes = {
+        "length_m": 320.0, "beam_m": 58.0, "draught_m": 20.8, "block_coefficient": 0.81, "water_density_kgpm3": 1025.0,
+        "Xudot": -0.0010057, "Yvdot": -0.0144033, "Nrdot": -0.00071089,
+    }  # fmt: skip
+    return mariner_text(valid_speed_mps="", **{key: f"{key} = {value}" for key, value in sizes.items()})
 
 
 X, WEIGHTS = (one * L / 2 for one in np.polynomial.legendre.leggauss(60))
 AREAS = SECTION * (1 - np.abs(2 * X / L) ** EXPONENT)
 
 
+@functools.cache
 def added_masses() -> np.ndarray:
     """Those of the Mariner's card over the density: surge and sway (m3), yaw (m5)."""
     moved = values(ship(), ["inertia.surge", "inertia.sway", "inertia.yaw"], state(U0, 0.0, 0.0))
@@ -203,12 +251,10 @@ as benchmarks/ship_ship.py --all prints them: sizes of the KVLCC2, a beam betwee
 @pytest.mark.parametrize("encounter", BODIES)
 def test_two_bodies_in_ideal_fluid_have_these_forces(encounter: tuple[float, float, float]) -> None:
     u, speed, ahead = encounter
-    sizes = {
-        "length_m": 320.0, "beam_m": 58.0, "draught_m": 20.8, "block_coefficient": 0.81, "water_density_kgpm3": 1025.0,
-        "Xudot": -0.0010057, "Yvdot": -0.0144033, "Nrdot": -0.00071089,
-    }  # fmt: skip
-    text = mariner_text(valid_speed_mps="", **{key: f"{key} = {value}" for key, value in sizes.items()})
-    X, Y, N = forces_by(other(ahead * 320.0, 116.0, 0.0, speed), u, text=text) / [1e3, 1e3, 1e6]
+    bodies = other(
+        ahead * 320.0, 116.0, 0.0, speed, length_m=320.0, beam_m=58.0, draught_m=20.8, block_coefficient=0.81
+    )
+    X, Y, N = forces_by(bodies, u, text=big_ship()) / [1e3, 1e3, 1e6]
     exact = BODIES[encounter]
     assert pytest.approx(exact[0], abs=0.07 * 380) == X
     assert pytest.approx(exact[1], abs=0.15 * max(abs(one[1]) for one in same_speeds(encounter))) == Y
@@ -230,55 +276,53 @@ def test_images_in_the_bottom_are_summed(depth: float, distance: float) -> None:
 
 
 def test_deep_water_is_the_limit_of_a_great_depth() -> None:
-    deep = forces_by(NEAR, 6.0)
-    effects = {"finite_depth": {"depth_m": 9e3}, "other_ship": NEAR}
-    names = [f"other_ship.{name}" for name in "XYN"]
-    np.testing.assert_allclose(values(ship(effects), names, state(6.0, 0.0, 0.0)), deep, rtol=1e-4)
-    shallow = values(ship({**effects, "finite_depth": {"depth_m": 1.5 * T}}), names, state(6.0, 0.0, 0.0))
+    deep, great, shallow = (forces_by(NEAR, 6.0, depth=depth) for depth in (None, 9e3, 1.5 * T))
+    np.testing.assert_allclose(great, deep, rtol=1e-4)
     assert np.all(np.abs(shallow) > 1.3 * np.abs(deep))
 
 
 def test_ships_on_top_of_one_another_have_finite_forces_and_slopes_and_no_validity() -> None:
-    for place in ((0.0, 0.0), (0.2 * L, 0.1 * B), (0.03 * L, -0.5 * B)):
-        model = ship({"other_ship": other(*place, 0.4)})
-        slopes = ca.Function(
-            "slopes", [model.x, model.u, model.p], [ca.jacobian(model.rates, ca.vcat([model.x, model.u]))]
+    names = (*FORCES, "validity_by.other_ship")
+    model, function = shown(names)
+    slopes = ca.Function(
+        "slopes",
+        [model.x, model.u, model.p],
+        [ca.jacobian(function(model.x, model.u, model.p)[:3], ca.vcat([model.x, model.u]))],
+    )
+    x = [U0 if name == "motion.u" else 0.0 for name in model.state_names]
+    for forward, starboard in ((0.0, 0.0), (0.2 * L, 0.1 * B), (0.03 * L, -0.5 * B)):
+        u = model.input_values(
+            {"other_ship.forward": forward, "other_ship.starboard": starboard, "other_ship.heading": 0.4}
         )
-        x = np.array(model.initial(model.parameter_values())).ravel()
-        assert np.all(np.isfinite(np.array(slopes(x, model.input_values(), model.parameter_values()))))
-        assert values(model, ["validity_by.other_ship"], state(U0, 0.0, 0.0))[0] == 0.0
+        values_there = np.array(function(x, u, model.parameter_values())).ravel()
+        assert np.all(np.isfinite(values_there)) and values_there[3] == 0.0
+        assert np.all(np.isfinite(np.array(slopes(x, u, model.parameter_values()))))
 
 
 def test_clearance_is_the_least_distance_of_the_centre_lines_less_half_of_both_beams() -> None:
-    model = ship({"other_ship": other(FAR_M, FAR_M, length_m=90.0, beam_m=15.0)})
-    along = np.linspace(-0.5, 0.5, 801)
+    along = np.linspace(-45.0, 45.0, 2001)
     for x, y, heading in itertools.product((-90.0, 0.0, 140.0), (-70.0, 20.0, 150.0), (0.0, 0.6, 1.7, 3.0)):
-        ends = np.array([x, y]) + 90.0 * along[:, None] * [math.cos(heading), math.sin(heading)]
-        own = np.column_stack([L * along, 0 * along])
-        least = np.min(np.linalg.norm(ends[:, None] - own[None], axis=-1))
-        at = {"other_ship.forward": x, "other_ship.starboard": y, "other_ship.heading": heading}
-        found = values(model, ["other_ship.clearance"], {**state(U0, 0.0, 0.0), **at})[0]
-        assert found + (B + 15.0) / 2 == pytest.approx(least, abs=0.3)
-
-
-def validity(model: Model, **at: float) -> float:
-    named = {f"other_ship.{name}": value for name, value in at.items()}
-    return float(values(model, ["validity_by.other_ship"], {**state(U0, 0.0, 0.0), **named})[0])
+        forward, starboard = x + along * math.cos(heading), y + along * math.sin(heading)
+        least = np.min(np.hypot(np.maximum(np.abs(forward) - L / 2, 0), starboard))
+        given = other(x, y, heading, length_m=90.0, beam_m=15.0)
+        found = seen(("other_ship.clearance",), given, state(U0, 0.0, 0.0))[0]
+        assert found + (B + 15.0) / 2 == pytest.approx(least, abs=0.03)
 
 
 def test_validity_falls_near_and_with_the_depth_froude_number_of_the_other_ship() -> None:
-    model = ship({"other_ship": NEAR})
-    assert validity(model, forward=0.0, starboard=2.1 * B) == 1.0
-    assert 0 < validity(model, forward=0.0, starboard=1.5 * B) < 1
-    assert validity(model, forward=0.0, starboard=0.99 * B) == 0.0
-    shallow = ship({"finite_depth": {"depth_m": 12.0}, "other_ship": NEAR})
-    assert validity(shallow, speed=7.0) == 1.0 > validity(shallow, speed=9.0)
+    def validity(starboard: float, speed: float = 6.0, depth: float | None = None) -> float:
+        given = other(0.0, starboard, 0.0, speed)
+        return float(seen(("validity_by.other_ship",), given, state(U0, 0.0, 0.0), depth)[0])
+
+    assert validity(2.1 * B) == 1.0 and 0 < validity(1.5 * B) < 1 and validity(0.99 * B) == 0.0
+    assert validity(4 * B, 7.0, 12.0) == 1.0 > validity(4 * B, 9.0, 12.0)
 
 
 def test_without_another_ship_nothing_is_felt_and_a_place_beyond_bounds_is_refused() -> None:
-    model = ship({"other_ship": other(FAR_M, FAR_M)})
-    names = [*(f"other_ship.{name}" for name in "XYN"), "validity_by.other_ship"]
-    found = values(model, names, state(U0, 0.0, 0.0))
+    found = seen((*FORCES, "validity_by.other_ship"), other(FAR_M, FAR_M), state(U0, 0.0, 0.0))
     assert np.max(np.abs(found[:3])) < 10 and found[3] == 1.0
-    with pytest.raises(InputError):
-        model.input_values({"other_ship.speed": 100.0})
+    model, _ = shown(FORCES)
+    assert np.all(np.isfinite(model.input_values({"other_ship.forward": -2 * FAR_M})))
+    for wrong in ({"other_ship.speed": 100.0}, {"other_ship.starboard": -3 * FAR_M}):
+        with pytest.raises(InputError):
+            model.input_values(wrong)
