@@ -157,6 +157,7 @@ def with_other_ship(depth: float | None = None) -> ca.Function:
         effects.insert(0, {"name": "finite_depth", "parameters": {"depth_m": depth}})
     card = t2s.load("kvlcc2").replace(
         {"ship.length_m": L, "ship.beam_m": B, "ship.draught_m": T, "ship.block_coefficient": BLOCK,
+         "ship.name": f"{ships_near.POINTS} points",  # equal cards have the same model, built once
          "environment.water_density_kgpm3": DENSITY, "effects": effects}
     )  # fmt: skip
     model = card.model
@@ -211,6 +212,20 @@ def compare(hull: Hulls, depth: float | None, clearances: tuple[float, ...], sta
                     print("   ", *row)
 
 
+def by_points(clearance: float) -> np.ndarray:
+    """Largest difference (3,) of X, Y, N on a moored ship to those with 40 points on each hull, over the largest."""
+    found, usual = [], ships_near.POINTS
+    masses = np.array([0.05, 0.75, 0.05 * L**2]) * BLOCK * L * B * T
+    for points in (usual, 40):
+        ships_near.POINTS = points
+        calculated = with_other_ship()
+        places = np.linspace(-1.2, 1.2, 61) * L
+        rows = [calculated(x, (1 + clearance) * B, 0.0, 0.0, 0.0, 0.0, SPEED, masses) for x in places]
+        found.append(np.array(rows).reshape(-1, 3))
+    ships_near.POINTS = usual
+    return np.max(np.abs(found[0] - found[1]), axis=0) / np.max(np.abs(found[1]), axis=0)
+
+
 def oblique(hull: Hulls) -> None:
     """Print forces of a ship that drifts and turns, another one crossing."""
     calculated, alone = with_other_ship(), lonely(hull)
@@ -228,6 +243,9 @@ def oblique(hull: Hulls) -> None:
 def main() -> None:
     """Print all comparisons."""
     logging.disable(logging.WARNING)
+    for clearance in (0.25, 0.5, 1.0):
+        errors = ", ".join(f"{100 * one:.2f} %" for one in by_points(clearance))
+        print(f"{ships_near.POINTS} points on a hull, not 40, clearance {clearance:g} B: X, Y, N differ by {errors}")
     print("deep water")
     compare(hulls(24, 16), None, CLEARANCES, STAGGERS)
     oblique(hulls(24, 16))
