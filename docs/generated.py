@@ -45,6 +45,7 @@ FAMILIES = {
     "fields": "Surroundings",
     "waves": "Surroundings",
     "banks": "Surroundings",
+    "ships_near": "Surroundings",
     "depth": "Surroundings",
     "propeller": "Propeller and engine",
     "controllable_pitch": "Propeller and engine",

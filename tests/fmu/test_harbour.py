@@ -19,7 +19,7 @@ from ..dynamics.effects.ships import N0, TYPICAL, T, ship, values
 
 pytestmark = pytest.mark.slow
 
-EFFECTS = ("waves", "twin_orders", "controllable_pitch", "loading")
+EFFECTS = ("waves", "other_ship", "twin_orders", "controllable_pitch", "loading")
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,16 @@ def unpacked(request, model: Model, tmp_path_factory) -> UnpackedFmu:
 
 ORDERS = (
     {"propeller.pitch": 0.9, "propeller.starboard_offset": -0.3 * N0, "rudder.port_offset": 0.2},
-    {"propeller.pitch": -0.5, "propeller.starboard_offset": 0.0, "waves.height": 3.0, "waves.direction": 1.2},
+    {
+        "propeller.pitch": -0.5,
+        "propeller.starboard_offset": 0.0,
+        "waves.height": 3.0,
+        "waves.direction": 1.2,
+        "other_ship.forward": 30.0,
+        "other_ship.starboard": -60.0,
+        "other_ship.heading": 0.3,
+        "other_ship.speed": 9.0,
+    },
 )
 SHOWN = [
     *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r"),
@@ -47,7 +56,7 @@ SHOWN = [
 ]
 OUTPUTS = [
     *("waves.heave", "waves.roll", "pose.z", "propeller.speed_starboard", "rudder.angle_port", "validity_by.pitch"),
-    *("loading.displacement", "validity_by.loading"),
+    *("loading.displacement", "validity_by.loading", "other_ship.clearance", "validity_by.other_ship"),
 ]
 
 

@@ -24,6 +24,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "waves": {"height_m": 2.0, "period_s": 8.0, "direction_deg": 40.0},
     "bank_suction": {"Y_prime": 1e-4, "N_prime": -3e-5},
     "bank": {"port_distance_m": 1e4, "starboard_distance_m": 150.0},
+    "other_ship": {"forward_m": 60.0, "starboard_m": 70.0, "heading_deg": 180.0, "speed_mps": 7.0},
     "propeller_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},
     "propeller_walk": {"Y_prime": -1e-4, "N_prime": 5e-5},
     "loading_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},

@@ -37,7 +37,7 @@ LARGEST_BANK, BANK_MARGIN = 0.26, 0.26
 """Largest y_B of the tests, and the distance beyond it over which ``validity`` falls to zero: project choice."""
 
 FAR_M = 1e4
-"""Distance without a bank, m: project choice."""
+"""Distance without a bank, or without another ship, m: project choice."""
 
 STEEPEST_SHARE = 0.95
 """Largest half height of a bank over its distance from the centre line: above it the bank is below the keel's middle.

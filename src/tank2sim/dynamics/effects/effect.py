@@ -112,7 +112,11 @@ class EffectParameter:
                 description=description,
                 display_unit=_SHOWN.get(suffix),
                 # A direction may go round and round, and a negative speed is one the other way.
-                minimum={"rad": None, "m/s": -BEYOND_CARD * self.maximum}.get(unit, self.lowest(card)),
+                minimum={
+                    "rad": None,
+                    "m/s": -BEYOND_CARD * self.maximum,
+                    "m": min(self.lowest(card), BEYOND_CARD * self.lowest(card)),
+                }.get(unit, self.lowest(card)),
                 maximum={"rad": None, "m/s": BEYOND_CARD * self.maximum, "m": BEYOND_CARD * self.maximum}.get(
                     unit, self.maximum
                 ),
