@@ -37,15 +37,28 @@ def test_the_slipstream_keeps_up_the_rudder_as_speed_is_lost(at) -> None:
 
 
 @pytest.mark.parametrize(
-    ("turns", "gain", "expected"), [(0.6, 0.8, 0.88), (1.2, 0.8, 1.36), (-0.5, 0.8, 0.4), (0.0, 2.0, 0.0)]
+    ("speed", "turns", "gain", "expected"),
+    [
+        (0.8, 1.0, 0.8, 1.21),
+        (0.8, 0.5, 0.8, 0.7225),
+        (0.8, 0.0, 0.8, 0.36),
+        (0.8, -0.5, 0.8, 0.36),
+        (0.8, 0.0, 3.0, 0.0),
+    ],
 )
-def test_the_slipstream_falls_with_the_revolutions(turns: float, gain: float, expected: float) -> None:
-    at = {**STATES[0], "motion.u": 0.75 * U0, "propeller.speed": turns * N0}
-    model = ship({"rudder_slipstream": {"gain": gain, "revolutions": 1.0}})
-    bare = values(ship(), ["rudder.Y", "rudder.N"], at)
-    np.testing.assert_allclose(
-        values(model, ["rudder.Y", "rudder.N"], at), expected * bare, atol=1e-9 * abs(bare).max()
-    )
+def test_the_jet_follows_the_revolutions(speed: float, turns: float, gain: float, expected: float) -> None:
+    at = {**STATES[0], "motion.u": speed * U0, "motion.v": 0.0, "propeller.speed": turns * N0}
+    jet, half = (ship({"rudder_slipstream": {"gain": gain, "jet": share}}) for share in (1.0, 0.5))
+    bare, whole, mixed = (values(model, ["rudder.Y", "rudder.N"], at) for model in (ship(), jet, half))
+    np.testing.assert_allclose(whole, expected * bare, atol=1e-9 * abs(bare).max())
+    np.testing.assert_allclose(mixed, (expected + 1 + gain * (1 - speed)) / 2 * bare, atol=1e-9 * abs(bare).max())
+
+
+def test_the_jet_and_the_loss_of_speed_are_the_same_to_first_order() -> None:
+    at = {**STATES[0], "motion.u": (1 - 1e-4) * U0, "motion.v": 0.0}
+    jet, loss = (ship({"rudder_slipstream": {"gain": 0.8, "jet": share}}) for share in (1.0, 0.0))
+    bare, first, second = (values(model, ["rudder.Y", "rudder.N"], at) for model in (ship(), jet, loss))
+    np.testing.assert_allclose(first - bare, second - bare, rtol=1e-3)
 
 
 @pytest.mark.parametrize(("angle_deg", "lost"), [(15.0, 0.0), (-22.5, 0.2), (30.0, 0.4), (21.25, 0.4 * 5 / 32)])

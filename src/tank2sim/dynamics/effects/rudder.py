@@ -75,19 +75,27 @@ RUDDER_EFFECTIVENESS = Effect(
 )
 
 
-def _in_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """F_delta (1 + gain (1 - u/u0 + s (n/n0 - 1))): the propeller keeps up the flow over the rudder while the ship
-    loses speed, s is ``revolutions``; n is not negative, and the second part in s does not turn the force round.
+SLOWEST_IN_JET = 0.2
+"""Speed over u0 below which the jet over a rudder is compared with this in place of the flow (project choice:
+slower than any turn; the forces at low speed have a jet of their own)."""
 
-    First order in the loss of speed and in the revolutions of the slipstream of momentum theory: Brix (ed.) (1993),
-    Manoeuvring Technical Manual; Ogawa and Kasai (1978), Int. Shipbuilding Progress 25 (292).
+
+def _in_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    """F_delta (1 + (1 - s) g (1 - u/u0) + s ((w/U)^2 - 1)), w = U + g/2 (u0 n/n0 - U): the propeller keeps up the flow
+    over the rudder while the ship loses speed; g is ``gain``, s is ``jet``.
+
+    Both are the same to first order in the loss of speed at n0. w is not negative, nor is n; U is U, or
+    :data:`SLOWEST_IN_JET` u0 if larger. Slipstream of momentum theory: Brix (ed.) (1993), Manoeuvring Technical Manual;
+    Ogawa and Kasai (1978), Int. Shipbuilding Progress 25 (292).
     """
-    by_speed = 1 + given["gain"] * (1 - model.symbol("motion.u") / model.symbol("ship.speed"))
-    if "propeller.speed_actual" not in model:
-        return with_rudder_force(model, by_speed)
-    revolutions = ca.fmax(model.symbol("propeller.speed_actual"), 0) / model.symbol("propulsion.nominal_speed")
-    by_both = by_speed + given["gain"] * given["revolutions"] * (revolutions - 1)
-    return with_rudder_force(model, ca.fmax(by_both, ca.fmin(by_speed, 0)))
+    u0 = model.symbol("ship.speed")
+    by_loss = 1 + given["gain"] * (1 - model.symbol("motion.u") / u0)
+    driven = ca.SX(1)
+    if "propeller.speed_actual" in model:
+        driven = ca.fmax(model.symbol("propeller.speed_actual"), 0) / model.symbol("propulsion.nominal_speed")
+    past = ca.fmax(model.symbol("motion.speed"), SLOWEST_IN_JET * u0)
+    by_jet = ca.fmax(1 + given["gain"] / 2 * (driven * u0 / past - 1), 0) ** 2
+    return with_rudder_force(model, by_loss + given["jet"] * (by_jet - by_loss))
 
 
 RUDDER_SLIPSTREAM = Effect(
@@ -105,13 +113,13 @@ RUDDER_SLIPSTREAM = Effect(
             typical=(0.7,),  # below the 1 or 2 of a jet that keeps its speed altogether (project choice)
         ),
         EffectParameter(
-            "revolutions",
-            "gain by revolutions over the nominal ones as a share of that by loss of speed; 1: a jet of their speed",
+            "jet",
+            "share of a jet that follows the revolutions, its force with the square of its speed",
             0.0,
             1.0,
             0.0,
             optional=True,
-            spread=1.0,  # nothing says beforehand how far they count (project choice)
+            spread=1.0,  # nothing says beforehand which of the two it is (project choice)
         ),
     ),
     equations=_in_slipstream,
