@@ -214,15 +214,15 @@ def compare(hull: Hulls, depth: float | None, clearances: tuple[float, ...], sta
 
 def by_points(clearance: float) -> np.ndarray:
     """Largest difference (3,) of X, Y, N on a moored ship to those with 40 points on each hull, over the largest."""
-    found, usual = [], ships_near.POINTS
+    found, usual = [], (ships_near.POINTS, ships_near.OTHER_POINTS)
     masses = np.array([0.05, 0.75, 0.05 * L**2]) * BLOCK * L * B * T
-    for points in (usual, 40):
-        ships_near.POINTS = points
+    for points in (usual, (40, 40)):
+        ships_near.POINTS, ships_near.OTHER_POINTS = points
         calculated = with_other_ship()
         places = np.linspace(-1.2, 1.2, 61) * L
         rows = [calculated(x, (1 + clearance) * B, 0.0, 0.0, 0.0, 0.0, SPEED, masses) for x in places]
         found.append(np.array(rows).reshape(-1, 3))
-    ships_near.POINTS = usual
+    ships_near.POINTS, ships_near.OTHER_POINTS = usual
     return np.max(np.abs(found[0] - found[1]), axis=0) / np.max(np.abs(found[1]), axis=0)
 
 
@@ -245,7 +245,8 @@ def main() -> None:
     logging.disable(logging.WARNING)
     for clearance in (0.25, 0.5, 1.0):
         errors = ", ".join(f"{100 * one:.2f} %" for one in by_points(clearance))
-        print(f"{ships_near.POINTS} points on a hull, not 40, clearance {clearance:g} B: X, Y, N differ by {errors}")
+        points = f"{ships_near.POINTS} and {ships_near.OTHER_POINTS} points in place of 40"
+        print(f"{points}, clearance {clearance:g} B: X, Y, N differ by {errors}")
     print("deep water")
     compare(hulls(24, 16), None, CLEARANCES, STAGGERS)
     oblique(hulls(24, 16))
