@@ -291,13 +291,11 @@ def r_squared(pairs: list[np.ndarray]) -> np.ndarray:
     return 1 - ((predicted - true) ** 2).sum(axis=0) / ((true - true.mean(axis=0)) ** 2).sum(axis=0)
 
 
-def shared_craft(folder: Path) -> None:
-    """The craft of the shared logs: from its CSV by revolutions, from an ArduPilot and a PX4 log by orders alone."""
-    truth = json.loads((LOGS / "usv_22-truth.json").read_text(encoding="utf-8"))
-    v, thrust = truth["vessel"], truth["vessel"]["thrusters"]
-    d = v["damping"]
-    per = (30 / math.pi) ** 2
-    c = {
+def shared_craft_numbers() -> dict[str, float]:
+    """The true craft of the shared logs, as :func:`random_craft` has one."""
+    v = json.loads((LOGS / "usv_22-truth.json").read_text(encoding="utf-8"))["vessel"]
+    d, thrust, per = v["damping"], v["thrusters"], (30 / math.pi) ** 2
+    return {
         "length": v["length_m"],
         "mass": v["mass_kg"],
         "inertia": v["yaw_inertia_kgm2"],
@@ -310,6 +308,12 @@ def shared_craft(folder: Path) -> None:
         "astern": thrust["astern_N_per_rpm2"] * per,
         "cruise": 2.0,
     }
+
+
+def shared_craft(folder: Path) -> None:
+    """The craft of the shared logs: from its CSV by revolutions, from an ArduPilot and a PX4 log by orders alone."""
+    truth = json.loads((LOGS / "usv_22-truth.json").read_text(encoding="utf-8"))
+    thrust, c = truth["vessel"]["thrusters"], shared_craft_numbers()
     table = np.genfromtxt(LOGS / "usv_22-truth.csv", delimiter=",", names=True)
     motion = {"t": table["t_s"], "u": table["u_mps"], "v": table["v_mps"], "r": np.radians(table["r_degps"])}
     begin = datetime.fromisoformat(truth["t_zero_utc"].replace("Z", "+00:00"))

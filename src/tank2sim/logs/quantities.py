@@ -196,7 +196,19 @@ _SIGNAL_K = re.compile(r"^(navigation|propulsion|steering|environment)\.[a-z]")
 
 
 def unit_of_signal_k(name: str, quantity: str) -> str:
-    """Unit of a path of Signal K, which is SI (signalk.org, 1.7), revolutions in Hz; empty of any other name."""
+    """Unit of a path of Signal K, which is SI (signalk.org, 1.7), revolutions in Hz; empty of any other name.
+
+    Parameters
+    ----------
+    name : str
+    quantity : str
+        A key of :data:`QUANTITIES`, or empty.
+
+    Examples
+    --------
+    >>> unit_of_signal_k("propulsion.main.revolutions", "rpm")
+    '1/s'
+    """
     if not quantity or not _SIGNAL_K.match(name):
         return ""
     return "1/s" if name.endswith(".revolutions") else next(iter(QUANTITIES[quantity].units))
