@@ -51,7 +51,9 @@ class CraftStabilityResult(Result):
 
     @property
     def _length_m(self) -> float:
-        return self.ship.card.ship.length_m
+        card = self.ship.card
+        assert isinstance(card, CraftCard)
+        return card.ship.length_m
 
     @property
     def nearly_straight(self) -> bool:
