@@ -12,7 +12,7 @@ from tank2sim.api.log import log
 from tank2sim.errors import InputError
 from tank2sim.logs.clock import utc_text
 from tank2sim.logs.nmea0183 import read_nmea0183
-from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name
+from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name, unit_of_signal_k
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.reference import local_metres
 from tank2sim.logs.table import read_table_log
@@ -65,7 +65,39 @@ def test_quantities_of_names(name, quantity) -> None:
     assert quantity_of_name(name) == quantity
 
 
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [
+        ("GPS1_LAT", "latitude"),
+        ("SPD_WATER_LONG", "u_water"),
+        ("ROT1", "yaw_rate"),
+        ("RUD_ORD", "rudder_order"),
+        ("Consigne de barre", "rudder_order"),
+        ("Rumbo sobre el fondo", "cog"),
+        ("Rumbo verdadero", "heading"),
+        ("Toerental stuurboord", "rpm_starboard"),
+        ("Giri motore sinistro", "rpm_port"),
+        ("Ønsket rorvinkel", "rudder_order"),
+        ("Drehgeschwindigkeit", "yaw_rate"),
+        ("navigation.courseOverGroundTrue", "cog"),
+        ("set course", ""),
+        ("left battery", ""),
+        ("wind temp", ""),
+    ],
+)
+def test_languages_and_recorders(name, quantity) -> None:
+    assert quantity_of_name(name) == quantity
+
+
+def test_paths_of_signal_k_are_in_si() -> None:
+    assert unit_of_signal_k("propulsion.port.revolutions", "rpm_port") == "1/s"
+    assert unit_of_signal_k("navigation.speedOverGround", "sog") == "m/s"
+    assert not unit_of_signal_k("speedOverGround", "sog")
+
+
 def test_signs_of_names() -> None:
+    assert sign_of_name("Barre (+ bâbord)") == -1
+    assert sign_of_name("Timone (dritta +)") == 1
     assert sign_of_name("Ruderlage (Bb +)") == -1
     assert sign_of_name("rudder angle, starboard positive") == 1
     assert sign_of_name("rudder_deg") == 0
@@ -91,6 +123,56 @@ def test_a_table_with_any_separator_is_read(tmp_path, separator) -> None:
     found = read_table_log(path)
     assert np.allclose(stream_of(found, "heading").values, frame().heading_deg)
     assert stream_of(found, "latitude").time_s[0] == pytest.approx(T0)
+
+
+@pytest.mark.parametrize("separator", ["\t", ";", ","])
+def test_cells_that_are_missing_shift_no_column(tmp_path, separator) -> None:
+    table = frame()
+    lost = np.random.default_rng(1).random((len(table), 3)) < 0.02
+    for place, name in enumerate(("latitude", "longitude", "rot_deg_min")):
+        table[name] = table[name].round(7).mask(lost[:, place])
+    table.to_csv(tmp_path / "gaps.csv", sep=separator, index=False)
+    found = {stream.name: stream.values for stream in read_log(tmp_path / "gaps.csv").streams}
+    for name, values in found.items():
+        np.testing.assert_allclose(values, table[name].to_numpy())
+    assert {"latitude", "longitude"} <= {
+        c.quantity for c in log(tmp_path / "gaps.csv").voyage.channels.channels if c.use
+    }
+
+
+def test_a_clock_with_another_decimal_sign_than_the_table_is_read(tmp_path) -> None:
+    table = frame().drop(columns="utc")
+    text = table.to_csv(sep=";", decimal=",", index=False).splitlines()
+    lines = [f"t [s];{text[0]}", *(f"{0.5 * k:.2f};{line}" for k, line in enumerate(text[1:]))]
+    (tmp_path / "mixed.csv").write_text("\n".join(lines), encoding="utf-8")
+    stream = read_log(tmp_path / "mixed.csv").streams[0]
+    np.testing.assert_allclose(stream.time_s, 0.5 * np.arange(len(table)))
+
+
+def test_an_order_of_unknown_unit_is_sure_only_where_an_angle_shows_it(tmp_path) -> None:
+    table = frame().drop(columns="rudder_deg")
+    order = np.degrees(voyage().rudder)
+    for name, columns, expected in (
+        ("alone", {"rudder order": order * 100 / 35}, ("deg", 1.0, False)),
+        ("percent", {"rudder order": order * 100 / 35, "rudder_deg": order}, ("deg", 0.35, False)),
+        ("degrees", {"rudder order": order, "rudder_deg": order}, ("deg", 1.0, True)),
+    ):
+        table.assign(**columns).to_csv(tmp_path / f"{name}.csv", index=False)
+        channel = log(tmp_path / f"{name}.csv").voyage.channels.used("rudder_order")
+        unit, scale, sure = expected
+        assert channel.unit == unit
+        assert channel.scale == pytest.approx(scale, rel=0.02)
+        assert (channel.confidence >= 0.9) is sure
+
+
+def test_of_two_rudders_the_one_that_holds_its_values_is_the_order(tmp_path) -> None:
+    made = voyage()
+    table = frame().rename(columns={"rudder_deg": "rudder one"})
+    table["rudder two"] = np.degrees(made.rudder).round(-1)
+    table.to_csv(tmp_path / "two.csv", index=False)
+    channels = log(tmp_path / "two.csv").voyage.channels
+    assert channels.used("rudder_angle").stream == "rudder one"
+    assert channels.used("rudder_order").stream == "rudder two"
 
 
 def test_decimal_commas_a_row_of_units_and_a_local_time(tmp_path) -> None:

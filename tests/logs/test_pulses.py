@@ -213,3 +213,10 @@ def test_a_dataflash_log_without_parameters_keeps_its_rudder(tmp_path) -> None:
     path.write_text("\n".join(lines) + "\n")
     (pulses,) = (one for one in read_log(path).streams if one.name == "RCOU.C1")
     assert shares(pulses) * 400 * 35 / 500 == pytest.approx(np.degrees(voyage().rudder), abs=0.2)
+
+
+def test_a_rudder_that_lay_hard_over_for_long_rests_in_the_middle() -> None:
+    pulses = np.concatenate([np.full(60, 1127.0), np.linspace(1127, 1900, 40)])
+    scale = pulses_of(LogStream("ch1", STEP * np.arange(100), pulses))[1]
+    assert scale.rest_us == 1127  # as of a controller that turns one way
+    assert scale.two_way.share(np.array([1500.0, 1900.0])).tolist() == [0.0, 1.0]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tank2sim.analysis.stability.craft import CraftAtSpeed, CraftStability, craft_stability
+from tank2sim.analysis.stability.craft import CraftAtSpeed, CraftStability, SteadyCraftTurn, craft_stability
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.stability import four_digits
 from tank2sim.cards import CraftCard
@@ -14,6 +14,10 @@ from tank2sim.units import from_si
 
 if TYPE_CHECKING:
     from tank2sim.api.ship import Ship
+
+STRAIGHT_FROM_LENGTHS = 100.0
+"""Diameter over length of a loop from which it is called nearly straight. Project choice: it turns the craft by a
+degree for each length, which wind, waves and errors of a few per cent in its coefficients do as well."""
 
 NO_RUDDER = "the criteria of IMO MSC.137(76) and the spirals are of a rudder, and are not judged"
 
@@ -45,12 +49,28 @@ class CraftStabilityResult(Result):
         """True if the craft holds a straight course with its revolutions held: every mode decays."""
         return self.study.run.stable
 
+    @property
+    def _length_m(self) -> float:
+        card = self.ship.card
+        assert isinstance(card, CraftCard)
+        return card.ship.length_m
+
+    @property
+    def nearly_straight(self) -> bool:
+        """True if the craft, with no difference of revolutions, holds a straight course or a loop wider than
+        :data:`STRAIGHT_FROM_LENGTHS`.
+        """
+        turns = self.study.turns
+        alone = turns[0] if turns and not turns[0].difference_radps else None
+        return self.stable or (alone is not None and alone.diameter_m > STRAIGHT_FROM_LENGTHS * self._length_m)
+
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
         study = self.study
         return {
             "ship": study.name,
             "straight_run": study.run.as_json(),
+            "nearly_straight": self.nearly_straight,
             "speeds": [run.as_json() for run in study.speeds],
             "highest_speed_mps": study.highest_speed_mps,
             "difference_turns": [
@@ -79,11 +99,7 @@ class CraftStabilityResult(Result):
             f"on a straight course, revolutions held{surge}{others}"
         ]
         if study.turns and not study.turns[0].difference_radps:
-            by_itself = study.turns[0]
-            lines.append(
-                f"It turns by itself, to either side: {math.degrees(by_itself.yaw_rate_radps):.3g} deg/s, "
-                f"{by_itself.diameter_m:.3g} m wide"
-            )
+            lines.append(_left_alone(study.turns[0], self._length_m))
         if study.turns and (last := study.turns[-1]).difference_radps:
             lines.append(
                 f"Steady turns: up to {math.degrees(last.yaw_rate_radps):.3g} deg/s, {last.diameter_m:.3g} m wide, at "
@@ -120,6 +136,15 @@ class CraftStabilityResult(Result):
             ),
         )
         return eigenvalues, by_speed, turns
+
+
+def _left_alone(turn: SteadyCraftTurn, length_m: float) -> str:
+    """What an unstable craft does without a difference of revolutions."""
+    if turn.diameter_m > STRAIGHT_FROM_LENGTHS * length_m:
+        per_length = math.degrees(2 * length_m / turn.diameter_m)
+        return f"Left alone it stays nearly straight: it settles on a curve of {per_length:.1g} deg for each length"
+    rate = math.degrees(turn.yaw_rate_radps)
+    return f"It turns by itself, to either side: {rate:.3g} deg/s, {turn.diameter_m:.3g} m wide"
 
 
 def _row(run: CraftAtSpeed) -> list[object]:

@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.logs.channels import USED_FROM, ChannelSet, LogChannel
+from tank2sim.logs.channels import SURE_FROM, USED_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import usual_step
 from tank2sim.logs.content import (
     AGREES,
     DIFFERS,
     FEW_SAMPLES,
+    UNIT_SLACK,
     UNTESTED,
     ContentEvidence,
     angle_unit,
@@ -26,8 +27,9 @@ from tank2sim.logs.content import (
     steering_evidence,
 )
 from tank2sim.logs.pulses import PulseScale, pulses_of
-from tank2sim.logs.quantities import QUANTITIES, sign_of_name
+from tank2sim.logs.quantities import QUANTITIES, names_another, plain_words, sign_of_name
 from tank2sim.logs.reference import (
+    HEADING_WINDOW_S,
     POSITION_WINDOW_S,
     ReferenceMotion,
     differenced,
@@ -62,6 +64,26 @@ _TESTED_STEP_S = 0.2
 ALONE_LESS = 0.1
 """A pair of orders is one of thrusters if either alone agrees with the turn by so much less than their difference
 (project choice)."""
+
+_PAIRED = 0.5
+"""Share of the samples of a latitude that have a longitude at the same time, from which they are a pair (project
+choice)."""
+
+_HOLDS, _MOVES = 0.5, 0.2
+"""Share of samples equal to the one before of a stream that holds its values, as an order does, and of one that moves
+(project choice)."""
+
+_DOUBTED = 0.85
+"""Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
+
+_MUCH_LESS = 0.7
+"""Ratio of deviations from which the lesser one decides (project choice)."""
+
+_FASTEST_SHAFT_HZ = 100.0
+"""Revolutions beyond which a record without a unit is in rpm, 1/s: small thrusters reach 80 (project choice)."""
+
+_LARGEST_HEEL_RAD = 0.8
+"""Heel beyond which a record without a unit is in deg: 46 deg in rad (project choice)."""
 
 _BASE = {"format": 0.95, "name": 0.75, "": 0.6}
 _AGREED = {"format": 0.99, "name": 0.96, "": 0.9}
@@ -114,6 +136,8 @@ class _Search:
         scale = self.pulse_scales.get(channel.stream)
         if scale is None:
             return channel
+        if channel.quantity.startswith("rudder"):
+            scale = scale.two_way
         if channel.use:
             full = scale.rest_us + scale.span_us
             text = f"{channel.stream} holds pulses: {scale.rest_us:g} us is taken as rest and {full:g} us as full order"
@@ -155,17 +179,17 @@ class _Search:
     def positions(self) -> None:
         pairs = []
         for north, east in (("latitude", "longitude"), ("x", "y")):
+            others = self.named(east)
             for first in self.named(north):
-                second = next(
-                    (
-                        s
-                        for s in self.named(east)
-                        if len(s.time_s) == len(first.time_s) and s.time_s[0] == first.time_s[0]
-                    ),
-                    None,
-                )
-                if second is not None:
-                    pairs.append((first, second))
+                fitting = [
+                    (other, pair)
+                    for other in others
+                    if len((pair := _paired(first, other))[0].values) > _PAIRED * len(first.values)
+                ]
+                if fitting:
+                    second, pair = max(fitting, key=lambda entry: _common_beginning(first.name, entry[0].name))
+                    others.remove(second)
+                    pairs.append(pair)
         tracks = []
         for first, second in pairs:
             track = self._track(first, second)
@@ -276,7 +300,8 @@ class _Search:
         for channel in (heading, course):
             time, angle = self._angle(self._stream(channel.stream))
             motion = replace(self.motion, heading_time_s=time, heading_rad=np.unwrap(angle))
-            agreements.append(rate_evidence(*self.thin(rates[0]), motion).agreement or 0.0)
+            evidence = rate_evidence(*self.thin(rates[0]), motion, (HEADING_WINDOW_S,))  # drift is slow
+            agreements.append(evidence.agreement or 0.0)
         if agreements[1] > _DERIVATIVE and agreements[0] < agreements[1] - (1 - _DERIVATIVE):
             text = f"{rates[0].name} is the derivative of the course {course.stream}, and not of it: exchanged"
             self.fault(self._stream(heading.stream), text)
@@ -391,7 +416,7 @@ class _Search:
             for stream in self.streams
             if not stream.quantity and len(stream.values) >= FEW_SAMPLES and np.ptp(stream.values) > 0
         ]
-        if self._best("heading") is None:
+        if self._best("heading") is None or self._best("cog") is None:
             self._unnamed_directions([stream for stream in nameless if self._circular(stream)])
         for stream in nameless:
             if any(channel.stream == stream.name for channel in self.found):
@@ -404,28 +429,50 @@ class _Search:
                     self.add(stream, 0.85, text, quantity="yaw_rate", unit=unit, sign=evidence.sign)
                     self.rate = time, self.found[-1].si(values)
                     continue
-            speeds = ("sog", "u_water", "u_ground", "v_north")
+            speeds = ("sog", "u_ground", "v_north")
             if any(self._best(name) for name in speeds) or stream.unit not in ("", *QUANTITIES["sog"].units):
                 continue
             evidence = speed_evidence(time, values, self.motion, "sog")
-            if evidence.agreement is not None and evidence.agreement > 0.9 and evidence.unit and values.min() >= 0:
+            follows = component_evidence(time, values, self.motion.speed_mps, self.motion).agreement or 0.0
+            agreement = min(evidence.agreement or 0.0, follows)
+            unit = stream.unit or evidence.unit
+            if agreement > 0.9 and evidence.unit and values.min() >= 0 and not names_another(stream.name):
+                if not self._closer_than_water(time, values * QUANTITIES["sog"].units[unit]):
+                    continue
                 text = f"by content alone: {evidence.text}"
-                self.add(stream, 0.75, text, quantity="sog", unit=stream.unit or evidence.unit)
+                self.add(stream, 0.75, text, quantity="sog", unit=unit)
         if not len(self.rate[0]) and len(self.motion.heading_time_s):
             self.rate = differenced(self.motion.heading_time_s, self.motion.heading_rad, 2.0)
 
+    def _closer_than_water(self, time: Array, speed: Array) -> bool:
+        """Whether a speed (m/s) follows that of the positions more closely than the one through the water does."""
+        water = self._best("u_water")
+        if water is None:
+            return True
+        other = self._stream(water.stream)
+        errors = [
+            float(np.nanmedian(np.abs(interpolated(self.motion.time_s, at, values, 5.0) - self.motion.speed_mps)))
+            for at, values in ((time, speed), (other.time_s, water.si(other.values)))
+        ]
+        return errors[0] < _MUCH_LESS * errors[1]
+
     def _unnamed_directions(self, streams: list[LogStream]) -> None:
         """A course and a heading by content: both follow the track, and the course more closely."""
+        known = [channel for channel in (self._best("heading"), self._best("cog")) if channel is not None]
         candidates = []
-        for stream in streams:
+        for stream in [*streams, *(self._stream(channel.stream) for channel in known)]:
             evidence = direction_evidence(*self._angle(stream), self.motion)
             near = abs(evidence.offset_rad) < LARGEST_OFFSET_RAD
-            if evidence.agreement is not None and evidence.agreement > 0.95 and evidence.sign > 0 and near:
+            if evidence.agreement is not None and evidence.agreement > AGREES and evidence.sign > 0 and near:
                 candidates.append((evidence.spread_rad, stream, evidence))
         candidates.sort(key=lambda entry: entry[0])
         distinct = len(candidates) == 2 and candidates[1][0] > 1.5 * candidates[0][0]
+        if not distinct and (known or len(candidates) != 1):
+            return
         for place, (_, stream, evidence) in enumerate(candidates):
             quantity = "cog" if distinct and place == 0 else "heading"
+            if any(stream.name == channel.stream or quantity == channel.quantity for channel in known):
+                continue
             text = f"by content alone: {evidence.text}" + ("" if distinct else "; it may be the course over ground")
             unit = angle_unit(stream.values, stream.unit)
             self.add(stream, 0.85 if distinct else 0.7, text, quantity=quantity, unit=unit)
@@ -439,6 +486,7 @@ class _Search:
     # Rudders and thrusters --------------------------------------------------------------------------------------
 
     def steering(self) -> None:
+        self._held_rudders()
         for stream in self.named("rudder_angle", "rudder_order", "port_rudder_angle"):
             time, values = self.thin(stream)
             evidence, _ = steering_evidence(time, values, *self.rate)
@@ -448,13 +496,20 @@ class _Search:
             self._unnamed_rudder()
         self._rudder_shares()
 
+    def _held_rudders(self) -> None:
+        """Of several streams that are a rudder by their names, one that holds its values is the order."""
+        angles = self.named("rudder_angle")
+        held = [stream for stream in angles if stream.stated_by == "name" and _held_share(stream) > _HOLDS]
+        if not self.named("rudder_order") and len(held) == 1 and any(_held_share(other) < _MOVES for other in angles):
+            self.streams[self.streams.index(held[0])] = replace(held[0], quantity="rudder_order")
+
     def _exchanged_rudders(self) -> None:
         """Refuse an angle that stays at its values and an order that never does: an order holds until the next."""
         angle, order = self._best("rudder_angle"), self._best("rudder_order")
         if angle is None or order is None:
             return
-        held = [float((np.diff(self._stream(channel.stream).values) == 0).mean()) for channel in (angle, order)]
-        if held[0] > 0.5 and held[1] < 0.2:
+        held = [_held_share(self._stream(channel.stream)) for channel in (angle, order)]
+        if held[0] > _HOLDS and held[1] < _MOVES:
             self.fault(self._stream(angle.stream), f"holds its values as an order does, and {order.stream} does not")
             self._doubt((angle.stream, order.stream), "order and angle seem exchanged")
 
@@ -477,6 +532,10 @@ class _Search:
                 self.findings.append(LogFinding("note", f"{stream.name} is positive to port", stream.name))
         if confidence < DIFFERS:
             self.fault(stream, why)
+        if stream.quantity == "rudder_order" and not stream.unit and unit == "deg":
+            confidence, why = min(confidence, _DOUBTED), f"{why}; deg by its size, and it may be in %"
+        if stream.quantity == "rudder_angle" and stream.stated_by == "name" and _held_share(stream) > _HOLDS:
+            confidence, why = min(confidence, _DOUBTED), f"{why}; it holds its values as an order does"
         self.add(stream, confidence, why, unit=unit, sign=sign)
 
     def _unnamed_rudder(self) -> None:
@@ -496,8 +555,7 @@ class _Search:
         candidates.sort(key=lambda entry: -entry[0])
         one_rudder = len(candidates) < 3 and all(self._alike(candidates[0][1], entry[1]) for entry in candidates[1:])
         for _, stream, evidence, unit in candidates:
-            steps = float((np.diff(stream.values) == 0).mean())
-            quantity = "rudder_order" if steps > 0.5 else "rudder_angle"
+            quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
             single = one_rudder or (stream is candidates[0][1] and candidates[0][0] > candidates[1][0] + 0.05)
             text = f"by content alone: {evidence.text}" + ("" if single else f"; {len(candidates)} streams would do")
             self.add(stream, 0.75 if single else 0.5, text, quantity=quantity, unit=unit, sign=evidence.sign)
@@ -510,7 +568,9 @@ class _Search:
 
     def _rudder_shares(self) -> None:
         """Orders in shares of the full rudder, scaled by the angle where it is known, else by the usual full rudder."""
-        for place, channel in enumerate(self.found):
+        for place, given in enumerate(self.found):
+            channel = self._by_angle(given) if given.quantity == "rudder_order" and given.unit == "deg" else given
+            self.found[place] = channel
             if channel.quantity not in ("rudder_order", "rudder_angle") or channel.unit not in ("1", "%"):
                 continue
             share = QUANTITIES["rudder_order"].units[channel.unit]
@@ -525,12 +585,26 @@ class _Search:
                 why += f"; full order is taken as {FULL_RUDDER_DEG:g} deg"
             self.found[place] = replace(channel, unit="deg", scale=scale, confidence=confidence, why=why)
 
-    def _ratio(self, measured: LogChannel, order: LogChannel) -> float | None:
+    def _by_angle(self, order: LogChannel) -> LogChannel:
+        """An order without a unit that is deg by its size: sure, or in %, by the angle that follows it."""
+        angle = next((c for c in self.found if c.quantity == "rudder_angle" and c.unit in ("deg", "rad")), None)
+        if self._stream(order.stream).unit or angle is None or angle.confidence < USED_FROM:
+            return order
+        ratio = self._ratio(angle, order, least_share=0.0)
+        if ratio is None:
+            return order
+        if abs(ratio - 1) < UNIT_SLACK:
+            return replace(
+                order, confidence=max(order.confidence, SURE_FROM), why=f"{order.why}; {angle.stream} shows deg"
+            )
+        return replace(order, unit="%")
+
+    def _ratio(self, measured: LogChannel, order: LogChannel, least_share: float = 0.3) -> float | None:
         """Measured value (SI) over ordered share, where the order is held and not small; None where it never is."""
         given, shown = self._stream(order.stream), self._stream(measured.stream)
         share = order.si(given.values)
         value = interpolated(given.time_s, shown.time_s, measured.si(shown.values), 10.0)
-        good = np.isfinite(value) & (np.abs(share) > 0.3)
+        good = np.isfinite(value) & (np.abs(share) > (least_share or 0.3 * np.abs(share).max()))
         if good.sum() < FEW_SAMPLES:
             return None
         ratio = value[good] / share[good]
@@ -576,7 +650,11 @@ class _Search:
                     elif swap:
                         confidence, why = _CONTRADICTED, f"{why}: the turn contradicts its side"
                         self.fault(stream, why)
-                    self.add(stream, confidence, why, quantity=quantity, unit=_share_unit(stream, quantity))
+                    unit = _share_unit(stream, quantity)
+                    shown = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ
+                    if unit == "rpm" != stream.unit and not shown:
+                        confidence, why = min(confidence, _DOUBTED), f"{why}; rpm by their size"
+                    self.add(stream, confidence, why, quantity=quantity, unit=unit)
             for stream in ports[len(starboards) :] + starboards[len(ports) :]:
                 self.add(stream, 0.6, "the other side is missing", unit=_share_unit(stream, stream.quantity))
 
@@ -590,6 +668,12 @@ class _Search:
                 unit = _share_unit(stream, stream.quantity)
             if stream.quantity in ("wind_rel_direction", "wind_direction", "wind_theoretical_direction") and not unit:
                 unit = angle_unit(stream.values, "")
+            if (
+                stream.quantity == "heel"
+                and not unit
+                and np.percentile(np.abs(stream.values), 99.9) > _LARGEST_HEEL_RAD
+            ):
+                unit = "deg"
             confidence, why = self.judged(stream, UNTESTED)
             self.add(stream, confidence, why, unit=unit)
         self._engine_shares()
@@ -623,6 +707,24 @@ class _Search:
         order = {name: place for place, name in enumerate(QUANTITIES)}
         channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
         return ChannelSet(tuple(channels), tuple(self.findings))
+
+
+def _paired(first: LogStream, second: LogStream) -> tuple[LogStream, LogStream]:
+    """Two streams at the times that both have: cells of either may be missing."""
+    _, mine, other = np.intersect1d(first.time_s, second.time_s, return_indices=True)
+    return (
+        replace(first, time_s=first.time_s[mine], values=first.values[mine]),
+        replace(second, time_s=second.time_s[other], values=second.values[other]),
+    )
+
+
+def _common_beginning(first: str, second: str) -> int:
+    """Letters with which both names begin."""
+    return next((place for place, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), len(first))
+
+
+def _held_share(stream: LogStream) -> float:
+    return float((np.diff(stream.values) == 0).mean())
 
 
 def _degrees(stream: LogStream) -> Array:

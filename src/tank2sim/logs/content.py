@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,13 @@ FEW_SAMPLES = 30
 LEAST_TURNED_RAD = math.radians(60.0)
 """Change of heading in a log below which signs of headings are not judged. Project choice: on one course, a mirrored
 heading differs by a constant alone."""
+
+RATE_WINDOWS_S = (HEADING_WINDOW_S, 8.0, 30.0)
+"""Times over which heading and rate of turn are compared, s, one after the other until they agree. Project choice: a
+large ship turns so slowly that the noise of a compass hides it within seconds."""
+
+_DECISIVE = 0.97
+"""Correlation from which no longer time is tried (project choice)."""
 
 _LAGS_S = np.arange(-3.0, 3.01, 0.25)
 _NOMOTO_T_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
@@ -124,24 +132,31 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     return ContentEvidence(as_it_is, sign, offset_rad=offset, text=words)
 
 
-def rate_evidence(time_s: Array, values: Array, motion: ReferenceMotion) -> ContentEvidence:
-    """Compare a rate of turn (n,), in an unknown unit, with the derivative of the heading: unit, sign and delay."""
-    at, slope = differenced(motion.heading_time_s, motion.heading_rad, HEADING_WINDOW_S)
-    if len(at) < FEW_SAMPLES or len(time_s) < FEW_SAMPLES or np.ptp(values) == 0:
+def rate_evidence(
+    time_s: Array, values: Array, motion: ReferenceMotion, windows_s: Sequence[float] = RATE_WINDOWS_S
+) -> ContentEvidence:
+    """Compare a rate of turn (n,), in an unknown unit, with the derivative of the heading: unit, sign and delay.
+
+    The windows of the comparison, s, are tried until one is decisive.
+    """
+    if len(motion.heading_time_s) < FEW_SAMPLES or len(time_s) < FEW_SAMPLES or np.ptp(values) == 0:
         return UNTESTED
     area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time_s))])
-    rate_at, smooth = differenced(time_s, area, max(HEADING_WINDOW_S, usual_step(motion.heading_time_s)))
-    best_lag, best = 0.0, 0.0
-    for lag in _LAGS_S:
-        found = _correlation(interpolated(at + lag, rate_at, smooth, 5.0), slope)
-        if abs(found) > abs(best) + 1e-4:
-            best_lag, best = float(lag), found
-    other = interpolated(at + best_lag, rate_at, smooth, 5.0)
-    good = np.isfinite(other)
-    if good.sum() < FEW_SAMPLES:
+    best_lag, best, slope, other = 0.0, 0.0, np.zeros(0), np.zeros(0)
+    for window in windows_s:
+        at, slopes = differenced(motion.heading_time_s, motion.heading_rad, window)
+        rate_at, smooth = differenced(time_s, area, max(window, usual_step(motion.heading_time_s)))
+        for lag in _LAGS_S:
+            shifted = interpolated(at + lag, rate_at, smooth, 5.0)
+            found = _correlation(shifted, slopes)
+            if abs(found) > abs(best) + 1e-4:
+                good = np.isfinite(shifted)
+                best_lag, best, slope, other = float(lag), found, slopes[good], shifted[good]
+        if abs(best) > _DECISIVE:
+            break
+    if len(other) < FEW_SAMPLES:
         return UNTESTED
-    other, slope = other[good] - np.mean(other[good]), slope[good] - np.mean(slope[good])
-    scale = abs(float(np.sum(other * slope) / np.sum(other**2))) / max(best * best, 1e-9)
+    scale = float(np.std(slope) / np.std(other))  # either may have the noise
     unit = _nearest_unit(scale, "yaw_rate")
     text = f"correlates with the derivative of the heading by {best:.3f}"
     text += f", {abs(best_lag):g} s {'late' if best_lag > 0 else 'early'}" if best_lag else ""

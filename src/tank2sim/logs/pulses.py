@@ -36,6 +36,11 @@ class PulseScale:
     rest_us: float
     span_us: float
 
+    @property
+    def two_way(self) -> PulseScale:
+        """The scale with rest in the middle, as of a rudder that lay hard over for most of a log."""
+        return PulseScale(MIDDLE_US, self.rest_us + self.span_us - MIDDLE_US)
+
     def share(self, pulses: Array) -> Array:
         """Shares of the full order (n,) of pulses (n,), us."""
         return (pulses - self.rest_us) / self.span_us

@@ -83,103 +83,183 @@ QUANTITIES: dict[str, LogQuantity] = {
 }
 """Every quantity of a channel. Signs are those of the trial format: starboard, ahead and clockwise are positive."""
 
-_PORT = r"\b(port|left|bb|backbord|babord|ps|l|prt|ptt)\b"
-_STARBOARD = r"\b(stbd|starboard|right|stb|steuerbord|tribord|sb|r|strb)\b"
-_ORDER = r"\b(order|orders|ordered|cmd|command|commanded|demand|set|setpoint|soll|desired|ref|reference|target)\b"
-_RUDDER = r"\b(rudder|ruder|ruderlage|helm|delta|rsa|barre|timon|roer|steering)\b"
-_SHAFT = r"\b(rpm|shaft|wellendrehzahl|drehzahl|propeller|revs|revolutions|engine|umdrehungen|n)\b"
-_THRUST = r"\b(thrust|thruster|thrusters|schub|motor|motors|throttle|propulsor|esc|pwm)\b"
-_WIND = r"\b(wind|wnd|awa|aws|twa|tws|twd)\b"
-_WATER = r"\b(water|stw|wasser|log|through|eau)\b"
-_GROUND = r"\b(ground|grund|sog|over|gps|fond)\b"
+_PORT = r"\b(port|left|bb|backbord|babord|ps|l|prt|ptt|links|babor|izquierd[oa]|bakboord|sinistr[oa])\b"
+_STARBOARD = (
+    r"\b(stbd|starboard|right|stb|steuerbord|tribord|sb|r|strb|rechts|estribor|derech[oa]|stuurboord|dritta|destr[oa]"
+    r"|styrbord)\b"
+)
+_ORDER = (
+    r"\b(orders?|ordered|ord|cmd|commands?|commanded|demand|set|setpoint|soll|desired|ref|reference|target|commande"
+    r"|consigne|ordre|orden|ordenado|ordine|comando|gewenste|onsket|\w*(?:sollwert|kommando|commando|befehl|ordre))\b"
+)
+_RUDDER = (
+    r"\b(rudder|rud|ruder\w*|helm|delta|rsa|barre|barra|timone?|gouvernail|roer\w*|ror(?:vinkel|utslag|kommando|ordre)?"
+    r"|steering)\b"
+)
+_REVOLUTIONS = (
+    r"\b(rpm|\w*drehzahl|revs|revolutions|umdrehungen|giri|tours|regime|revoluciones|\w*toerental|\w*turtall)\b"
+)
+_SHAFT = rf"{_REVOLUTIONS}|\b(shaft|propeller|engine|n|helice|elica|arbre)\b"
+_NOT_SPEED = r"\b(temp\w*|torque|fuel|power|load|pressure|flow|hours|current|alarm|limit)\b"
+_THRUST = (
+    r"\b(thrust|thruster|thrusters|thr|schub|motor|motors|moteur|motore|throttle|propulsor|propulseur|propulsore|esc|pwm"
+    r"|fahrhebel|stuwkracht|padrag|cmd|command)\b"
+)
+_WIND = (
+    r"\b(wind(?:geschw\w*|richtung|snelheid|richting|speed|angle)?|wnd|awa|aws|twa|tws|twd|vent|viento|vento"
+    r"|vindhastighet|vindretning)\b"
+)
+_FROM = r"\b(dir|direction|angle|winkel|angulo|angolo|\w*richtung|\w*richting|\w*retning|awa|twd)\b"
+_TRUE = r"\b(true|wahr\w*|vrai|real|reale|tw[asd])\b"
+_WATER = r"\b(water|stw|wassers?|log|through|eau|surface|agua|acqua|vannet)\b"
+_GROUND = r"\b(ground|grund|sog|over|gps|fondo?|grond|suolo|grunn)\b"
 _RATE_WORDS = (
     r"\b(rot|yawrate|yaw rate|turn rate|rate of turn|drehgeschw\w*|drehrate|wendegeschw\w*|gyr ?z|gyro ?z|omega ?z"
-    r"|wz|angular velocity z|rate ?turn)\b|^r$"
+    r"|wz|angular velocity z|rate ?turn|taux de giration|vitesse de (?:giration|rotation)|(?:velocidad|regimen) de giro"
+    r"|draaisnelheid|bochtaanwijzer|velocita (?:di accostata|angolare)|svinghastighet|dreiehastighet)\b|^r$"
 )
-_SPEED_WORDS = r"\b(speed|spd|fahrt|vitesse|velocity|geschw\w*|sog|stw)\b"
+_SPEED_WORDS = (
+    r"\b(speed|spd|fahrt|vitesse|velocity|\w*geschw\w*|sog|stw|velocidad|velocita|snelheid|grondsnelheid|fart)\b"
+)
+_TRANSVERSE = r"\b(transverse|trans|lateral|sway|quer\w*)\b"
 
 _PATTERNS: tuple[tuple[str, str, str], ...] = (
     # quantity, words that must be there, words that must not
-    ("latitude", r"\b(lat|latitude|breite)\b", r"\b(lateral|accel\w*|latency)\b"),
-    ("longitude", r"\b(lon|lng|long|longitude|lange|laenge|länge)\b", r"\b(longitudinal|speed|accel\w*)\b"),
     (
-        "wind_direction",
-        rf"(?=.*{_WIND})(?=.*\b(true|wahr\w*|twd)\b)(?=.*\b(dir|direction|richtung\w*|angle|twd)\b)",
-        "",
+        "latitude",
+        r"\b(lat|latitude|breite|breitengrad|latitud|latitudine|breedte|breedtegraad|bredde|breddegrad)\b",
+        r"\b(lateral|accel\w*|latency)\b",
     ),
-    ("wind_speed", rf"(?=.*{_WIND})(?=.*\b(true|wahr\w*|tws)\b)(?!.*\b(dir|direction|angle)\b)", ""),
     (
-        "wind_rel_direction",
-        r"(?=.*\b(wind|windrichtung|awa)\b)(?=.*\b(dir|direction|angle|windrichtung|richtung|awa|winkel)\b)",
-        r"\b(twa|true)\b",
+        "longitude",
+        r"\b(lon|lng|long|longitude|lange|laenge|langengrad|laengengrad|longitud|longitudine|lengte|lengtegraad|lengde"
+        r"|lengdegrad)\b",
+        r"\b(longitudinal|speed|spd|water|accel\w*)\b",
     ),
-    ("wind_rel_speed", r"\b(wind|aws|windgeschw\w*)\b", r"\b(dir|direction|angle|windrichtung|true|twa|tws|twd)\b"),
-    ("thrust_order_port", rf"(?=.*{_THRUST})(?=.*{_PORT})", r"\b(rpm|drehzahl|current|temp\w*)\b"),
-    ("thrust_order_starboard", rf"(?=.*{_THRUST})(?=.*{_STARBOARD})", r"\b(rpm|drehzahl|current|temp\w*)\b"),
-    ("rpm_port", rf"(?=.*{_SHAFT})(?=.*{_PORT})", r"\b(order|cmd|command|temp\w*|torque)\b"),
-    ("rpm_starboard", rf"(?=.*{_SHAFT})(?=.*{_STARBOARD})", r"\b(order|cmd|command|temp\w*|torque)\b"),
+    ("wind_direction", rf"(?=.*{_WIND})(?=.*{_TRUE})(?=.*({_FROM}|\btwa\b))", ""),
+    ("wind_speed", rf"(?=.*{_WIND})(?=.*{_TRUE})(?!.*{_FROM})", ""),
+    ("wind_rel_direction", rf"(?=.*{_WIND})(?=.*{_FROM})", _TRUE),
+    ("wind_rel_speed", _WIND, rf"{_FROM}|{_TRUE}|\b(temp\w*|chill|gust\w*)\b"),
+    ("thrust_order_port", rf"(?=.*{_THRUST})(?=.*{_PORT})", rf"{_REVOLUTIONS}|{_RUDDER}|{_NOT_SPEED}"),
+    ("thrust_order_starboard", rf"(?=.*{_THRUST})(?=.*{_STARBOARD})", rf"{_REVOLUTIONS}|{_RUDDER}|{_NOT_SPEED}"),
+    ("rpm_port", rf"(?=.*({_SHAFT}))(?=.*{_PORT})", rf"\b(order|cmd|command)\b|{_NOT_SPEED}"),
+    ("rpm_starboard", rf"(?=.*({_SHAFT}))(?=.*{_STARBOARD})", rf"\b(order|cmd|command)\b|{_NOT_SPEED}"),
     ("rudder_order", rf"(?=.*{_RUDDER})(?=.*{_ORDER})", ""),
-    ("rudder_angle", _RUDDER, _ORDER),
-    ("rpm_order", rf"(?=.*{_SHAFT}|.*\btelegraph\b|.*\bthrottle\b)(?=.*({_ORDER}|\btelegraph\b))", _RUDDER),
-    ("rpm", _SHAFT, r"\b(temp\w*|torque|fuel|power|load|pressure)\b"),
+    ("rudder_angle", _RUDDER, rf"{_ORDER}|\b(trim|mode|limit|alarm)\b"),
+    (
+        "rpm_order",
+        rf"(?=.*({_SHAFT})|.*\btelegraph\b|.*\bthrottle\b)(?=.*({_ORDER}|\btelegraph\b))",
+        _RUDDER,
+    ),
+    ("rpm", _SHAFT, _NOT_SPEED),
     ("yaw_rate", _RATE_WORDS, r"\b(desired|set|error|ref)\b"),
     (
         "magnetic_heading",
         r"(?=.*\b(heading|hdg|compass|kompass)\b)(?=.*\b(mag|magnetic|compass|kompass|hdm)\b)|\bhdm\b",
-        "",
+        r"\b(true|gps|gnss)\b",
     ),
     (
         "heading",
-        r"\b(heading|hdg|hdt|psi|yaw|steuerkurs|gyro|cap|true heading|kreiselkurs|rumbo)\b",
-        r"\b(rate|speed|error|err|desired|des|set|cmd|ref|control|mag|u|r|e|x|y|z)\b",
+        r"\b(heading|hdg|hdt|psi|yaw|steuerkurs|gyro|cap|true heading|kreiselkurs|rumbo|proa|prua|gyrokoers|gyrokurs"
+        r"|vorausrichtung|voorliggende koers|ware koers|kurs rechtweisend|rettvisende kurs|stevnet kurs)\b",
+        r"\b(rate|speed|error|err|desired|des|set|cmd|ref|control|mag|u|r|e|x|y|z|fondo?|grunn|grond|suolo|grund)\b",
     ),
     (
         "cog",
-        rf"\b(cog|track|course|route)\b|(?=.*\bkurs\b)(?=.*{_GROUND})",
-        r"\b(error|cross|desired|speed)\b",
+        r"\b(cog|track|course|crs|route|rotta|kug|grondkoers|beholden kurs)\b"
+        rf"|(?=.*\b(kurs|koers|rumbo)\b)(?=.*{_GROUND})",
+        r"\b(error|cross|desired|speed|set|planned|ordered|to)\b",
     ),
+    ("v_water", rf"(?=.*{_TRANSVERSE})(?=.*{_SPEED_WORDS})(?!.*\b(ground|grund)\b)", ""),
+    ("v_ground", rf"(?=.*{_TRANSVERSE})(?=.*{_SPEED_WORDS})(?=.*\b(ground|grund)\b)", ""),
+    ("u_water", rf"(?=.*{_SPEED_WORDS})(?=.*{_WATER})|\b(stw|fd ?w|loggefahrt)\b", _TRANSVERSE),
     (
-        "v_water",
-        rf"(?=.*\b(transverse|lateral|sway|quer\w*)\b)(?=.*{_SPEED_WORDS})(?!.*\b(ground|grund)\b)",
-        "",
+        "sog",
+        rf"(?=.*{_SPEED_WORDS})(?=.*{_GROUND})|\b(grondsnelheid|fug|fart o grunn)\b",
+        rf"{_TRANSVERSE}|\b(wind|water)\b",
     ),
-    ("v_ground", rf"(?=.*\b(transverse|lateral|sway|quer\w*)\b)(?=.*{_SPEED_WORDS})(?=.*\b(ground|grund)\b)", ""),
-    ("u_water", rf"(?=.*({_SPEED_WORDS}|\bstw\b))(?=.*{_WATER})", r"\b(transverse|lateral|quer\w*)\b"),
-    ("sog", rf"(?=.*{_SPEED_WORDS})(?=.*{_GROUND})", r"\b(transverse|lateral|wind|water)\b"),
     ("a_x", r"\b(acc|accel|acceleration)\b.*\bx\b|\b(accx|ax)\b", ""),
     ("a_y", r"\b(acc|accel|acceleration)\b.*\by\b|\b(accy|ay)\b", ""),
-    ("heel", r"\b(heel|roll|phi|krangung|krängung|rollwinkel)\b", r"\b(rate|desired|speed)\b"),
+    (
+        "heel",
+        r"\b(heel|roll|phi|krangung|kraengung|rollwinkel|roulis|gite|escora|balance|slagzij|helling|sbandamento|rollio"
+        r"|krengning|rull)\b",
+        r"\b(rate|desired|speed|batt\w*|cell\w*)\b",
+    ),
 )
 _COMPILED = tuple(
     (name, re.compile(wanted), re.compile(barred) if barred else None) for name, wanted, barred in _PATTERNS
 )
 
 
+_SIGNAL_K = re.compile(r"^(navigation|propulsion|steering|environment)\.[a-z]")
+
+
+def unit_of_signal_k(name: str, quantity: str) -> str:
+    """Unit of a path of Signal K, which is SI (signalk.org, 1.7), revolutions in Hz; empty of any other name.
+
+    Parameters
+    ----------
+    name : str
+    quantity : str
+        A key of :data:`QUANTITIES`, or empty.
+
+    Examples
+    --------
+    >>> unit_of_signal_k("propulsion.main.revolutions", "rpm")
+    '1/s'
+    """
+    if not quantity or not _SIGNAL_K.match(name):
+        return ""
+    return "1/s" if name.endswith(".revolutions") else next(iter(QUANTITIES[quantity].units))
+
+
+_LETTERS = str.maketrans({"ø": "o", "æ": "ae", "ß": "ss"})
+"""Letters that are not one of a to z with an accent."""
+
+
 def plain_words(name: str) -> str:
     """Small letters without accents, words separated by single spaces: ``/ship/shaftRPM`` is ``ship shaft rpm``."""
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    text = unicodedata.normalize("NFKD", text.lower())
-    text = "".join(letter for letter in text if not unicodedata.combining(letter))
+    text = _without_accents(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name))
     return re.sub(r"[^a-z0-9]+", " ", text).strip()
+
+
+def _without_accents(text: str) -> str:
+    """Small letters without accents."""
+    text = unicodedata.normalize("NFKD", text.lower().translate(_LETTERS))
+    return "".join(letter for letter in text if not unicodedata.combining(letter))
 
 
 def quantity_of_name(name: str) -> str:
     """Quantity that the words of a name suggest; empty if they suggest none.
 
-    English, German and the abbreviations of NMEA are known.
+    English, German, French, Spanish, Dutch, Italian, Norwegian, and the abbreviations of NMEA are known. A number
+    behind a word is not part of it (``ROT1``).
     """
-    words = plain_words(name)
+    words = re.sub(r"(?<=[a-z])(?=\d)", " ", plain_words(name))
     for quantity, wanted, barred in _COMPILED:
         if wanted.search(words) and not (barred and barred.search(words)):
             return quantity
     return ""
 
 
+_ANOTHER = re.compile(
+    r"\b(temp\w*|volt\w*|battery|batt|current|amps?|depth|tiefe|fuel|pressure|baro\w*|humidity|hdop|pdop|satellites|sats"
+    r"|error|status|id|mode|pitch|trim|alt|altitude|load|power|torque)\b"
+)
+
+
+def names_another(name: str) -> bool:
+    """Whether the words of a name say that it is none of the quantities: a temperature, a voltage, a depth."""
+    return bool(_ANOTHER.search(plain_words(name)))
+
+
 def sign_of_name(name: str) -> int:
     """Sign that a name states, -1 where port is positive (``Ruderlage (Bb +)``), 1 where starboard is, 0 if none."""
-    text = name.lower().replace("positive", "+").replace("pos.", "+")
-    if re.search(r"(\b(bb|port|backbord|ps)\s*\+|\+\s*(to\s+)?(bb|port|backbord|ps)\b)", text):
-        return -1
-    if re.search(r"(\b(stb|stbd|starboard|steuerbord|sb)\s*\+|\+\s*(to\s+)?(stb|stbd|starboard|steuerbord)\b)", text):
-        return 1
+    text = _without_accents(name).replace("_", " ")
+    text = re.sub(r"\b(positive?|pos|positiv)\b\.?", "+", text)
+    port, starboard = (words.removeprefix(r"\b(").removesuffix(r")\b") for words in (_PORT, _STARBOARD))
+    for words, sign in ((port, -1), (starboard, 1)):
+        if re.search(rf"\b({words})\s*\+|\+\s*(to\s+)?({words})\b", text):
+            return sign
     return 0

@@ -13,7 +13,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.quantities import QUANTITIES, quantity_of_name
+from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, unit_of_signal_k
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
 from tank2sim.records.spelt_units import split_unit
 from tank2sim.records.text_layout import WHITESPACE, TextLayout, decoded_text, text_layout
@@ -26,8 +26,12 @@ _ZONES_H |= {"eet": 2, "eest": 3, "msk": 3, "sgt": 8, "hkt": 8, "jst": 9, "kst":
 _ZONES_H |= {"est": -5, "edt": -4, "cst": -6, "cdt": -5, "mst": -7, "mdt": -6, "pst": -8, "pdt": -7}
 """Hours of time zones before UTC, by the abbreviations that names of columns use (IANA time zone database)."""
 
-_TIME_WORDS = re.compile(r"\b(time|times|timestamp|zeit|uhrzeit|utc|datetime|epoch|stamp|heure|hora|t|secs|seconds)\b")
-_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha)\b")
+_TIME_WORDS = re.compile(
+    r"\b(time|times|timestamp|zeit|uhrzeit|zeitstempel|utc|datetime|epoch|stamp|heure|horodatage|hora|ora|tijd|tijdstip"
+    r"|tid|tidspunkt|t|secs|seconds)\b"
+)
+_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha|data|dato)\b")
+_DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 """Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
 
@@ -88,7 +92,7 @@ def read_table_log(path: Path) -> VesselLog:
     time, dated, used = _time(path, frame, findings)
     if not np.isfinite(time).any():
         name = sorted(used, key=list(frame.columns).index)[-1]
-        first = next((str(value) for value in frame[name].dropna()[:1]), "")
+        first = _first_cell(frame[name])
         remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
         raise InputError(path, f"column {name}", f"holds no time that can be read, as {first[:40]!r}", remedy)
     streams = [
@@ -105,8 +109,8 @@ def read_table_log(path: Path) -> VesselLog:
 
 def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
     """A column with the quantity that its name suggests, unless its unit is of another kind."""
-    unit = unit or split_unit(name)[1]
     quantity = quantity_of_name(name)
+    unit = unit or split_unit(name)[1] or unit_of_signal_k(name, quantity)
     if quantity and unit and unit not in QUANTITIES[quantity].units:
         quantity = ""
     return LogStream(name, time, values, unit, quantity, "name" if quantity else "")
@@ -131,9 +135,14 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
     import pandas as pd
 
     named = [name for name in frame.columns if _TIME_WORDS.search(_plain(name))]
-    dates = [name for name in frame.columns if _DATE_WORDS.search(_plain(name)) and name not in named]
-    for name in [*named, *dates, *frame.columns[:1]]:
-        column = frame[name]
+    dates = [
+        name
+        for name in frame.columns
+        if _DATE_WORDS.search(_plain(name)) and name not in named and _DATE.match(_first_cell(frame[name]))
+    ]
+    clocks = [name for name in frame.columns if name not in (*named, *dates) and _looks_like_time(frame[name])]
+    for name in [*named, *dates, *clocks, *frame.columns[:1]]:
+        column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
             values = column.to_numpy(dtype=float)
             size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
@@ -141,7 +150,7 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
                 if least <= size <= largest:
                     return values * factor, True, {name, *dates}
             continue
-        first = next((str(value) for value in column.dropna()[:1]), "")
+        first = _first_cell(column)
         offset = _zone_s(name, findings)
         if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
             return (
@@ -156,8 +165,9 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
             clock = pd.to_timedelta(_clock_text(column), errors="coerce").dt.total_seconds().to_numpy(dtype=float)
             return days + clock, True, {name, dates[0]}
     for name in named or list(frame.columns[:1]):
-        if pd.api.types.is_numeric_dtype(frame[name]):
-            values = frame[name].to_numpy(dtype=float)
+        column = _as_numbers(frame[name])
+        if pd.api.types.is_numeric_dtype(column):
+            values = column.to_numpy(dtype=float)
             steps = np.diff(values[np.isfinite(values)])
             if len(steps) and (steps >= 0).mean() > 0.9:
                 text = f"{name} counts from the beginning of the log: the trials have no date"
@@ -165,6 +175,24 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
                 return values * _relative_scale(name, values), False, {name}
     remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
     raise InputError(path, "header", "there is no column of time", remedy)
+
+
+def _as_numbers(column: pd.Series[Any]) -> pd.Series[Any]:
+    """A column of numbers with another decimal sign than the rest of the table as numbers; any other as it is."""
+    import pandas as pd
+
+    if pd.api.types.is_numeric_dtype(column) or not re.fullmatch(r"\s*-?\d+[.,]\d+\s*", _first_cell(column)):
+        return column
+    return pd.to_numeric(column.astype(str).str.replace(",", ".", regex=False), errors="coerce")
+
+
+def _looks_like_time(column: pd.Series[Any]) -> bool:
+    """Whether the first cell of a column is a date with a time, or a time of day."""
+    return bool(re.match(rf"({_DATE.pattern}[T ,]+)?\d{{1,2}}:\d\d", _first_cell(column)))
+
+
+def _first_cell(column: pd.Series[Any]) -> str:
+    return next((str(value) for value in column.dropna()[:1]), "")
 
 
 def _relative_scale(name: str, values: Array) -> float:

@@ -131,7 +131,10 @@ def _separator(sample: Sequence[str], known: str) -> tuple[str, int]:
         width, count = Counter(map(len, rows)).most_common(1)[0]
         if width < 2 or (count < _REGULAR * len(rows) and not known):
             continue
-        numbers = sum(_is_number(cell) for row in rows if len(row) == width for cell in row) / (width * count)
+        if separator == WHITESPACE and found[0] in ";\t|" and best > _MOSTLY:
+            break  # blanks would cut a table of tabs as well, and empty cells would shift its columns
+        filled = [cell for row in rows if len(row) == width for cell in row if cell.strip()]
+        numbers = sum(map(_is_number, filled)) / max(len(filled), 1)
         if separator == WHITESPACE and not known and numbers < _REGULAR:
             continue  # blanks within cells of dates, positions or words
         if numbers > best + 1e-9:

@@ -1,12 +1,14 @@
 """Stability and turning of a craft with two thrusters, against the equations written out and the simulation."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
 from tank2sim.analysis.stability.craft import craft_stability
+from tank2sim.api.craft_stability import CraftStabilityResult
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
 
@@ -84,6 +86,17 @@ def test_a_craft_unstable_on_a_straight_course_turns_without_a_difference():
     assert study.turns[0].difference_radps == 0.0
     assert study.turns[0].yaw_rate_radps > 0
     assert craft_stability(t2s.load("otter").card, 0.7).run.stable
+
+
+@pytest.mark.parametrize(("lengths", "nearly_straight"), [(30.0, False), (1.2e4, True)])
+def test_a_loop_of_thousands_of_lengths_is_nearly_straight(lengths, nearly_straight):
+    otter = t2s.load("otter")
+    study = craft_stability(otter.card)
+    alone = replace(study.turns[0], diameter_m=lengths * otter.card.ship.length_m)
+    found = CraftStabilityResult(otter, replace(study, turns=(alone, *study.turns[1:])))
+    assert (found.stable, found.nearly_straight) == (False, nearly_straight)
+    assert found.to_dict()["nearly_straight"] is nearly_straight
+    assert ("by itself" in " ".join(found.headline)) is not nearly_straight
 
 
 def test_a_speed_beyond_the_thrusters_is_refused(made_up):

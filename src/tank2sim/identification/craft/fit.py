@@ -48,8 +48,11 @@ STRONGER = (1.0, 2.0, 4.0, 8.0, 16.0)
 FEWEST_TRIALS = 5
 """Fewest trials whose currents and winds determine how much these differ (project choice)."""
 
-LEAST_SPREAD = 0.1
-"""Least spread of a disturbance between trials, over that before them (project choice)."""
+LEAST_SPREAD = 0.03
+"""Least spread of a disturbance between trials, over that before them: 0.01 m/s of a current (project choice)."""
+
+_EXPECTATIONS = 1000
+"""Rounds after which the spread between trials no longer changes in what is printed."""
 
 _LINEARISATIONS = 5
 """Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
@@ -154,13 +157,49 @@ def _first_estimate(problem: Problem, settings: KalmanSettings, progress: Search
 
 
 def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array, Array]:
-    """Mean and spread (5,) of the disturbances over the trials; the spread is within what is known without them."""
+    """Mean and spread (5,) of the disturbances over the trials; the spread is within what is known without them.
+
+    `runs` are smoothed with the means 0 and the wide spreads of :func:`.craft_problem`.
+    """
     places = [problem.model.state_names.index(name) for name in DISTURBANCES]
     wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
-    found = np.stack([smoothed.states[0, places] for smoothed in runs])
-    if len(found) < FEWEST_TRIALS:
+    if len(runs) < FEWEST_TRIALS:
         return np.zeros(len(wide)), wide
-    return found.mean(axis=0), np.clip(found.std(axis=0, ddof=1), LEAST_SPREAD * wide, wide)
+    found = np.stack([smoothed.states[0, places] for smoothed in runs])
+    errors = np.stack([smoothed.state_errors[0, places] for smoothed in runs])
+    pairs = [spread_between(*columns) for columns in zip(found.T, errors.T, wide, strict=True)]
+    means, spreads = map(np.array, zip(*pairs, strict=True))
+    return means, np.clip(spreads, LEAST_SPREAD * wide, wide)
+
+
+def spread_between(found: Array, errors: Array, before: float) -> tuple[float, float]:
+    """Mean and standard deviation of a quantity over trials, without the errors with which each trial shows it.
+
+    Normal in the trials and between them; the greatest likelihood, by expectation and maximisation (Dempster, Laird
+    and Rubin 1977, J. R. Stat. Soc. B 39).
+
+    Parameters
+    ----------
+    found, errors : array (n,)
+        Of each trial, and its standard error, where it was known beforehand to be 0 within `before`.
+    before : float
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> mean, spread = spread_between(np.array([0.9, 1.1, 1.0, 1.0]), np.full(4, 0.1), 100.0)
+    >>> round(mean, 3), spread < 0.01
+    (1.0, True)
+    """
+    precision = np.maximum(1 / np.maximum(errors, 1e-9 * before) ** 2 - 1 / before**2, 1e-6 / before**2)
+    alone = found / errors**2 / precision
+    mean, variance = float(np.average(alone, weights=precision)), before**2
+    for _ in range(_EXPECTATIONS):
+        left = 1 / (precision + 1 / variance)
+        each = left * (precision * alone + mean / variance)
+        mean = float(each.mean())
+        variance = float(np.mean((each - mean) ** 2 + left))
+    return mean, float(np.sqrt(variance))
 
 
 def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
