@@ -56,7 +56,7 @@ enum {{ KEPT = NX }};
 #endif
 typedef struct {{
   double h, first, second, side;
-  long changing, limit, kept, watches, most, times, own; /* own: from the times of one ship to those of the next */
+  long changing, limit, kept, watches, most, times, stride; /* from the times of one ship to those of the next */
   const double *inputs, *limits, *at;
 }} Plan;
 typedef struct {{
@@ -154,7 +154,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
       LANE(end, l) = ends[k];
       LANE(goal, l) = goals[2 * k];
       for (int w = 0; w < plan->watches; ++w) LANE(level[w], l) = levels[k * plan->watches + w];
-      at[l] = plan->at + k * plan->own;
+      at[l] = plan->at + k * plan->stride;
       if (plan->times) LANE(soon, l) = at[l][0];
     }}
     for (int i = 0; i < NU; ++i) g.u[i] = all(plan->inputs[i]);
@@ -299,7 +299,7 @@ static void keep_sample(double *row, double t, double order, const V *x, int lan
 class _Plan(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_double) for name in ("h", "first", "second", "side")),
-        *((name, ctypes.c_long) for name in ("changing", "limit", "kept", "watches", "most", "times", "own")),
+        *((name, ctypes.c_long) for name in ("changing", "limit", "kept", "watches", "most", "times", "stride")),
         *((name, ctypes.c_void_p) for name in ("inputs", "limits", "at")),
     )
 

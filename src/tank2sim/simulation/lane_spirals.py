@@ -80,25 +80,25 @@ class LaneSpirals:
         rates = np.full((count, len(spiral.rudders)), np.nan)
         states = np.full((count, len(at), starts.shape[1]), np.nan)
         for place, rudder in enumerate(spiral.rudders):
-            held, before, some = np.zeros(count), np.full(count, np.inf), np.flatnonzero(fine)
-            while len(some):
-                lengths = np.minimum(STEADY_AFTER * ship_times[some], longest[some] - held[some])
-                due, places = _due(at, elapsed[some], elapsed[some] + lengths)
+            held, before, turning = np.zeros(count), np.full(count, np.inf), np.flatnonzero(fine)
+            while len(turning):
+                lengths = np.minimum(STEADY_AFTER * ship_times[turning], longest[turning] - held[turning])
+                due, places = _due(at, elapsed[turning], elapsed[turning] + lengths)
                 plan = LanePlan((rudder, rudder), "motion.psi", 1.0, 0, (), 0, inputs, due)
-                no_levels, no_goals = np.zeros((len(some), 0)), np.zeros((len(some), 2))
-                found = self._runner.runs(plan, p[some], x[some], lengths, no_levels, no_goals)
-                fine[some] = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
-                left[some] = np.minimum(left[some], found.left + elapsed[some])
+                no_levels, no_goals = np.zeros((len(turning), 0)), np.zeros((len(turning), 2))
+                found = self._runner.runs(plan, p[turning], x[turning], lengths, no_levels, no_goals)
+                fine[turning] = (found.ended == FINE) & np.isfinite(found.last).all(axis=1)
+                left[turning] = np.minimum(left[turning], found.left + elapsed[turning])
                 rows, columns = np.nonzero(places >= 0)
-                states[some[rows], places[rows, columns]] = found.states[rows, columns]
-                x[some] = found.last
-                held[some] += lengths
-                elapsed[some] += lengths
+                states[turning[rows], places[rows, columns]] = found.states[rows, columns]
+                x[turning] = found.last
+                held[turning] += lengths
+                elapsed[turning] += lengths
                 rate = found.last[:, yaw_rate]
-                over = longest[some] - held[some] <= 1e-6 * ship_times[some]  # apart from rounding
-                steady = is_steady(before[some], rate, ship_times[some])
-                before[some] = rate
-                some = some[fine[some] & ~over & ~steady]
+                over = longest[turning] - held[turning] <= 1e-6 * ship_times[turning]  # apart from rounding
+                steady = is_steady(before[turning], rate, ship_times[turning])
+                before[turning] = rate
+                turning = turning[fine[turning] & ~over & ~steady]
             rates[:, place] = np.where(fine, x[:, yaw_rate], np.nan)
         return SpiralRuns(rates, states, np.where(fine, left, np.nan), fine)
 

@@ -172,21 +172,21 @@ def flow_of(other: Body, speed: ca.SX, at: ca.SX, given: EffectSymbols, least: c
     )
 
 
-def clearance(given: EffectSymbols, own: Body, other: Body) -> ca.SX:
+def clearance(given: EffectSymbols, ship: Body, other: Body) -> ca.SX:
     """Least distance, m, between the centre lines of both ships; zero where they cross."""
     cos, sin = ca.cos(given["heading"]), ca.sin(given["heading"])
     x, y = given["forward"], given["starboard"]
-    halves = own.length / 2, other.length / 2
+    halves = ship.length / 2, other.length / 2
     # ends of the other ship in own axes, and own ends in its axes
-    there = [(x + side * cos * halves[1], y + side * sin * halves[1]) for side in (1, -1)]
-    here = [((side * halves[0] - x) * cos - y * sin, -(side * halves[0] - x) * sin - y * cos) for side in (1, -1)]
+    other_ends = [(x + side * cos * halves[1], y + side * sin * halves[1]) for side in (1, -1)]
+    ship_ends = [((side * halves[0] - x) * cos - y * sin, -(side * halves[0] - x) * sin - y * cos) for side in (1, -1)]
     squares = [
         ca.fmax(ca.fabs(along) - half, 0) ** 2 + across**2
-        for ends, half in ((there, halves[0]), (here, halves[1]))
+        for ends, half in ((other_ends, halves[0]), (ship_ends, halves[1]))
         for along, across in ends
     ]
     apart = ca.fmin(ca.fmin(squares[0], squares[1]), ca.fmin(squares[2], squares[3]))
-    crossed = ca.logic_and(there[0][1] * there[1][1] < 0, here[0][1] * here[1][1] < 0)
+    crossed = ca.logic_and(other_ends[0][1] * other_ends[1][1] < 0, ship_ends[0][1] * ship_ends[1][1] < 0)
     least: ca.SX = ca.sqrt(ca.if_else(crossed, 0, apart))
     return least
 
@@ -209,7 +209,7 @@ def _with_other_ship(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     model, (beam, draught, block) = with_particulars(model, card, "beam_m", "draught_m", "block_coefficient")
     length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
     u, v, r = (model.symbol(f"motion.{name}") for name in "uvr")
-    own = Body(length, MIDSHIP_COEFFICIENT * beam * draught, block / MIDSHIP_COEFFICIENT)
+    ship = Body(length, MIDSHIP_COEFFICIENT * beam * draught, block / MIDSHIP_COEFFICIENT)
     other_section = MIDSHIP_COEFFICIENT * given["beam"] * given["draught"]
     other = Body(given["length"], other_section, given["block_coefficient"] / MIDSHIP_COEFFICIENT)
     speed, mean_beam = given["speed"], (beam + given["beam"]) / 2
@@ -218,7 +218,7 @@ def _with_other_ship(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     surge, sway, yaw = (
         (model.symbol(f"inertia.{one}") - model.symbol(f"ship.{rigid}")) / density for one, rigid in moved
     )
-    hull = sections(own, (surge, sway, yaw))
+    hull = sections(ship, (surge, sway, yaw))
     x, flow = hull.x, flow_of(other, speed, hull.x, given, mean_beam / 2, depth)
     along, across = hull.areas + hull.along, hull.areas + hull.across
     passed = hull.across - hull.along
@@ -233,7 +233,7 @@ def _with_other_ship(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
         unit="m",
         description="Distance of the centre lines of both ships, where they are nearest, less half of both beams",
         nominal=model_particular(card, "beam_m"),
-        value=clearance(given, own, other) - mean_beam,
+        value=clearance(given, ship, other) - mean_beam,
     )
     inside = inside_range(CLEAR_BEAMS - left.symbol / mean_beam, CLEAR_BEAMS)
     if depth is not None:

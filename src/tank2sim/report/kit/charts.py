@@ -59,7 +59,7 @@ VEGALITE_VERSION = ".".join(alt.SCHEMA_VERSION.lstrip("v").split(".")[:2])
 """Version of Vega-Lite that Altair writes, and in which its charts are drawn: ``6.1``."""
 
 CHECKED_AGAINST_SCHEMA = False
-"""Whether each chart is held against the schema of Vega-Lite, which takes more than half of the time of a page. No
+"""Whether each chart is compared with the schema of Vega-Lite, which takes more than half of the time of a page. No
 chart's form depends on what a user gives: the tests of the pages set this, and a page is not delayed by it."""
 
 
