@@ -17,7 +17,8 @@ from gap_truth.ship import Array, polynomial
 
 TICK_S = 0.1
 SPARE_S = 10.0
-"""Every lane runs on after its end, for records whose clock stood still or whose rudder column is early."""
+"""Every lane runs on after its end at least so long, for records whose clock stood still or whose rudder column is
+early."""
 
 U, V, R, PSI, X, Y = range(6)
 RECORDED = ("u", "v", "r", "psi", "x", "y", "order", "rpm")
@@ -45,7 +46,9 @@ class Batch:
         self.hull = hull = lanes[0].setting.hull
         if any(lane.setting.hull is not hull for lane in lanes):
             raise ValueError("lanes of one ship expected")
-        self.duration_s = max(lane.manoeuvre.duration_s for lane in lanes) + SPARE_S
+        late = [("out_clock_freeze", "freeze_s"), ("rudder_time_offset", "delay_s")]
+        spare_s = max(SPARE_S, *(lane.value(*name, 0.0) for lane in lanes for name in late))
+        self.duration_s = max(lane.manoeuvre.duration_s for lane in lanes) + spare_s
         self.coefficients = {name: np.array([lane.coefficients[name] for lane in lanes]) for name in hull.coefficients}
         self.effects = [(force, *gathered(lanes, name)) for name, force in FORCES.items()]
         self.effects = [effect for effect in self.effects if effect[1].size]

@@ -80,6 +80,16 @@ def test_estimates_are_told_by_effect_and_parameter() -> None:
     assert second == ("current", {"size": -0.3}, {"size": pytest.approx(0.3)})
 
 
+def test_what_trials_do_not_determine_is_uncertain_by_its_whole_range_and_no_more() -> None:
+    toy = Toy((None, None))
+    low, high = toy.bounds
+    fit = ExplanationFit(toy, np.array([0.5, -0.3]), np.diag([1e12, 0.09]), LOGS, 0.0, np.zeros(0))
+    (_, values, errors), (*_, other) = estimates(fit)
+    uniform = np.random.default_rng(1).uniform(low[0], high[0], 200_000)
+    assert values == {"size": 0.5}
+    assert errors == {"size": pytest.approx(np.std(uniform), rel=0.01)} and other == {"size": pytest.approx(0.3)}
+
+
 # -- the force that is lacking -------------------------------------------------------------------------------------
 
 LENGTH_M, WATER_KGPM3, SPEED_MPS = 160.93, 1025.0, 7.7175

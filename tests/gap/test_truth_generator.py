@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gap_truth import EFFECTS, FIT, HOLDOUT, HULLS, OUTSIDERS, SENSORS, SHIP_TOML, Setting, make, write
 from gap_truth.disturbances import WANDER, WHITE, sensor_noise
-from gap_truth.integrate import integrate
+from gap_truth.integrate import SPARE_S, integrate
 from gap_truth.lane import Lane, lanes_of, parameters_of
 from gap_truth.manoeuvres import MANOEUVRES, Manoeuvre
 from gap_truth.record import recorded
@@ -253,6 +253,17 @@ def test_card_and_trials_are_those_of_the_worked_cases(data: Path) -> None:
     truth = json.loads((folder / "case_1-truth.json").read_text(encoding="utf-8"))
     assert (list(FIT), list(HOLDOUT)) == (truth["fit"], truth["holdout"])
     assert set(MANOEUVRES) == set(FIT + HOLDOUT)
+
+
+@pytest.mark.slow
+def test_a_record_whose_clock_stood_still_lasts_as_long_as_its_manoeuvre() -> None:
+    setting = Setting(("out_clock_freeze",), seed=207748247, ship="tanker", manoeuvres=("zigzag10_10",))
+    (lane,) = lanes_of(setting)
+    assert lane.value("out_clock_freeze", "freeze_s", 0.0) > SPARE_S
+    (made,) = make([setting])
+    trial = made.trials["zigzag10_10"]
+    assert trial["t_s"][-1] == pytest.approx(lane.manoeuvre.duration_s, abs=0.1)
+    assert np.isfinite(trial["u_mps"]).all()
 
 
 def test_unknown_names_are_refused() -> None:

@@ -68,6 +68,17 @@ def test_a_rudder_loses_its_share_over_five_degrees_past_stall(angle_deg: float,
     np.testing.assert_allclose(found, with_rudder(1 - lost, at), rtol=1e-9)
 
 
+@pytest.mark.parametrize(("angle_deg", "lost"), [(19.0, 0.0), (-25.0, 0.2), (31.0, 0.4)])
+@pytest.mark.parametrize("drag", [0.0, 0.25])
+def test_a_stalled_rudder_keeps_the_drag_that_it_is_said_to_keep(angle_deg: float, lost: float, drag: float) -> None:
+    at = {**STATES[0], "rudder.angle": angle_deg * DEG}
+    stall = {"angle_deg": 20.0, "loss": 0.4, "width_deg": 10.0, "drag": drag}
+    found, bare = (
+        values(model, ["rudder.X", "rudder.Y", "rudder.N"], at) for model in (ship({"rudder_stall": stall}), ship())
+    )
+    np.testing.assert_allclose(found / bare, [1 - drag * lost, 1 - lost, 1 - lost], rtol=1e-9)
+
+
 def test_a_biased_rudder_is_a_rudder_at_another_angle() -> None:
     at = {**STATES[0], "rudder.angle": 0.1}
     found = forces(ship({"rudder_bias": {"angle_deg": 2.0}}), at)

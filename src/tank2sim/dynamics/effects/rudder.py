@@ -119,6 +119,7 @@ RUDDER_SLIPSTREAM = Effect(
             1.0,
             0.0,
             optional=True,
+            typical=(0.0, 1.0),
             spread=1.0,  # nothing says beforehand which of the two it is (project choice)
         ),
     ),
@@ -128,10 +129,15 @@ RUDDER_SLIPSTREAM = Effect(
 
 
 def _stalled(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """F_delta (1 - loss s), s = 3 a^2 - 2 a^3 rising from 0 to 1 over :data:`STALL_WIDTH` above the angle of stall."""
-    beyond = (ca.fabs(model.symbol("rudder.effective")) - given["angle"]) / STALL_WIDTH
-    a = ca.fmax(0, ca.fmin(1, beyond))
-    return with_rudder_force(model, 1 - given["loss"] * a**2 * (3 - 2 * a))
+    """Y and N times 1 - loss s, X times 1 - drag loss s, s = 3 a^2 - 2 a^3 rising from 0 to 1 over ``width`` above the
+    angle of stall: with ``drag`` 1 the force normal to the rudder falls off, with 0 the lift, and the drag stays.
+    """
+    a = ca.fmax(0, ca.fmin(1, (ca.fabs(model.symbol("rudder.effective")) - given["angle"]) / given["width"]))
+    lost = given["loss"] * a**2 * (3 - 2 * a)
+    model = model.redefine("rudder.X", lambda force: (1 - given["drag"] * lost) * force)
+    for name in ("rudder.Y", "rudder.N"):
+        model = model.redefine(name, lambda force: (1 - lost) * force)
+    return model
 
 
 RUDDER_STALL = Effect(
@@ -155,6 +161,26 @@ RUDDER_STALL = Effect(
             1.0,
             absent=0.0,
             typical=(0.4,),  # project choice
+        ),
+        EffectParameter(
+            "width_rad",
+            "range of angle over which it is lost",
+            math.radians(1.0),  # a step would have no derivatives
+            math.radians(30.0),
+            STALL_WIDTH,
+            optional=True,
+            typical=(STALL_WIDTH, 3 * STALL_WIDTH),
+            spread=math.radians(10.0),  # behind a ship it may be gradual (project choice)
+        ),
+        EffectParameter(
+            "drag",
+            "share of that loss which the longitudinal force has too",
+            0.0,
+            1.0,
+            1.0,
+            optional=True,
+            typical=(0.0, 1.0),
+            spread=1.0,  # nothing says beforehand which of the two it is (project choice)
         ),
     ),
     equations=_stalled,

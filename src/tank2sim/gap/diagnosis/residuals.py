@@ -105,9 +105,11 @@ def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[st
 def estimates(fit: ExplanationFit) -> list[Found]:
     """Each effect of a fit with its parameters and their standard errors, SI, by the names of the parameters.
 
-    Those of single trials are in :func:`surroundings_by_trial`.
+    Those of single trials are in :func:`surroundings_by_trial`. What the trials do not determine at all (an angle
+    between two orders) has the standard deviation of a uniform distribution between its bounds.
     """
-    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    low, high = fit.hypothesis.bounds
+    errors = np.minimum(np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), (high - low) / np.sqrt(12))
     found: list[Found] = []
     for effect in fit.hypothesis.effects:
         places = [

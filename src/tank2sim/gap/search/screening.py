@@ -80,7 +80,7 @@ def variants(likelihood: Likelihood, hypothesis: Hypothesis) -> tuple[Variant, .
     """
     card = likelihood.none.card
     grids = [
-        estimate.parameter.typical_values(card) if estimate.parameter.default is None else (hypothesis.prior[0][place],)
+        estimate.parameter.typical_values(card) or (hypothesis.prior[0][place],)
         for place, estimate in enumerate(hypothesis.estimated)
     ]
     amplitudes = tuple(place for place, estimate in enumerate(hypothesis.estimated) if estimate.is_amplitude)
