@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tank2sim.identification.trials.methods.posterior import evidence_scale, scaled_prior
+from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 
 STATED = 0.05
@@ -55,3 +55,16 @@ def test_what_the_trials_do_not_show_does_not_widen_the_prior() -> None:
     information = np.diag([1e12, 0.0])
     scale = evidence_scale(problem, information, np.array([1 + 4 * STATED, 1.0]), {})
     assert scale["Y"] == pytest.approx(4.0), "one parameter is fixed, and it is four errors away"
+
+
+def test_parameters_that_the_trials_see_only_together_have_errors_all_the_same() -> None:
+    random = np.random.default_rng(3)
+    seen = random.standard_normal((400, 3)) * 1e3
+    columns = seen @ random.standard_normal((3, 12))  # 12 parameters, of which 3 combinations are seen
+    information = columns.T @ columns
+    rounded = information * (1 + 1e-11 * random.standard_normal(information.shape))
+    scores = [columns * random.standard_normal((400, 1))]
+    found = sandwich(rounded, np.ones(12), scores, np.eye(12))
+    assert np.all(np.diag(found) > 0)
+    # Nothing but the prior is known of the other nine combinations.
+    np.testing.assert_allclose(np.linalg.eigvalsh(found)[3:], 1.0, rtol=0.1)

@@ -16,8 +16,8 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import lsq_linear, minimize
 
 from tank2sim.arrays import Array
 from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
@@ -348,7 +348,7 @@ class Likelihood:
         return best
 
     def _noise(self, fit: ExplanationFit, linear: Linear, coefficients: Array, count: int) -> ExplanationFit:
-        """Noise and width for the columns as they are; the parameters follow linearly unless one is at a bound."""
+        """Noise and width for the columns as they are; the parameters follow linearly, within their bounds."""
         cost, scale = self._cost_of_noise(fit, linear, coefficients), self.scale
 
         def scaled(steps: Array) -> tuple[float, Array]:
@@ -400,14 +400,13 @@ class Likelihood:
         self, fit: ExplanationFit, linear: Linear, coefficients: Array
     ) -> Callable[[Array], tuple[float, Array]]:
         """Cost of the logarithms of noise and width and its slope, for the columns of a fit as they are."""
-        free = _inside(fit)
         columns = self._informative(fit, linear, self.columns(fit.hypothesis, fit.theta, coefficients))
 
         def cost(logs: Array) -> tuple[float, Array]:
             noisy = replace(fit, logs=logs)
             seen = self._observer(linear, noisy)
             wide = columns.scaled(noisy.width)
-            solved = self._solved(fit.hypothesis, fit.theta, seen, wide, free=free)
+            solved = self._solved(fit.hypothesis, fit.theta, seen, wide, free=True)
             counted = (_mixed(part, solved.weights) for part in (wide.driving, wide.shown, solved.whitened))
             by_noise = slopes(seen, *counted)
             coefficients_change = solved.change[: columns.coefficient_count]
@@ -422,15 +421,15 @@ class Likelihood:
 
     def cost_of_waves(self, fit: ExplanationFit) -> Callable[[WaveBand | None], float]:
         """Cost of accelerations by waves, for the columns of a fit as they are and at its noise; parameters and
-        coefficients follow linearly unless a parameter is at a bound."""
-        hypothesis, theta, free = fit.hypothesis, fit.theta, _inside(fit)
+        coefficients follow linearly, the parameters within their bounds."""
+        hypothesis, theta = fit.hypothesis, fit.theta
         linear = self.linear(hypothesis, theta)
         columns = self.columns(hypothesis, theta, self.of_coefficients(hypothesis, theta))
         columns = self._informative(fit, linear, columns).scaled(fit.width)
 
         def cost(waves: WaveBand | None) -> float:
             seen = observer(linear, fit.noise, waves)
-            return seen.log_det + self._solved(hypothesis, theta, seen, columns, free=free).reduced_cost
+            return seen.log_det + self._solved(hypothesis, theta, seen, columns, free=True).reduced_cost
 
         return cost
 
@@ -473,8 +472,8 @@ class Likelihood:
     def _solved(
         self, hypothesis: Hypothesis, theta: Array, seen: Observer, columns: FilterColumns, *, free: bool = False
     ) -> _Solved:
-        """Least squares over the parameters' and coefficients' columns; the cost of the residual is at the given
-        parameters, or at the solution if `free`."""
+        """Least squares over the parameters' and coefficients' columns, the parameters within their bounds; the cost of
+        the residual is at the given parameters, or at the solution if `free`."""
         whitened = seen.whiten(columns.driving, columns.shown)
         flat = whitened.reshape(-1, whitened.shape[-1])
         gram = flat.T @ flat
@@ -488,13 +487,21 @@ class Likelihood:
         identity = np.eye(len(normal))
         factor = cho_factor(normal / np.outer(size, size) + 1e-12 * identity)
         whole = cho_solve(factor, pull / size) / size
-        inner = normal[k:, k:]
+        inner, cross = normal[k:, k:], normal[k:, :k]
         held = cho_factor(inner)
-        alone = cho_solve(held, -gram[1 + k :, 0])
-        gain = float(pull @ whole - alone @ (inner @ alone))
+        alone = cho_solve(held, pull[k:])
+        low, high = (bound - theta for bound in hypothesis.bounds)
+        if np.any((whole[:k] < low) | (whole[:k] > high)):
+            follow = cho_solve(held, cross)
+            move = _bounded(normal[:k, :k] - cross.T @ follow, pull[:k] - cross.T @ alone, low, high)
+            whole = np.concatenate([move, alone - follow @ move])
+        decrease, without = (
+            float(2 * pull[-len(x) :] @ x - x @ (part @ x)) for x, part in ((whole, normal), (alone, inner))
+        )
+        gain = decrease - without
         change = whole[k:] if free else alone
         base = gram[0, 0] + float(precision @ (theta - mean) ** 2)
-        reduced_cost = base - (float(pull @ whole) if free else float(alone @ (inner @ alone)))
+        reduced_cost = base - (decrease if free else without)
         reduced_cost += 2 * float(np.sum(np.log(np.diag(held[0]))))
         covariance = cho_solve(factor, identity) / np.outer(size, size)
         spread = np.linalg.inv(inner)
@@ -515,10 +522,14 @@ class Likelihood:
         )
 
 
-def _inside(fit: ExplanationFit) -> bool:
-    """Whether no parameter of a fit is at a bound."""
-    least, largest = fit.hypothesis.bounds
-    return bool(np.all((fit.theta > least) & (fit.theta < largest)))
+def _bounded(normal: Array, pull: Array, low: Array, high: Array) -> Array:
+    """The x (k,) between bounds with the least x'Nx/2 - x'p: Stark and Parker (1995), Computational Statistics 10."""
+    size = np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), 1.0))
+    root = np.linalg.cholesky(normal / np.outer(size, size) + 1e-12 * np.eye(len(size)))
+    target = solve_triangular(root, pull / size, lower=True)
+    found = lsq_linear(root.T, target, (low * size, high * size), method="bvls")
+    x: Array = found.x / size
+    return x
 
 
 def _mixed(columns: Array, weights: Array) -> Array:

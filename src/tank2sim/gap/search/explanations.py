@@ -13,6 +13,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
@@ -217,9 +218,13 @@ def _polish(fitting: Fitting) -> None:
     """Refit the best with a converged noise, all others at this noise, and those that are then close once more.
 
     Scores at noises that have not converged differ by more than explanations do. An explanation that shares an effect
-    with the best is also tried from the best's parameters: a descent may have stopped at another minimum.
+    with the best is also tried from the best's parameters, and one whose shape lies at a bound from its typical shape:
+    a descent may have stopped at another minimum.
     """
     fitting.fit([refit(fitting.best(), [fitting.best().logs], LAST_ROUNDS)])
+    converged = fitting.best()
+    near = [fit for fit in fitting.found.values() if fit.score < fitting.best().score + CLOSE and _at_a_bound(fit)]
+    fitting.fit([Proposal(_of_typical_shape(fit), [fit.logs], ROUNDS, each=fit.hypothesis.each) for fit in near])
     best = fitting.best()
     best_thetas = thetas_of(best)
     each = best.hypothesis.each
@@ -241,9 +246,36 @@ def _polish(fitting: Fitting) -> None:
     close = [
         fit
         for effects, fit in fitting.found.items()
-        if fit is not best and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
+        if fit is not converged and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
     ]
     fitting.fit([refit(fit, [fit.logs, best.logs], LAST_ROUNDS) for fit in close])
+
+
+def _shapes(fit: ExplanationFit) -> NDArray[np.bool_]:
+    """Mask of the parameters that give an effect its shape, and that every card with it must state (k,)."""
+    return np.array(
+        [
+            one.run is None and not one.is_amplitude and one.parameter.default is None
+            for one in fit.hypothesis.estimated
+        ],
+        dtype=bool,
+    )
+
+
+def _at_a_bound(fit: ExplanationFit) -> bool:
+    """Whether a parameter of the shape lies at one of its bounds."""
+    low, high = fit.hypothesis.bounds
+    return bool(np.any(_shapes(fit) & ((fit.theta <= low) | (fit.theta >= high))))
+
+
+def _of_typical_shape(fit: ExplanationFit) -> dict[str, Array]:
+    """Parameters of a fit by effect, with those of the shape at the likeliest of their typical values."""
+    card = fit.hypothesis.card
+    typical = [
+        one.parameter.typical_values(card)[0] if shape else value
+        for one, shape, value in zip(fit.hypothesis.estimated, _shapes(fit), fit.theta, strict=True)
+    ]
+    return thetas_of(replace(fit, theta=np.array(typical)))
 
 
 def _on_top_of(fitting: Fitting, base: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:

@@ -92,11 +92,11 @@ def _meat(information: Array, scores: Sequence[Array], determined: float) -> Arr
     count = sum(len(score) for score in scores)
     total *= 1 / (1 - min(determined / max(count, 1), MOST_FITTED))
     # To a diagonal of 1 at most: trials with hardly any noise have an information so large that the rounding of one
-    # parameter's exceeds all of another's. What is added is negligible: 1e-9 of the prior's, 1e-12 of its own.
+    # parameter's exceeds all of another's. What is added is negligible: 1e-9 of the prior's, 1e-10 of its own.
     size = 1 / np.sqrt(np.diag(information) + 1.0)
     square = np.outer(size, size)
-    scaled = information * square
-    values, vectors = eigh(total * square, scaled + np.diag(1e-9 * size**2 + 1e-12))
+    scaled = 0.5 * (information + information.T) * square
+    values, vectors = eigh(total * square, scaled + np.diag(1e-9 * size**2 + 1e-10))
     root = scaled @ vectors
     meat: Array = (root * np.maximum(values, 1.0)) @ root.T
     return meat / square
