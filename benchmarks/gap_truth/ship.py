@@ -200,9 +200,9 @@ class Polynomial:
             monomials = monomials * powers[self._powers[place], place]
         terms = self._values * monomials
         sums = np.zeros((6, u.size))
-        for row, part in zip(sums, self._parts, strict=True):
+        for place, part in enumerate(self._parts):
             if part.stop > part.start:
-                row += np.add.accumulate(terms[part], axis=0)[-1]  # in this order, whatever n is
+                sums[place] += np.add.accumulate(terms[part], axis=0)[-1]  # in this order, whatever n is
         return sums[:3], sums[3:]
 
 

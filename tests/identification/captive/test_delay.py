@@ -144,16 +144,27 @@ def test_a_delay_that_sway_alone_shows_is_reported_and_not_corrected(tmp_path):
     assert abs(derivative.value - written.derivatives["Yvdot"]) < 1.96 * derivative.standard_error
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [-0.03, 0.0, 0.0015, 0.03])
-def test_intervals_cover_the_truth_with_any_delay(tmp_path, delay):
+FEW, MANY = (range(200, 206), 0.88, 1.0), (range(200, 220), 0.90, 0.985)
+
+
+@pytest.mark.parametrize(
+    ("delay", "seeds", "least", "most"),
+    [
+        *(pytest.param(delay, *MANY, marks=pytest.mark.long) for delay in (-0.03, 0.0, 0.0015, 0.03)),
+        *(pytest.param(delay, *FEW, marks=pytest.mark.slow) for delay in (0.0, 0.03)),
+    ],
+)
+def test_intervals_cover_the_truth_with_any_delay(tmp_path, delay, seeds, least, most):
+    """The bounds of few campaigns are wider, as chance makes them."""
     ratios, of_delay = [], []
-    for seed in range(200, 220):
+    for seed in seeds:
         found, written = reduced_with_truth(
             Campaign(seed=seed, rate_hz=10.0, force_delay_s=delay), tmp_path / str(seed)
         )
         ratios += errors_over(found, written, (*ACCELERATIONS, *DAMPING))
         of_delay.append((found.delay.size - delay) / found.delay.standard_error)
     covered = np.mean(np.abs(ratios) < 1.96)
-    assert 0.90 <= covered <= 0.985, covered
-    assert 0.6 < np.std(of_delay) < 1.5 and np.abs(np.mean(of_delay)) < 4 / np.sqrt(len(of_delay))
+    assert least <= covered <= most, covered
+    # Of normal errors of size 1 the spread of 20 lies within 0.6 to 1.5, and that of 6 within 0.3 to 1.75.
+    low, high = (0.6, 1.5) if len(seeds) == 20 else (0.3, 1.75)
+    assert low < np.std(of_delay) < high and np.abs(np.mean(of_delay)) < 4 / np.sqrt(len(of_delay))
