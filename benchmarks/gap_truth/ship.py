@@ -183,7 +183,7 @@ class Polynomial:
 
     def __init__(self, coefficients: dict[str, Array]) -> None:
         groups = [(force, of_rudder) for of_rudder in (False, True) for force in "XYN"]
-        names = [[name for name in _TERMS if name in coefficients and _group(name) == group] for group in groups]
+        names = [[name for name in _TERMS if name in coefficients and _row(name) == group] for group in groups]
         ordered = [name for group in names for name in group]
         self._values = np.array([coefficients[name] for name in ordered])
         self._powers = tuple(np.array([_TERMS[name] for name in ordered]).T)
@@ -206,7 +206,7 @@ class Polynomial:
         return sums[:3], sums[3:]
 
 
-def _group(name: str) -> tuple[str, bool]:
+def _row(name: str) -> tuple[str, bool]:
     """Force of a term, and whether it is the rudder's."""
     return name[0], _TERMS[name][3] > 0
 

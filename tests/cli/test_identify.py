@@ -57,6 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+NO_BANDS = ("--members", "0")
 FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 
@@ -87,7 +88,7 @@ def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
 
 def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
     """A 4 m model's zigzag, Froude-scaled, next to the ship's own turn."""
-    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", cwd=folder)
+    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", *NO_BANDS, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "25 times as long" in " ".join(result.stdout.split())
     found = json.loads((folder / "small.json").read_text())["derivatives"]
@@ -132,7 +133,7 @@ def test_a_card_that_was_never_measured_in_yaw_holds_after_the_fit_as_far_as_the
 
 def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     arguments = ("identify", "off.toml", *FITTED[::2], "--hold", "Xvv", "-o", "held.toml", "--json", "held.json")
-    result = tank2sim(*arguments, cwd=folder)
+    result = tank2sim(*arguments, *NO_BANDS, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "Xvv" not in json.loads((folder / "held.json").read_text())["derivatives"]
     before, after = (read_card(str(folder / name)) for name in ("off.toml", "held.toml"))
@@ -170,7 +171,9 @@ def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None
         kept = [place for place, head in enumerate(lines[0]) if head not in ("u_mps", "v_mps")]
         text = "\n".join(",".join(line[place] for place in kept) for line in lines)
         (folder / f"{name}_gps.csv").write_text(text + "\n")
-    result = tank2sim("identify", "off.toml", "zigzag20_gps.csv", "--json", "z.json", "-o", "z.toml", cwd=folder)
+    result = tank2sim(
+        "identify", "off.toml", "zigzag20_gps.csv", "--json", "z.json", "-o", "z.toml", *NO_BANDS, cwd=folder
+    )
     assert result.returncode == 0, result.stderr
     found = json.loads((folder / "z.json").read_text())
     assert "Xvv" not in found["derivatives"]

@@ -75,7 +75,7 @@ def test_the_smoother_is_exact_estimation_where_all_is_linear_and_normal() -> No
     np.testing.assert_allclose(np.cov(moved.T), covariance - gain @ slope @ covariance, atol=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_hold_made_up_ships() -> None:
     card, stream = prior_card(TANKER, "tanker"), np.random.default_rng(7)
     draws, _ = draws_of(card, 99)
