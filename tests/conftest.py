@@ -56,7 +56,7 @@ def private_cache(session_folder: Path) -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
-    """The fast tests compile with little optimisation, in 60 % of the time and to the same digits; slow ones as users do."""
+    """The fast tests compile with little optimisation, sooner and to the same digits; slow ones as users do."""
     compiler = find_compiler()
     if compiler is None or "not slow" not in pytestconfig.option.markexpr or os.name != "posix":
         return

@@ -42,12 +42,19 @@ def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
         tank2sim.simulat  # noqa: B018
 
 
-SEARCHING = ("design_campaign", "identify_craft")  # examples that take 10 s
+LENGTHY = (
+    "CampaignDesignResult",
+    "CheckResult",
+    "TrialDesignResult",
+    "design_campaign",
+    "design_trial",
+    "identify_craft",
+)
 
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in SEARCHING else ()) for name in tank2sim.__all__],
+    [pytest.param(name, marks=pytest.mark.slow if name in LENGTHY else ()) for name in tank2sim.__all__],
 )
 def test_examples_in_docstrings_are_true(name: str, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
