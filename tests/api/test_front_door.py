@@ -48,6 +48,7 @@ LENGTHY = (
     "TrialDesignResult",
     "design_campaign",
     "design_trial",
+    "guess",
     "identify_craft",
 )
 
