@@ -135,8 +135,8 @@ def test_figures_of_an_option_are_read_with_their_errors() -> None:
     ("values", "named"),
     [
         ({"advance@turn35": 97.0}, "advance=97"),
-        ({"advance@turn35": 970.0, "tactical_diameter@turn35": 400.0}, "400"),
-        ({"overshoot_1@zigzag10": 9.4, "overshoot_2@zigzag10": 90.0}, "90"),
+        pytest.param({"advance@turn35": 970.0, "tactical_diameter@turn35": 400.0}, "400", marks=pytest.mark.slow),
+        pytest.param({"overshoot_1@zigzag10": 9.4, "overshoot_2@zigzag10": 90.0}, "90", marks=pytest.mark.slow),
     ],
 )
 def test_impossible_and_contradictory_figures_are_named(values, named) -> None:
