@@ -58,6 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 NO_BANDS = ("--members", "0")
+SHORT = ("--method", "equation_error", "--structure", "card", *NO_BANDS)
 FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 
@@ -185,14 +186,12 @@ def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None
 
 
 def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) -> None:
-    several = ("--holdout", "turn-35.csv", "turn25.csv", "--members", "0", "--json", "several.json")
+    several = ("--holdout", "turn-35.csv", "turn25.csv", *SHORT, "--json", "several.json")
     result = tank2sim(
         "identify",
         "off.toml",
         *FITTED[:2],
         *several,
-        "--method",
-        "equation_error",
         "--holdout",
         "small.csv",
         cwd=folder,
@@ -256,6 +255,7 @@ REPAIRED = {
 }
 
 
+@pytest.mark.slow
 def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path) -> None:
     def identified(turn: str, zigzag: str) -> dict[str, float]:
         options = ("--method", "equation_error", "--members", "0", "--json", "unit.json")
@@ -287,7 +287,7 @@ def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> No
 
 def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: Path) -> None:
     """Its columns in another order, with fewer digits, every second row, and its first rows cut."""
-    made = ("identify", "off.toml", "zigzag10.csv", "turn25.csv", "--method", "equation_error", "-o", "signed.toml")
+    made = ("identify", "off.toml", "zigzag10.csv", "turn25.csv", *SHORT, "-o", "signed.toml")
     assert tank2sim(*made, cwd=folder).returncode == 0
     heads, *rows = ((folder / "turn25.csv").read_text()).splitlines()
     cells = [[f"{float(cell):.5g}" for cell in reversed(line.split(","))] for line in rows[4::2]]
@@ -305,7 +305,7 @@ def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: 
         asked = (command, "signed.toml", "zigzag20.csv", "--holdout", "unheard.csv", "-o", "held_out")
         refused(tank2sim(*asked, cwd=folder), "unheard.csv", "is held out", "signed.toml was fitted to it", "turn25")
         assert not (folder / "held_out").exists()
-    again = ("identify", "signed.toml", "zigzag10.csv", "zigzag20.csv", "--method", "equation_error", "-o", "more.toml")
+    again = ("identify", "signed.toml", "zigzag10.csv", "zigzag20.csv", *SHORT, "-o", "more.toml")
     assert tank2sim(*again, cwd=folder).returncode == 0
     card = read_card(str(folder / "more.toml"))
     assert isinstance(card, ManoeuvringCard)
@@ -316,7 +316,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     """The same card twice as long: its rudder would have to turn four times the inertia as fast."""
     text = (folder / "off.toml").read_text()
     (folder / "longer.toml").write_text(text.replace(f"length_m = {LENGTH}", f"length_m = {2 * LENGTH}"))
-    asked = ("identify", "longer.toml", *FITTED, "--method", "equation_error", "-o", "o.toml", "--json", "o.json")
+    asked = ("identify", "longer.toml", *FITTED, *SHORT, "-o", "o.toml", "--json", "o.json")
     result = tank2sim(*asked, cwd=folder)
     refused(result, "zigzag20", "longer.toml", "--force")
     assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()
