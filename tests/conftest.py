@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 
 # Matrices here are small and the workers of the tests share the cores: threads would only wait for each other.
@@ -12,6 +13,7 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import Model, build
+from tank2sim.native.compiler import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("TANK2SIM_DATA", ROOT.parent / "shared"))
@@ -50,3 +52,16 @@ def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def private_cache(session_folder: Path) -> None:
     """Compiled models of tests go to a folder of their own, so that no test passes on what was compiled earlier."""
     os.environ["XDG_CACHE_HOME"] = str(session_folder / "cache")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
+    """The fast tests compile with little optimisation, sooner and to the same digits; slow ones as users do."""
+    compiler = find_compiler()
+    if compiler is None or "not slow" not in pytestconfig.option.markexpr or os.name != "posix":
+        return
+    command, own = session_folder / "cc", session_folder / f"cc-{os.getpid()}"
+    own.write_text(f'#!/bin/sh\nexec {shlex.join(compiler)} "$@" -Og\n', encoding="utf-8")
+    own.chmod(0o755)
+    own.replace(command)  # one name for all worker processes: what one has compiled is known by it
+    os.environ["CC"] = str(command)

@@ -131,8 +131,11 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
 OWN_DOCUMENTS = ("pilotcard", "poster", "steer")
 """Commands whose result is a document of its own, which is no page of tables and charts."""
 
-SLOW = ("steer", "stability with small probabilities")
-"""Names whose result takes 10 s or more."""
+SLOW = (
+    *("autopilot", "autopilot along a track", "check", "design", "design of a sea trial", "guess", "identify", "steer"),
+    "stability with small probabilities",
+)
+"""Names whose result takes 5 s or more."""
 
 
 def marked(names: Iterable[str]) -> list[ParameterSet]:

@@ -85,7 +85,7 @@ def test_one_ship_in_two_libraries_turns_alike() -> None:
     assert theirs.figure(theirs.run(1e-4)) == pytest.approx(own.figure(own.run(own.delivered)), rel=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_table_has_every_library_and_holds_ours_and_theirs_to_one_accuracy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

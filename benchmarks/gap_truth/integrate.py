@@ -13,7 +13,7 @@ from gap_truth.lane import Lane
 from gap_truth.manoeuvres import Helm
 from gap_truth.memory import FlowMemory, Roll
 from gap_truth.motion import Index, Motion, Parameters
-from gap_truth.ship import Array, polynomial
+from gap_truth.ship import Array, Polynomial
 
 TICK_S = 0.1
 SPARE_S = 10.0
@@ -50,6 +50,7 @@ class Batch:
         spare_s = max(SPARE_S, *(lane.value(*name, 0.0) for lane in lanes for name in late))
         self.duration_s = max(lane.manoeuvre.duration_s for lane in lanes) + spare_s
         self.coefficients = {name: np.array([lane.coefficients[name] for lane in lanes]) for name in hull.coefficients}
+        self.polynomial = Polynomial(self.coefficients)
         self.effects = [(force, *gathered(lanes, name)) for name, force in FORCES.items()]
         self.effects = [effect for effect in self.effects if effect[1].size]
         self.memories = [memory for memory in (Roll(lanes), FlowMemory(lanes)) if memory.lanes.size]
@@ -71,7 +72,7 @@ class Batch:
         u, v, r, psi = states[0][:4]
         speed = np.sqrt(u * u + v * v)
         v_prime, r_prime = v / speed, r * hull.length_m / speed
-        bare, steering = polynomial(self.coefficients, (u - hull.speed_mps) / speed, v_prime, r_prime, rudder)
+        bare, steering = self.polynomial((u - hull.speed_mps) / speed, v_prime, r_prime, rudder)
         total = bare + steering
         nominal = (hull.speed_mps / speed) ** 2
         total[0] += hull.xnn * (rpm_ratio * np.abs(rpm_ratio) - 1.0) * nominal

@@ -175,26 +175,40 @@ def _group(name: str) -> str:
     return name[0] + ("3" if sum(_TERMS[name][1:]) > 1 else "1")
 
 
-def polynomial(coefficients: dict[str, Array], u: Array, v: Array, r: Array, rudder: Array) -> tuple[Array, Array]:
-    """Hull and rudder forces, each (3, n): X', Y', N' of u' = (u - u0)/U, v', r' and the rudder (rad, starboard).
+class Polynomial:
+    """Hull and rudder forces by the terms of the derivatives; `coefficients` has an element a lane.
 
     Sums run term by term, so that a lane's last bit does not depend on the number of lanes beside it.
     """
-    bases = [(np.ones_like(base), base, base * base, base * base * base) for base in (u, v, r, -rudder)]
-    values: dict[tuple[int, ...], Array] = {}
-    terms = {name: powers for name, powers in _TERMS.items() if name in coefficients}
-    for powers in sorted(set(terms.values())):
-        value = bases[0][0]
-        for base, power in zip(bases, powers, strict=True):
-            if power:
-                value = base[power] if value is bases[0][0] else value * base[power]
-        values[powers] = value
-    hull, steering = np.zeros((3, u.size)), np.zeros((3, u.size))
-    rows = {"X": (hull[0], steering[0]), "Y": (hull[1], steering[1]), "N": (hull[2], steering[2])}
-    for name, powers in terms.items():
-        row = rows[name[0]][powers[3] > 0]
-        row += coefficients[name] * values[powers]
-    return hull, steering
+
+    def __init__(self, coefficients: dict[str, Array]) -> None:
+        groups = [(force, of_rudder) for of_rudder in (False, True) for force in "XYN"]
+        names = [[name for name in _TERMS if name in coefficients and _row(name) == group] for group in groups]
+        ordered = [name for group in names for name in group]
+        self._values = np.array([coefficients[name] for name in ordered])
+        self._powers = tuple(np.array([_TERMS[name] for name in ordered]).T)
+        ends = np.cumsum([len(group) for group in names])
+        self._parts = [slice(end - len(group), end) for group, end in zip(names, ends, strict=True)]
+
+    def __call__(self, u: Array, v: Array, r: Array, rudder: Array) -> tuple[Array, Array]:
+        """Each (3, n): X', Y', N' of u' = (u - u0)/U, v', r' and the rudder (rad, starboard)."""
+        base = np.array([u, v, r, -rudder])
+        square = base * base
+        powers = np.array([np.ones_like(base), base, square, square * base])
+        monomials = powers[self._powers[0], 0]
+        for place in (1, 2, 3):
+            monomials = monomials * powers[self._powers[place], place]
+        terms = self._values * monomials
+        sums = np.zeros((6, u.size))
+        for place, part in enumerate(self._parts):
+            if part.stop > part.start:
+                sums[place] += np.add.accumulate(terms[part], axis=0)[-1]  # in this order, whatever n is
+        return sums[:3], sums[3:]
+
+
+def _row(name: str) -> tuple[str, bool]:
+    """Force of a term, and whether it is the rudder's."""
+    return name[0], _TERMS[name][3] > 0
 
 
 def ship_toml(hull: Hull) -> str:

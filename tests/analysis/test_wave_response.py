@@ -47,6 +47,7 @@ def answer(in_waves: t2s.Ship) -> WaveTable:
     return wave_table(section.columns, section.rows)
 
 
+@pytest.mark.slow
 def test_in_long_waves_the_hull_follows_the_surface_and_its_slope(answer: WaveTable) -> None:
     beta, slope = answer.directions, LONG**2 / G
     np.testing.assert_allclose(answer.motions["heave"][0], -1.0, atol=0.01)
@@ -58,6 +59,7 @@ def test_in_long_waves_the_hull_follows_the_surface_and_its_slope(answer: WaveTa
     np.testing.assert_allclose(roll, -1j * np.sin(beta), atol=0.08)
 
 
+@pytest.mark.slow
 def test_very_long_waves_do_not_drift_the_hull_and_short_ones_push_it_along(answer: WaveTable) -> None:
     reflected = 0.5 * RHO * G * 160.93  # of a wall of the ship's length
     for force in ("X", "Y"):
@@ -68,6 +70,7 @@ def test_very_long_waves_do_not_drift_the_hull_and_short_ones_push_it_along(answ
     assert 0.2 * reflected < -Y[2] < reflected
 
 
+@pytest.mark.slow
 def test_a_hull_alike_fore_and_aft_is_pushed_and_turned_alike(answer: WaveTable) -> None:
     X, Y, N = (answer.drift[force][1] for force in ("X", "Y", "N"))
     np.testing.assert_allclose(X[::-1], -X, atol=0.05 * np.max(np.abs(X)))
@@ -81,6 +84,7 @@ def with_sea(ship: t2s.Ship, period_s: float) -> t2s.Ship:
     return t2s.Ship(parse_card(f'{ship.card.text}\n[[effects]]\nname = "waves"\nparameters = {given}\n', "ship.toml"))
 
 
+@pytest.mark.slow
 def test_the_ship_in_waves_is_pushed_away_from_them(in_waves: t2s.Ship) -> None:
     ship = with_sea(in_waves, period_s=7.0)
     straight = {"t_s": [0.0], "delta_order_deg": [0.0]}

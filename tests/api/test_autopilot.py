@@ -37,12 +37,13 @@ def test_margins_are_those_of_the_loop_that_is_drawn(pilot: t2s.AutopilotResult)
     assert pilot.margins["phase_margin_deg"].iloc[0] == pytest.approx(phase % 360 - 180, abs=2.0)
 
 
-def test_a_track_is_kept_whatever_form_it_has(pilot: t2s.AutopilotResult, tmp_path: Path) -> None:
+@pytest.mark.parametrize("form", ["file", pytest.param("table", marks=pytest.mark.slow)])
+def test_a_track_is_kept_whatever_form_it_has(pilot: t2s.AutopilotResult, tmp_path: Path, form: str) -> None:
     waypoints = pd.DataFrame({"y_m": [0, 0, 2000], "x_m": [0, 3000, 5000], "name": ["a", "b", "c"]})
     waypoints.to_csv(tmp_path / "track.csv", columns=["x_m", "y_m"], index=False)
-    for track in (waypoints, tmp_path / "track.csv"):
-        again = pilot.ship.autopilot(course_change_deg=-30, track=track)
-        pd.testing.assert_frame_equal(again.cross_track, pilot.cross_track)
+    track = waypoints if form == "table" else tmp_path / "track.csv"
+    again = pilot.ship.autopilot(course_change_deg=-30, track=track)
+    pd.testing.assert_frame_equal(again.cross_track, pilot.cross_track)
     assert set(pilot.cross_track.index) == {"line of sight", "with integral"}
 
 

@@ -69,11 +69,6 @@ def test_a_campaign_follows_its_schema(data) -> None:
 
 
 @pytest.mark.slow
-def test_the_demonstration_follows_its_schema(tmp_path) -> None:
-    jsonschema.validate(json.loads(t2s.run_demo(tmp_path).to_json()), t2s.json_schema("demo"))
-
-
-@pytest.mark.slow
 def test_trials_follow_their_schemas(data) -> None:
     case = data / "data/gap_cases/case_6"
     fit = t2s.identify(case / "ship.toml", case / "zigzag20_20.csv", holdout=case / "turn35_port.csv", members=3)

@@ -57,6 +57,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+NO_BANDS = ("--members", "0")
+SHORT = ("--method", "equation_error", "--structure", "card", *NO_BANDS)
 FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 
@@ -87,7 +89,7 @@ def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
 
 def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
     """A 4 m model's zigzag, Froude-scaled, next to the ship's own turn."""
-    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", cwd=folder)
+    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", *NO_BANDS, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "25 times as long" in " ".join(result.stdout.split())
     found = json.loads((folder / "small.json").read_text())["derivatives"]
@@ -132,7 +134,7 @@ def test_a_card_that_was_never_measured_in_yaw_holds_after_the_fit_as_far_as_the
 
 def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     arguments = ("identify", "off.toml", *FITTED[::2], "--hold", "Xvv", "-o", "held.toml", "--json", "held.json")
-    result = tank2sim(*arguments, cwd=folder)
+    result = tank2sim(*arguments, *NO_BANDS, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "Xvv" not in json.loads((folder / "held.json").read_text())["derivatives"]
     before, after = (read_card(str(folder / name)) for name in ("off.toml", "held.toml"))
@@ -170,7 +172,9 @@ def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None
         kept = [place for place, head in enumerate(lines[0]) if head not in ("u_mps", "v_mps")]
         text = "\n".join(",".join(line[place] for place in kept) for line in lines)
         (folder / f"{name}_gps.csv").write_text(text + "\n")
-    result = tank2sim("identify", "off.toml", "zigzag20_gps.csv", "--json", "z.json", "-o", "z.toml", cwd=folder)
+    result = tank2sim(
+        "identify", "off.toml", "zigzag20_gps.csv", "--json", "z.json", "-o", "z.toml", *NO_BANDS, cwd=folder
+    )
     assert result.returncode == 0, result.stderr
     found = json.loads((folder / "z.json").read_text())
     assert "Xvv" not in found["derivatives"]
@@ -182,14 +186,12 @@ def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None
 
 
 def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) -> None:
-    several = ("--holdout", "turn-35.csv", "turn25.csv", "--members", "0", "--json", "several.json")
+    several = ("--holdout", "turn-35.csv", "turn25.csv", *SHORT, "--json", "several.json")
     result = tank2sim(
         "identify",
         "off.toml",
         *FITTED[:2],
         *several,
-        "--method",
-        "equation_error",
         "--holdout",
         "small.csv",
         cwd=folder,
@@ -253,6 +255,7 @@ REPAIRED = {
 }
 
 
+@pytest.mark.slow
 def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path) -> None:
     def identified(turn: str, zigzag: str) -> dict[str, float]:
         options = ("--method", "equation_error", "--members", "0", "--json", "unit.json")
@@ -284,7 +287,7 @@ def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> No
 
 def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: Path) -> None:
     """Its columns in another order, with fewer digits, every second row, and its first rows cut."""
-    made = ("identify", "off.toml", "zigzag10.csv", "turn25.csv", "--method", "equation_error", "-o", "signed.toml")
+    made = ("identify", "off.toml", "zigzag10.csv", "turn25.csv", *SHORT, "-o", "signed.toml")
     assert tank2sim(*made, cwd=folder).returncode == 0
     heads, *rows = ((folder / "turn25.csv").read_text()).splitlines()
     cells = [[f"{float(cell):.5g}" for cell in reversed(line.split(","))] for line in rows[4::2]]
@@ -302,7 +305,7 @@ def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: 
         asked = (command, "signed.toml", "zigzag20.csv", "--holdout", "unheard.csv", "-o", "held_out")
         refused(tank2sim(*asked, cwd=folder), "unheard.csv", "is held out", "signed.toml was fitted to it", "turn25")
         assert not (folder / "held_out").exists()
-    again = ("identify", "signed.toml", "zigzag10.csv", "zigzag20.csv", "--method", "equation_error", "-o", "more.toml")
+    again = ("identify", "signed.toml", "zigzag10.csv", "zigzag20.csv", *SHORT, "-o", "more.toml")
     assert tank2sim(*again, cwd=folder).returncode == 0
     card = read_card(str(folder / "more.toml"))
     assert isinstance(card, ManoeuvringCard)
@@ -313,7 +316,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     """The same card twice as long: its rudder would have to turn four times the inertia as fast."""
     text = (folder / "off.toml").read_text()
     (folder / "longer.toml").write_text(text.replace(f"length_m = {LENGTH}", f"length_m = {2 * LENGTH}"))
-    asked = ("identify", "longer.toml", *FITTED, "--method", "equation_error", "-o", "o.toml", "--json", "o.json")
+    asked = ("identify", "longer.toml", *FITTED, *SHORT, "-o", "o.toml", "--json", "o.json")
     result = tank2sim(*asked, cwd=folder)
     refused(result, "zigzag20", "longer.toml", "--force")
     assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()

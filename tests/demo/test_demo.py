@@ -6,6 +6,7 @@ import json
 import zipfile
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 import tank2sim as t2s
@@ -54,6 +55,10 @@ def test_the_fmu_follows_the_measured_tows(demo) -> None:
     tows = demo[1]["towed_vehicle"]["tows"]
     assert len(tows) == 5
     assert all(tow["rms_mps"] < 0.008 and tow["largest_mps"] < 0.015 for tow in tows)
+
+
+def test_the_result_follows_its_schema(demo) -> None:
+    jsonschema.validate(json.loads(DemoResult(demo[0], demo[1]).to_json()), t2s.json_schema("demo"))
 
 
 def test_the_result_is_json_and_the_page_is_there(demo) -> None:

@@ -83,6 +83,7 @@ def test_a_campaign_of_ones_own_is_compared_in_place_of_the_usual_matrix(tmp_pat
     assert ((ratio > 0.9) & (ratio < 1.3)).all()
 
 
+@pytest.mark.slow
 def test_ranges_of_the_gauges_leave_out_what_is_too_strong(tmp_path):
     usual = plan()
     reach = usual.design.planned.largest_forces(max(usual.design.runs, key=lambda run: abs(run.drift_rad)))
@@ -172,6 +173,7 @@ def test_drawn_ships_count_as_much_as_the_one_of_the_card():
     assert (found.figures["variance_ratio"] < 1).all()
 
 
+@pytest.mark.slow
 def test_few_hours_are_compared_with_one_whole_usual_matrix_and_marked():
     few = plan(hours=1.0)
     once = plan(hours=None)  # the time of the usual matrix
@@ -183,6 +185,7 @@ def test_few_hours_are_compared_with_one_whole_usual_matrix_and_marked():
     assert not any("too few" in text for text in once.notices)
 
 
+@pytest.mark.slow
 def test_a_hardly_certain_figure_is_marked_with_the_gauge_at_fault():
     wide = TankFile.model_validate({"gauges": {"N_range_Nm": 1e9}})
     found = plan(tank=wide)
@@ -220,6 +223,7 @@ def test_derivatives_without_a_stated_error_are_marked_where_ships_are_drawn():
     assert not any("of the card" in text for text in _assumptions(replace(plan().design, card=bare), 0))
 
 
+@pytest.mark.slow
 def test_a_range_that_the_mechanism_cuts_is_noted():
     tank = TankFile.model_validate({"mechanism": {"drift_rad": np.radians(5.0), "rudder_rad": np.radians(10.0)}})
     found = plan(tank=tank, largest=(30.0, 35.0, 0.6), hours=2.0)

@@ -67,6 +67,7 @@ def test_the_information_of_a_manoeuvre_is_that_of_the_differences_of_its_readin
         assert np.linalg.eigvalsh(J.T @ J - each).min() > -1e-9 * np.trace(J.T @ J)
 
 
+@pytest.mark.slow
 def test_a_ship_that_is_unstable_on_a_straight_course_is_marked():
     """The KVLCC2 is (C' < 0), the Mariner is not."""
     unstable = design_trial("kvlcc2-captive", figures="steady_radius_m@20", sensors=SENSORS)

@@ -28,7 +28,7 @@ def model() -> Model:
     return ship({name: TYPICAL[name] for name in EFFECTS})
 
 
-@pytest.fixture(scope="module", params=[2, 3])
+@pytest.fixture(scope="module", params=[pytest.param(2, marks=pytest.mark.long), 3])
 def unpacked(request, model: Model, tmp_path_factory) -> UnpackedFmu:
     folder: Path = tmp_path_factory.mktemp("harbour")
     write_fmu(model, folder / "ship.fmu", fmi=request.param)

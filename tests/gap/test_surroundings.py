@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -41,8 +42,19 @@ def test_parts_along_north_and_east_are_speed_and_direction() -> None:
     assert Surroundings.of_parts(np.zeros(2), np.full(2, 0.1)).direction_error_rad == np.pi
 
 
-def case(folder: Path, setting: Setting) -> tuple[Made, ManoeuvringCard, Measured, Measured]:
-    (made,) = make([setting])
+@cache
+def sets() -> dict[str, Made]:
+    """A wind and a current that differ from trial to trial, and nothing; all in one batch."""
+    settings = {
+        "wind": Setting(("wind",), 41, by_trial=True, manoeuvres=(*TRIALS, *HELD)),
+        "current": Setting(("current",), 42, by_trial=True, manoeuvres=TRIALS),
+        "nothing": Setting((), 44, manoeuvres=TRIALS[:2]),
+    }
+    return dict(zip(settings, make(list(settings.values())), strict=True))
+
+
+def case(folder: Path, name: str) -> tuple[Made, ManoeuvringCard, Measured, Measured]:
+    made = sets()[name]
     write(made, folder)
     card = read_card(folder / "ship.toml")
     assert isinstance(card, ManoeuvringCard)
@@ -53,8 +65,7 @@ def case(folder: Path, setting: Setting) -> tuple[Made, ManoeuvringCard, Measure
 
 @pytest.fixture(scope="module")
 def windy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Made, ManoeuvringCard, Measured, Measured]:
-    setting = Setting(("wind",), 41, by_trial=True, manoeuvres=(*TRIALS, *HELD))
-    return case(tmp_path_factory.mktemp("windy"), setting)
+    return case(tmp_path_factory.mktemp("windy"), "wind")
 
 
 def test_each_trial_is_moved_by_its_own_wind_alone(windy: tuple) -> None:
@@ -104,7 +115,7 @@ SIGNALS = ("speed_mps", "direction_deg")
 
 
 def test_the_current_of_a_trial_is_found_from_its_replay(tmp_path: Path) -> None:
-    made, card, fitted, _ = case(tmp_path, Setting(("current",), 42, by_trial=True, manoeuvres=TRIALS))
+    made, card, fitted, _ = case(tmp_path, "current")
     with_current = add_effects_to_card(card, [("current", {}, {})])
     found = fit_surroundings(with_current, fitted, ("current",), NOISE)
     truth = made.parameters["current"]
@@ -134,8 +145,9 @@ def test_the_winds_of_all_trials_and_their_coefficients_are_found_from_replays(w
     assert np.median(found.predicted) < 0.2
 
 
+@pytest.mark.slow
 def test_a_wind_of_the_first_half_predicts_nothing_where_there_is_none(tmp_path: Path) -> None:
-    _, card, fitted, _ = case(tmp_path, Setting((), 44, manoeuvres=TRIALS[:2]))
+    _, card, fitted, _ = case(tmp_path, "nothing")
     with_wind = add_effects_to_card(card, [("wind", at_rest("wind"), {})])
     assert np.median(fit_common_surroundings(with_wind, fitted, "wind", NOISE).predicted) > 0.9
 
@@ -156,7 +168,7 @@ def test_probabilities_by_simulation_are_those_of_the_misfits_and_of_the_numbers
     assert gained == pytest.approx(passages * np.log(5.0) / 3, rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_wind_of_a_pond_is_named_by_simulation(data) -> None:
     bundled = read_card("esso-osaka")
     assert isinstance(bundled, ManoeuvringCard)

@@ -152,9 +152,10 @@ def run_each(*groups: list[Lane]) -> list[list[Trial]]:
 
 
 def rate_limited(hull: Hull, rate: float) -> list[Lane]:
-    """The turn of a ship whose gear is limited to this rate (deg/s)."""
+    """The first part of the turn of a ship whose gear is limited to this rate (deg/s)."""
     (lane,) = lanes_of(dataclasses.replace(QUIET, ship=hull.name, manoeuvres=("turn35_stbd",)))
-    return [dataclasses.replace(lane, effects={"rudder_rate_limit": {"max_rate_degps": rate}})]
+    begun = dataclasses.replace(lane.manoeuvre, duration_s=0.4 * lane.manoeuvre.duration_s)
+    return [dataclasses.replace(lane, manoeuvre=begun, effects={"rudder_rate_limit": {"max_rate_degps": rate}})]
 
 
 def test_noise_has_the_stated_size() -> None:

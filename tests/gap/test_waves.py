@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from gap_truth import FIT, Setting, make, sampled, write
+from gap_truth import Made, Setting, make, sampled, write
 from gap_truth.disturbances import WAVE_BAND_RADPS
 
 from tank2sim.cards import read_card
@@ -73,38 +74,50 @@ def test_with_waves_slopes_are_difference_quotients_in_every_other_noise() -> No
     assert found == pytest.approx(np.array(quotients), abs=1e-5, rel=1e-5)
 
 
+TRIALS, MINUTES = ("zigzag20_20", "turn35_stbd", "straight"), 20
+SETTINGS = (
+    Setting((), 31, process="waves", manoeuvres=TRIALS),
+    Setting(("wind",), 32, process="waves", manoeuvres=TRIALS),
+    Setting((), 33, process="gusts", manoeuvres=TRIALS),
+    Setting((), 34, process="waves", manoeuvres=TRIALS),
+)
+
+
+@cache
+def sets() -> dict[Setting, Made]:
+    return dict(zip(SETTINGS, make(SETTINGS), strict=True))
+
+
 def likelihood_of(setting: Setting, hertz: int, folder) -> tuple[Likelihood, ExplanationFit]:
     """Likelihood of made-up trials, and the card as it is, at the noise believed beforehand."""
-    (made,) = make([replace(setting, manoeuvres=FIT)])
-    write(sampled(made, hertz), folder)
+    write(sampled(sets()[setting], hertz), folder)
     card = read_card(folder / "ship.toml")
-    likelihood = likelihood_from_card(card, measured([folder / f"{name}.csv" for name in FIT], card))
+    likelihood = likelihood_from_card(card, measured([folder / f"{name}.csv" for name in TRIALS], card))
     nothing = np.zeros(0)
     fit = likelihood.at_best(likelihood.none, nothing, [likelihood.belief.logs], (5,))
     return likelihood, fit
 
 
-@pytest.mark.parametrize(("seed", "effects"), [(31, ()), (32, ("wind",))])
-def test_the_frequency_of_a_made_up_sea_is_found(seed: int, effects: tuple[str, ...], tmp_path) -> None:
-    setting = Setting(effects, seed, process="waves")
+@pytest.mark.parametrize("setting", SETTINGS[:2], ids=["no effect", "wind"])
+def test_the_frequency_of_a_made_up_sea_is_found(setting: Setting, tmp_path) -> None:
     truth = setting.generator("sea").uniform(*WAVE_BAND_RADPS)
     likelihood, fit = likelihood_of(setting, 1, tmp_path)
     waves = fit_waves(likelihood, fit)
     assert waves is not None
     assert waves.frequency == pytest.approx(truth, abs=0.05)
     explained = likelihood.with_waves(waves).at_best(fit.hypothesis, fit.theta, [fit.logs], (0,))
-    assert explained.score < fit.score - 100
+    assert explained.score < fit.score - 2 * MINUTES  # what a score tells grows with the length of the trials
     cost = likelihood.cost_of_waves(fit)  # without combinations of coefficients that the trials hardly determine
     assert cost(waves) - cost(None) == pytest.approx(explained.score - fit.score, rel=1e-3, abs=1.0)
 
 
 def test_no_waves_are_found_in_gusts(tmp_path) -> None:
-    assert fit_waves(*likelihood_of(Setting((), 33, process="gusts"), 1, tmp_path)) is None
+    assert fit_waves(*likelihood_of(SETTINGS[2], 1, tmp_path)) is None
 
 
 @pytest.mark.slow
 def test_an_effect_that_swings_as_waves_do_is_not_sought_in_them(tmp_path) -> None:
-    likelihood, _ = likelihood_of(Setting((), 34, process="waves"), 1, tmp_path)
+    likelihood, _ = likelihood_of(SETTINGS[3], 1, tmp_path)
     found = search(likelihood, names=("rudder_bias", "roll_coupling"), most=1)
     assert found.likelihood.belief.waves is not None
     assert {name for fit in found.fits for name in fit.hypothesis.effects} == {"rudder_bias"}

@@ -181,7 +181,7 @@ def test_straight_runs_alone_never_make_a_wrong_name_sure(effect: str, tmp_path:
 SOME = GapOptions(workers=1, effects=("cross_flow_drag", "wind", "rudder_lag", "rudder_time_offset"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_with_a_card_that_is_wrong_its_coefficients_are_fitted_together_with_the_effect(tmp_path: Path) -> None:
     (made,) = make([Setting(("cross_flow_drag",), SEED, manoeuvres=(*FOUR, *HELD))])
     case = sought(tmp_path, made, HELD, SOME, wrong=0.1)
@@ -207,8 +207,7 @@ def test_where_only_coefficients_are_wrong_they_are_the_explanation(tmp_path: Pa
     assert max(entry.moved for entry in case.gap.coefficients) > 1.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("hertz", [2, 1])
+@pytest.mark.parametrize("hertz", [pytest.param(2, marks=pytest.mark.long), pytest.param(1, marks=pytest.mark.slow)])
 def test_an_order_that_is_sampled_once_a_second_is_not_taken_for_a_late_gear(tmp_path: Path, hertz: int) -> None:
     (made,) = make([Setting((), SEED, manoeuvres=FOUR)])
     gear = GapOptions(workers=1, effects=("rudder_lag", "rudder_time_offset", "rudder_rate_limit", "rudder_dead_band"))
@@ -216,7 +215,7 @@ def test_an_order_that_is_sampled_once_a_second_is_not_taken_for_a_late_gear(tmp
     assert case.gap.verdict == NO_EFFECT_MISSING
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_late_gear_is_found_in_orders_that_are_sampled_twice_a_second(tmp_path: Path) -> None:
     (made,) = make([Setting(("rudder_time_offset",), SEED, manoeuvres=FOUR)])
     case = sought(tmp_path, sampled(made, 2), options=SOME)

@@ -50,7 +50,6 @@ def test_the_card_written_is_a_craft_with_the_estimates_and_their_errors(found) 
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_orders_alone_give_thrust_curve_damping_and_lag(craft, tmp_path) -> None:
     paths = written(tmp_path, craft, ["straight", "spin", "astern", "steps", "zigzag"], ordered=True)
     text = craft_log.first_card(craft, np.random.default_rng(5)).card.text
@@ -89,6 +88,7 @@ def test_trials_by_revolutions_and_by_orders_are_not_mixed(craft, tmp_path) -> N
     assert raised.value.source == str(first)
 
 
+@pytest.mark.slow
 def test_a_held_out_trial_is_predicted(found) -> None:
     r_squared = found.determination
     assert r_squared["u"] > 0.9 and r_squared["r"] > 0.9

@@ -78,8 +78,16 @@ def faulty(kind, change, shrunk=None, **options):
     return trial({**MOTIONS[kind], **change(MOTIONS[kind])}, noise=noise, **options)
 
 
-@pytest.mark.parametrize("kind", ["zigzag", "turn_port"])
-@pytest.mark.parametrize("name", FAULTS)
+def with_kinds(names, kinds):
+    """Parameters: each name with one of the kinds of motion, by turns, and with the others in slow tests."""
+    return [
+        pytest.param(name, kind, marks=() if place % len(kinds) == number else pytest.mark.slow)
+        for place, name in enumerate(names)
+        for number, kind in enumerate(kinds)
+    ]
+
+
+@pytest.mark.parametrize(("name", "kind"), with_kinds(FAULTS, ["zigzag", "turn_port"]))
 def test_a_wrong_column_is_named_and_corrected(kind, name):
     change, column, truth = FAULTS[name]
     record = faulty(kind, change, SHRUNK.get(name))
@@ -364,8 +372,7 @@ DEPENDENT = {
 }
 
 
-@pytest.mark.parametrize("kind", ["zigzag", "turn", "turn_port"])
-@pytest.mark.parametrize("name", DEPENDENT)
+@pytest.mark.parametrize(("name", "kind"), with_kinds(DEPENDENT, ["zigzag", "turn", "turn_port"]))
 def test_faults_that_depend_on_each_other_are_repaired_one_after_the_other(kind, name):
     change, columns = DEPENDENT[name]
     true, changed = MOTIONS[kind], change(MOTIONS[kind])

@@ -74,26 +74,27 @@ def _model(card: Card) -> Model:
         return yaw_rig_model(card.ship.name, card.yaw_rig)
     if not isinstance(card, ManoeuvringCard | CraftCard):
         raise TypeError(f"no model for {type(card).__name__}")
+    for number, entry in enumerate(card.effects):
+        _check_effect(card, entry, f"effects.{number}")
     model = craft_model(card) if isinstance(card, CraftCard) else ship_model(card)
-    for number, entry in sorted(enumerate(card.effects), key=lambda numbered: _comes_last(numbered[1])):
-        model = _with_effect(model, card, entry, f"effects.{number}")
+    for entry in sorted(card.effects, key=_comes_last):
+        model = _with_effect(model, card, entry)
     return model
 
 
 def _comes_last(entry: EffectEntry) -> bool:
-    effect = EFFECTS.get(entry.name)
-    return effect is not None and effect.last
+    return EFFECTS[entry.name].last
 
 
-def _with_effect(model: Model, card: ManoeuvringCard | CraftCard, entry: EffectEntry, place: str) -> Model:
+def _check_effect(card: ManoeuvringCard | CraftCard, entry: EffectEntry, place: str) -> None:
+    """Refuse an effect that is not known, not for this kind of ship, or whose parameters are not as it has them."""
     effect = EFFECTS.get(entry.name)
     if effect is None:
         raise card.fault(f"{place}.name", f"{entry.name!r} is not an effect", EFFECTS.remedy(entry.name))
     if isinstance(card, CraftCard) and not effect.fits_craft:
         fitting = ", ".join(name for name, other in EFFECTS.items() if other.fits_craft)
         raise card.fault(f"{place}.name", f"{entry.name} is not for a small craft", f"it can have {fitting}")
-    # What fits a craft reads nothing else of a card than what both kinds have.
-    shared = cast(ManoeuvringCard, card)
+    shared = _as_ship(card)
     known = {parameter.name: parameter for parameter in effect.parameters}
     for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
         for name in given:
@@ -110,7 +111,16 @@ def _with_effect(model: Model, card: ManoeuvringCard | CraftCard, entry: EffectE
             key, shown = card.in_file(f"{place}.parameters.{name}", value)
             lowest, highest = (from_si(key, bound) for bound in (parameter.lowest(shared), parameter.maximum))
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
-    changed = effect.apply(model, entry.parameters, shared)
+
+
+def _as_ship(card: ManoeuvringCard | CraftCard) -> ManoeuvringCard:
+    """The card as effects take it: what fits a craft reads nothing else of a card than what both kinds have."""
+    return cast(ManoeuvringCard, card)
+
+
+def _with_effect(model: Model, card: ManoeuvringCard | CraftCard, entry: EffectEntry) -> Model:
+    effect = EFFECTS[entry.name]
+    changed = effect.apply(model, entry.parameters, _as_ship(card))
     # One that changes derivatives has no force of its own.
     if effect.acts_on != "force" or effect.reads_derivatives or effect.changes:
         return changed

@@ -120,6 +120,11 @@ class Quantity(Variable):
 
     value: ca.SX
 
+    @cached_property
+    def uses(self) -> dict[int, str]:
+        """Names of the symbols in its expression, by their hash."""
+        return {symbol.element_hash(): symbol.name() for symbol in ca.symvar(self.value)}
+
 
 TRIM_STRIDE = 0.2
 """Longest Newton step towards steady motion, over the nominal size of a state: longer ones leap over the steady motion
@@ -277,9 +282,14 @@ class Model:
 
         `value` may hold the old symbol. A parameter that it does not hold acts on nothing any more, and is dropped.
         """
-        old = self.symbol(name)
-        kept = tuple(parameter for parameter in self.parameters if parameter.name != name or ca.depends_on(value, old))
-        return self._substituted(old, value, kept)
+        return self.substitute_all({name: value})
+
+    def substitute_all(self, values: Mapping[str, ca.SX]) -> Model:
+        """As :meth:`substitute`, of several variables at once: symbols in `values` are those from before."""
+        old = {name: self.symbol(name) for name in values}
+        dropped = {name for name, value in values.items() if not ca.depends_on(value, old[name])}
+        kept = tuple(parameter for parameter in self.parameters if parameter.name not in dropped)
+        return self._substituted(ca.vcat(list(old.values())), ca.vcat(list(values.values())), kept)
 
     def with_constants(self, names: Iterable[str]) -> Model:
         """A model without the parameters of these names: their start values are numbers in its equations."""
@@ -294,12 +304,16 @@ class Model:
 
     def _substituted(self, old: ca.SX, value: ca.SX, parameters: tuple[Parameter, ...]) -> Model:
         """The model with `value` in place of the symbols `old`, and with `parameters`."""
+        gone = {symbol.element_hash() for symbol in ca.symvar(old)}
 
         def changed(expression: ca.SX | float) -> ca.SX:
             return ca.substitute(ca.SX(expression), old, value)
 
         quantities = tuple(
-            same_symbol(quantity, replace(quantity, value=changed(quantity.value))) for quantity in self.quantities
+            quantity
+            if gone.isdisjoint(quantity.uses)
+            else same_symbol(quantity, replace(quantity, value=changed(quantity.value)))
+            for quantity in self.quantities
         )
         states = tuple(
             same_symbol(
@@ -429,11 +443,10 @@ class Model:
         known = {variable.symbol.element_hash() for variable in (*self.states, *self.inputs, *self.parameters)}
         uses: dict[str, set[str]] = {}
         for quantity in self.quantities:
-            symbols = {symbol.element_hash(): symbol for symbol in ca.symvar(quantity.value)}
-            unknown = [symbols[key].name() for key in symbols if key not in known and key not in by_symbol]
+            unknown = [name for key, name in quantity.uses.items() if key not in known and key not in by_symbol]
             if unknown:
                 raise ValueError(f"{quantity.name} uses {unknown}, which are not variables of the model")
-            uses[quantity.name] = {by_symbol[key].name for key in symbols if key in by_symbol}
+            uses[quantity.name] = {by_symbol[key].name for key in quantity.uses if key in by_symbol}
         try:
             order = graphlib.TopologicalSorter(uses).static_order()
             named = {quantity.name: quantity for quantity in self.quantities}

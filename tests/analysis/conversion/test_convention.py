@@ -59,10 +59,14 @@ def mariner_without(tmp_path: Path, *keys: str) -> Path:
     return written(tmp_path, kept.replace("[ship]\n", "[ship]\ndisplacement_kg = 17045000.0\n"), "ship.toml")
 
 
+EVERY = 5
+"""Of the ways to print a table so many-th one is tried where not all are: a prime to the counts of each choice."""
+
+
 @pytest.mark.parametrize("name", ["s175_container", "mariner", "esso_osaka_model", "tanker_1972"])
 def test_the_true_reading_of_a_scrambled_table_is_the_first(name: str, tmp_path: Path) -> None:
     source = HERE / f"{name}.csv"
-    for wanted in combinations(Table(source)):
+    for wanted in list(combinations(Table(source)))[::EVERY]:
         path = written(tmp_path, "\n".join(Table(source).rows(wanted)) + "\n")
         table = read_coefficients(path)
         ranked = with_probabilities([weigh(table, reading) for reading in possible_readings(table)])
@@ -70,17 +74,21 @@ def test_the_true_reading_of_a_scrambled_table_is_the_first(name: str, tmp_path:
         assert math.fsum(entry.probability for entry in ranked) == pytest.approx(1.0)
 
 
-@pytest.mark.slow
-def test_of_ten_published_tables_nine_in_ten_readings_are_true_and_all_but_for_the_origin(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("every", "least"), [pytest.param(1, 200, marks=pytest.mark.long), pytest.param(EVERY, 40, marks=pytest.mark.slow)]
+)
+def test_of_ten_published_tables_nine_in_ten_readings_are_true_and_all_but_for_the_origin(
+    tmp_path: Path, every: int, least: int
+) -> None:
     first, ship, count = 0, 0, 0
     for source in sorted(HERE.glob("*.csv")):
-        for wanted in combinations(Table(source)):
+        for wanted in list(combinations(Table(source)))[::every]:
             path = written(tmp_path, "\n".join(Table(source).rows(wanted)) + "\n")
             found = vars(t2s.convention(path).readings[0].reading)
             first += found == wanted
             ship += all(found[key] == wanted[key] for key in wanted if key != "origin")
             count += 1
-    assert count > 200 and first / count > 0.9 and ship / count > 0.98
+    assert count > least and first / count > 0.9 and ship / count > 0.98
 
 
 def test_every_reading_of_a_table_that_was_scrambled_that_way_is_the_same_ship(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def test_the_smoother_is_exact_estimation_where_all_is_linear_and_normal() -> No
     np.testing.assert_allclose(np.cov(moved.T), covariance - gain @ slope @ covariance, atol=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_hold_made_up_ships() -> None:
     card, stream = prior_card(TANKER, "tanker"), np.random.default_rng(7)
     draws, _ = draws_of(card, 99)
@@ -135,8 +135,8 @@ def test_figures_of_an_option_are_read_with_their_errors() -> None:
     ("values", "named"),
     [
         ({"advance@turn35": 97.0}, "advance=97"),
-        ({"advance@turn35": 970.0, "tactical_diameter@turn35": 400.0}, "400"),
-        ({"overshoot_1@zigzag10": 9.4, "overshoot_2@zigzag10": 90.0}, "90"),
+        pytest.param({"advance@turn35": 970.0, "tactical_diameter@turn35": 400.0}, "400", marks=pytest.mark.slow),
+        pytest.param({"overshoot_1@zigzag10": 9.4, "overshoot_2@zigzag10": 90.0}, "90", marks=pytest.mark.slow),
     ],
 )
 def test_impossible_and_contradictory_figures_are_named(values, named) -> None:

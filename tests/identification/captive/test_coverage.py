@@ -1,4 +1,7 @@
-"""Stated uncertainties are honest: over many made-up campaigns 95 % intervals cover the truth 90 to 98 % of times."""
+"""Stated uncertainties are honest: over many made-up campaigns 95 % intervals cover the truth 90 to 98 % of times.
+
+Of few campaigns, in the tests that are run often, the bounds are as much wider as chance makes them.
+"""
 
 import re
 from collections import defaultdict
@@ -6,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
 from tank2sim.cards import parse_card, read_card
@@ -19,7 +23,13 @@ from tank2sim.simulation.run import simulate
 from tests.identification.captive.generator import Campaign, write
 
 TWO_SIDED_95 = 1.96
-SEEDS = range(100, 130)
+SEEDS = [
+    pytest.param(range(100, 130), 0.90, 0.98, id="30 campaigns", marks=pytest.mark.long),
+    pytest.param(range(100, 106), 0.88, 1.0, id="6 campaigns", marks=pytest.mark.slow),
+]
+"""Of campaigns, and the least and largest share of their intervals that may cover the truth."""
+SELDOM = 1 / 1700
+"""Chance at which a count is held to be none of 95 %: 23 or fewer of 30 intervals cover so seldom."""
 
 SETTINGS = {
     "third order": Campaign(seed=0, size="small", rate_hz=10.0),
@@ -47,23 +57,22 @@ def errors_over_standard_errors(campaign, folder):
     return {name: (found[name].value - value) / found[name].standard_error for name, value in true.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS.values(), ids=SETTINGS)
-def test_intervals_cover_the_truth_as_often_as_they_say(setting, tmp_path):
+@pytest.mark.parametrize(("seeds", "least", "most"), SEEDS)
+def test_intervals_cover_the_truth_as_often_as_they_say(setting, seeds, least, most, tmp_path):
     ratios = defaultdict(list)
-    for seed in SEEDS:
+    for seed in seeds:
         for name, ratio in errors_over_standard_errors(replace(setting, seed=seed), tmp_path / str(seed)).items():
             ratios[name].append(ratio)
     table = {name: np.abs(values) for name, values in ratios.items()}
     reported = {name: f"{np.mean(values < TWO_SIDED_95):.2f} of {len(values)}" for name, values in table.items()}
     covered = np.mean(np.concatenate(list(table.values())) < TWO_SIDED_95)
-    assert 0.90 <= covered <= 0.98, reported
+    assert least <= covered <= most, reported
     for name in ("Yv", "Nv", "Yr", "Nr", "Yvdot", "Nrdot", "Yd", "Nd"):
-        assert len(table[name]) == len(SEEDS), name
-        # That 23 or fewer of 30 intervals cover, if each does in 95 of 100 cases, happens once in 1700 times.
-        assert np.count_nonzero(table[name] < TWO_SIDED_95) >= 0.8 * len(SEEDS), (name, reported)
+        assert len(table[name]) == len(seeds), name
+        assert np.count_nonzero(table[name] < TWO_SIDED_95) >= binom.ppf(SELDOM, len(seeds), 0.95), (name, reported)
     for name, values in ratios.items():
-        if len(values) >= len(SEEDS) // 2:
+        if len(values) >= len(seeds) // 2:
             assert abs(np.mean(values)) < 4.0 / np.sqrt(len(values)), (name, "is biased", np.mean(values))
 
 
@@ -71,7 +80,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(setting, tmp_path):
 def test_readings_that_are_not_independent_are_not_counted_as_if_they_were(tmp_path):
     """Twice the readings of slow noise do not halve the variance: standard errors stay nearly the same."""
     errors = {10.0: [], 20.0: []}
-    for seed in range(3, 8):
+    for seed in range(3, 5):
         slow = Campaign(seed=seed, size="linear", correlation_time_s=1.0, vibration=False)
         for rate, found in errors.items():
             written = write(replace(slow, rate_hz=rate), tmp_path / f"{seed} {rate:g}")
@@ -127,9 +136,12 @@ def found_text(text, derivatives):
     return head + "[derivatives]\n" + "\n".join(f"{name} = {value!r}" for name, value in derivatives.items()) + after
 
 
-@pytest.mark.slow
-def test_the_band_of_a_turn_holds_the_true_ship_as_often_as_it_says(tmp_path):
+# Of 20 bands of 90 %, 14 or fewer hold the truth once in 90 times; of 6, 3 or fewer once in 63 times.
+@pytest.mark.parametrize(
+    ("bands", "least"),
+    [pytest.param(20, 15, marks=pytest.mark.long), pytest.param(6, 4, marks=pytest.mark.slow)],
+)
+def test_the_band_of_a_turn_holds_the_true_ship_as_often_as_it_says(bands, least, tmp_path):
     """To leave out cubic terms that do not differ from zero left 13 of 30 true turns outside of a band of 90 %."""
-    inside = np.array([turn_inside_its_band(tmp_path / str(seed), seed) for seed in range(100, 120)])
-    # Of 20 bands of 90 %, 14 or fewer hold the truth once in 90 times.
-    assert inside.sum(axis=0).min() >= 15, inside.sum(axis=0)
+    inside = np.array([turn_inside_its_band(tmp_path / str(seed), seed) for seed in range(100, 100 + bands)])
+    assert inside.sum(axis=0).min() >= least, inside.sum(axis=0)

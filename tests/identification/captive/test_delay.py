@@ -28,7 +28,7 @@ def errors_over(found, written, names):
     return [(derivatives[name].value - written.derivatives[name]) / derivatives[name].standard_error for name in names]
 
 
-@pytest.mark.parametrize("delay", [-0.05, -0.01, 0.01, 0.03, 0.1])
+@pytest.mark.parametrize("delay", [-0.05, 0.01, 0.1])
 def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
     found, written = reduced_with_truth(Campaign(seed=21, rate_hz=10.0, force_delay_s=delay), tmp_path)
     (error,) = found.systematic
@@ -45,7 +45,7 @@ def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
     assert "CORRECTED" in reduction_findings(found)[0]
 
 
-@pytest.mark.parametrize("seed", [21, 22])
+@pytest.mark.parametrize("seed", [21, pytest.param(22, marks=pytest.mark.slow)])
 def test_a_low_pass_filter_of_the_gauges_is_found_as_its_group_delay(tmp_path, seed):
     """A Butterworth filter of the second order and 2 Hz delays slow signals by sqrt(2)/(2 pi 2 Hz) = 0.1125 s."""
     written = write(Campaign(seed=seed, rate_hz=50.0, size="linear", part_periods=True), tmp_path)
@@ -110,8 +110,10 @@ def with_memory(campaign, written, kinds, share, time_s):
     [
         (("pure_sway",), 0.3, 0.8, 21),
         (("pure_yaw", "yaw_with_drift"), 0.3, 0.8, 22),
-        (("pure_sway", "pure_yaw", "yaw_with_drift"), 0.3, 0.8, 23),
-        *((("pure_sway", "pure_yaw", "yaw_with_drift"), 0.5, 1.5, seed) for seed in (21, 22, 23)),
+        pytest.param(("pure_sway", "pure_yaw", "yaw_with_drift"), 0.3, 0.8, 23, marks=pytest.mark.slow),
+        (("pure_sway", "pure_yaw", "yaw_with_drift"), 0.5, 1.5, 21),
+        pytest.param(("pure_sway", "pure_yaw", "yaw_with_drift"), 0.5, 1.5, 22, marks=pytest.mark.slow),
+        pytest.param(("pure_sway", "pure_yaw", "yaw_with_drift"), 0.5, 1.5, 23, marks=pytest.mark.slow),
     ],
 )
 def test_memory_of_the_flow_is_not_taken_for_a_delay(tmp_path, kinds, share, time_s, seed):
@@ -144,16 +146,27 @@ def test_a_delay_that_sway_alone_shows_is_reported_and_not_corrected(tmp_path):
     assert abs(derivative.value - written.derivatives["Yvdot"]) < 1.96 * derivative.standard_error
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [-0.03, 0.0, 0.0015, 0.03])
-def test_intervals_cover_the_truth_with_any_delay(tmp_path, delay):
+FEW, MANY = (range(200, 206), 0.88, 1.0), (range(200, 220), 0.90, 0.985)
+
+
+@pytest.mark.parametrize(
+    ("delay", "seeds", "least", "most"),
+    [
+        *(pytest.param(delay, *MANY, marks=pytest.mark.long) for delay in (-0.03, 0.0, 0.0015, 0.03)),
+        *(pytest.param(delay, *FEW, marks=pytest.mark.slow) for delay in (0.0, 0.03)),
+    ],
+)
+def test_intervals_cover_the_truth_with_any_delay(tmp_path, delay, seeds, least, most):
+    """The bounds of few campaigns are wider, as chance makes them."""
     ratios, of_delay = [], []
-    for seed in range(200, 220):
+    for seed in seeds:
         found, written = reduced_with_truth(
             Campaign(seed=seed, rate_hz=10.0, force_delay_s=delay), tmp_path / str(seed)
         )
         ratios += errors_over(found, written, (*ACCELERATIONS, *DAMPING))
         of_delay.append((found.delay.size - delay) / found.delay.standard_error)
     covered = np.mean(np.abs(ratios) < 1.96)
-    assert 0.90 <= covered <= 0.985, covered
-    assert 0.6 < np.std(of_delay) < 1.5 and np.abs(np.mean(of_delay)) < 4 / np.sqrt(len(of_delay))
+    assert least <= covered <= most, covered
+    # Of normal errors of size 1 the spread of 20 lies within 0.6 to 1.5, and that of 6 within 0.3 to 1.75.
+    low, high = (0.6, 1.5) if len(seeds) == 20 else (0.3, 1.75)
+    assert low < np.std(of_delay) < high and np.abs(np.mean(of_delay)) < 4 / np.sqrt(len(of_delay))

@@ -14,7 +14,10 @@ def plain(tmp_path_factory):
     return written, reduce_campaign(read_campaign(written.path)).derivatives
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in ("german.csv", "hdf5.h5") else pytest.param(name, marks=pytest.mark.slow) for name in FORMATS],
+)
 def test_derivatives_are_those_of_the_plain_files_to_the_digits_of_the_format(plain, tmp_path, name):
     for library, ending in (("h5py", ("h5", "73.mat")), ("nptdms", "tdms")):
         if name.endswith(ending):

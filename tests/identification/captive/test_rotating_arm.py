@@ -28,15 +28,22 @@ def test_without_noise_every_derivative_is_that_of_the_hull(tmp_path, column):
     assert all(abs(found[name].value) < 1e-6 for name in others)
 
 
-@pytest.mark.slow
-def test_intervals_of_95_percent_have_the_truth_in_90_to_98_percent(tmp_path):
+# Few campaigns in the tests that are run often, with bounds that are as much wider as chance makes them.
+COUNTS = pytest.mark.parametrize(
+    ("campaigns", "least", "most"),
+    [pytest.param(20, 0.90, 0.98, marks=pytest.mark.long), pytest.param(6, 0.87, 1.0, marks=pytest.mark.slow)],
+)
+
+
+@COUNTS
+def test_intervals_of_95_percent_have_the_truth_in_90_to_98_percent(campaigns, least, most, tmp_path):
     inside = []
-    for seed in range(20):
+    for seed in range(campaigns):
         random = np.random.default_rng(500 + seed)
         truth = {name: value * random.uniform(0.85, 1.15) for name, value in TRUTH.items()}
         found = reduced(write_arm(tmp_path, truth, seed))
         inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
-    assert 0.90 <= np.mean(inside) <= 0.98
+    assert least <= np.mean(inside) <= most
 
 
 def as_runs(folder, *, with_rate: bool):
@@ -105,15 +112,15 @@ def test_tests_at_a_heel_give_the_terms_of_the_heel_and_leave_the_others(tmp_pat
     assert any("Nvvphi" in notice for notice in result.notices)
 
 
-@pytest.mark.slow
-def test_intervals_of_the_heel_have_the_truth_in_90_to_98_percent(tmp_path):
+@COUNTS
+def test_intervals_of_the_heel_have_the_truth_in_90_to_98_percent(campaigns, least, most, tmp_path):
     inside = []
-    for seed in range(20):
+    for seed in range(campaigns):
         random = np.random.default_rng(900 + seed)
         truth = {name: value * random.uniform(0.85, 1.15) for name, value in (TRUTH | HEEL).items()}
         found = reduced(write_arm(tmp_path, truth, seed))
         inside += [abs(found[name].value - truth[name]) < 1.96 * found[name].standard_error for name in HEEL]
-    assert 0.90 <= np.mean(inside) <= 0.98
+    assert least <= np.mean(inside) <= most
 
 
 def test_a_heel_is_refused_where_the_method_is_of_an_upright_hull(tmp_path):

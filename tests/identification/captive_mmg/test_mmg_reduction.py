@@ -51,13 +51,17 @@ def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
     assert found["mx"].origin == found["my"].origin == "estimated"
 
 
-def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path) -> None:
+# The bounds of few campaigns are wider, as chance makes them.
+@pytest.mark.parametrize(
+    ("seeds", "least", "most"), [(6, 0.87, 1.0), pytest.param(SEEDS, 0.90, 0.98, marks=pytest.mark.slow)]
+)
+def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path, seeds, least, most) -> None:
     inside = []
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         truth = another_ship(tmp_path, 7000 + seed)
         found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, seed)).coefficients
         inside += [abs(found[name].value - value) < 1.96 * found[name].standard_error for name, value in truth.items()]
-    assert 0.90 <= np.mean(inside) <= 0.98
+    assert least <= np.mean(inside) <= most
 
 
 def test_the_card_steers_like_the_ship_that_was_tested(tmp_path) -> None:
@@ -187,16 +191,21 @@ def scale_column(folder: Path, name: str, factor: float) -> None:
     ("column", "factor", "words"),
     [
         ("K_T", 1.5, "open_water.K_T: is .* off its curve.*propeller_diameter_m"),
-        ("K_T", 10.0, "open_water.K_T: is .* at J = 0"),
-        ("K_T", -1.0, "open_water.K_T: .*falls with J"),
         ("T", -1.0, r"averages.columns.thrust \(column T\)"),
-        ("T", 0.5, "open_water.K_T: is .* off its curve"),
         ("rps", -1.0, r"averages.columns.propeller \(column rps\)"),
-        ("r", -1.0, r"averages.columns.yaw_rate \(column r\): Nr is \+"),
         ("r", 0.1, r"averages.columns.yaw_rate \(column r\): .*l_R"),
-        ("X", -1.0, r"averages.columns.X \(column X\) .*R0"),
         ("Y", -1.0, r"averages.columns.Y \(column Y\) .*Yv"),
-        ("N", -1.0, r"averages.columns.N \(column N\) .*x_H"),
+        *(
+            pytest.param(*one, marks=pytest.mark.slow)
+            for one in (
+                ("K_T", 10.0, "open_water.K_T: is .* at J = 0"),
+                ("K_T", -1.0, "open_water.K_T: .*falls with J"),
+                ("T", 0.5, "open_water.K_T: is .* off its curve"),
+                ("r", -1.0, r"averages.columns.yaw_rate \(column r\): Nr is \+"),
+                ("X", -1.0, r"averages.columns.X \(column X\) .*R0"),
+                ("N", -1.0, r"averages.columns.N \(column N\) .*x_H"),
+            )
+        ),
     ],
 )
 def test_columns_of_another_sign_or_unit_are_refused_by_their_names(tmp_path, column, factor, words) -> None:

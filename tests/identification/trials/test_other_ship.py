@@ -27,15 +27,17 @@ def test_the_cards_own_ship_and_a_run_without_rudder_raise_no_alarm(off):
     assert other_ship(problem(runs, off=off)) == ()
 
 
-@pytest.mark.slow
-def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Path) -> None:
+@pytest.mark.parametrize(
+    "every", [pytest.param(1, marks=pytest.mark.long), pytest.param(5, marks=pytest.mark.slow)], ids=["all", "some"]
+)
+def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Path, every: int) -> None:
     folder = data / "data"
     kvlcc2, esso = read_card("kvlcc2-captive"), read_card("esso-osaka-estimated")
     asked = [(kvlcc2, sorted((folder / basin).glob("*.dat"))) for basin in ("kvlcc2_hsva", "kvlcc2_marin")]
     asked += [(esso, sorted(folder.glob(f"esso_osaka/{kind}/*.csv"))) for kind in ("zigzag", "turning", "random")]
     cases = [path for path in sorted((folder / "gap_cases").glob("case_*")) if path.is_dir()]
     asked += [(read_card(str(case / "ship.toml")), sorted(case.glob("*.csv"))) for case in cases]
-    for card, files in asked:
+    for card, files in asked[::every]:
         trials = measured(files, card)
         assert other_ship(problem_from_card(card, trials.trials, trials.driven_by)) == (), files[0].parent
 

@@ -125,7 +125,7 @@ def test_a_gap_is_passed_over(noisy, found):
     assert np.all(np.abs(answer.values - found.values) < 2 * found.standard_errors)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_standard_errors_hold_under_coloured_forces_and_model_error():
     """Gusts, and a ship with a term that the fitted model has not: 95 % intervals about the mean of all fits."""
     answers = []

@@ -20,7 +20,7 @@ def asked(names: list[str], error: float = STATED) -> Problem:
 @pytest.mark.parametrize("true", [2.0, 6.0])
 def test_the_scale_is_the_one_that_makes_the_measurements_likeliest(noise: float, true: float) -> None:
     """Of theta + noise, theta scattered by k times the stated error: k^2 = (mean square - noise^2)/error^2."""
-    count = 300
+    count = 100
     problem = asked([f"derivatives.Y{n}" for n in range(count)])
     rng = np.random.default_rng(5)
     measured = 1 + true * STATED * rng.standard_normal(count) + noise * rng.standard_normal(count)

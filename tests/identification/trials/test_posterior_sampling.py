@@ -65,8 +65,9 @@ def test_missing_samples_do_not_count(quiet) -> None:
     np.testing.assert_allclose(density.with_gradient(z)[1], slopes, rtol=1e-4, atol=1e-4 * np.abs(slopes).max())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sampler", ["nuts", "ensemble"])
+@pytest.mark.parametrize(
+    "sampler", [pytest.param("nuts", marks=pytest.mark.slow), pytest.param("ensemble", marks=pytest.mark.long)]
+)
 def test_of_a_precise_record_the_posterior_is_the_normal_distribution_of_the_fit(quiet, sampler: str) -> None:
     """So little noise that the model is linear within it: mean and covariance are those of linear least squares."""
     posed, estimate = quiet
@@ -86,6 +87,7 @@ def test_of_a_precise_record_the_posterior_is_the_normal_distribution_of_the_fit
     np.testing.assert_allclose(correlation, expected, atol=0.2)
 
 
+@pytest.mark.slow
 def test_the_truth_lies_within_the_samples(quiet) -> None:
     samples = sample_posterior(*quiet, draws=40, robust=False)
     away = (samples.mean - [TRUTH[name] for name in FREE]) / np.sqrt(np.diag(samples.covariance))
@@ -118,6 +120,7 @@ def test_draws_stay_within_the_bounds_of_the_model(quiet) -> None:
         np.testing.assert_allclose(density.with_gradient(z)[1], slopes, rtol=1e-3, atol=1e-3 * np.abs(slopes).max())
 
 
+@pytest.mark.slow
 def test_the_seed_fixes_the_samples(quiet, few) -> None:
     np.testing.assert_array_equal(few.values, sample_posterior(*quiet, draws=10, seed=7).values)
     assert not np.array_equal(few.values, sample_posterior(*quiet, draws=10, seed=8).values)

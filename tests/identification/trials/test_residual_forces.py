@@ -172,7 +172,7 @@ def test_bootstrap_scatters_as_the_standard_errors_say():
     assert np.all((ratio > 0.35) & (ratio < 1.5))  # few blocks of time: the standard errors are on the safe side
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_bands_hold_what_happens():
     """Manoeuvres of the made-up ship in gusts of an exact recursion, integrated by scipy: 95 % of them in the band."""
     settings = PredictionSettings(members=200, seed=1)

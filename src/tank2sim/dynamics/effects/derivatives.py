@@ -21,7 +21,7 @@ USUAL_CHANGE = 0.15
 
 
 def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCard) -> Model:
-    """The model with derivatives changed by so much: name to an expression in the prime system.
+    """The model with derivatives changed by so much: name to an expression in the prime system, of the old ones.
 
     Raises
     ------
@@ -31,10 +31,8 @@ def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCa
     for name in changes:
         if f"derivatives.{name}" not in model:
             raise card.fault("model.kind", f"a {card.model.kind} model has no {name}", 'set kind = "abkowitz"')
-    for name, change in changes.items():
-        symbol = model.symbol(f"derivatives.{name}")
-        model = model.substitute(f"derivatives.{name}", symbol + change)
-    return model
+    full = {name: f"derivatives.{name}" for name in changes}
+    return model.substitute_all({full[name]: model.symbol(full[name]) + change for name, change in changes.items()})
 
 
 def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
@@ -265,7 +263,6 @@ def trimmed(model: Model, share: ca.SX, card: ManoeuvringCard) -> Model:
         "Nr": 0.30 * share * hydrodynamic(model, "Nr", card),
         "Nv": -0.27 * share * hydrodynamic(model, "Yv", card),
     }
-    # Nv last: its change is by the Yv of the even keel, which the change of Yv must not reach.
     return with_changes(model, changes, card)
 
 

@@ -11,7 +11,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.captive.equations import CampaignEquations
 from tank2sim.identification.captive.regression import (
     Spread,
-    run_covariance,
+    run_covariances,
     scatters,
     solve,
     weighted_system,
@@ -93,6 +93,7 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
     remaining = normal - np.array([block.T @ block for block in blocks])
     determined = np.linalg.cond(remaining) <= 1e10
     inverses = np.linalg.inv(np.where(determined[:, None, None], remaining, np.eye(len(norms))))
+    covariances, roots = run_covariances(equations, spread), weights.run_roots(equations)
     for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
         if not determined[place]:
             continue
@@ -101,8 +102,8 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
         shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
         largest = int(np.argmax(shift))
         prediction_covariance = block @ inverse @ (together - scatter[place]) @ inverse @ block.T
-        misfit_covariance = run_covariance(equations, spread, place) + prediction_covariance
-        root = weights.run_root(equations, place)
+        misfit_covariance = covariances[place] + prediction_covariance
+        root = roots[place]
         row = 1 if equations.runs[place].run.oscillates else 0
         shown, expected = root @ target, root @ (block @ without)
         squares = _squares(target - block @ without, misfit_covariance)

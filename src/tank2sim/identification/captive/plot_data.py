@@ -110,7 +110,7 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
     unit = _unit(reduction, force, run)
     result = reduction.forces[force].selection
     place = result.equations.runs.index(run)
-    root = result.spread.run_root(result.equations, place) * result.equations.unit
+    root = result.spread.run_roots(result.equations)[place] * result.equations.unit
     inertia = rigid_body_force(reduction.campaign, run.motion)[force]
     return (float(run.fits[force].coefficients[0]) + float(np.mean(inertia))) / unit, float(
         np.linalg.norm(root[0])

@@ -82,15 +82,15 @@ class Spread:
             result = result - direction[:, None] * along[equations.run_of_row]
         return result
 
-    def run_root(self, equations: CampaignEquations, place: int) -> Array:
-        """A root of the covariance of one run's coefficients, in ``Equations.unit``."""
-        start, size = int(equations.first_rows[place]), len(equations.roots[place])
-        root: Array = math.sqrt(self.noise) * equations.roots[place]
+    def run_roots(self, equations: CampaignEquations) -> list[Array]:
+        """A root of the covariance of each run's coefficients, in ``Equations.unit``."""
+        roots: list[Array] = [math.sqrt(self.noise) * root for root in equations.roots]
         for direction, sizes, variances in self._common_errors(equations):
-            block, length = direction[start : start + size], float(sizes[place])
-            along = math.sqrt(1.0 + float(variances[place]) * length / self.noise) - 1.0
-            root = root @ (np.eye(size) + np.outer(block, block) * along / length)
-        return root
+            along = (np.sqrt(1.0 + variances * sizes / self.noise) - 1.0) / sizes
+            for place, (start, root) in enumerate(zip(equations.first_rows, roots, strict=True)):
+                block = direction[start : start + len(root)]
+                roots[place] = root + np.outer(root @ block, along[place] * block)
+        return roots
 
     def log_determinant(self, equations: CampaignEquations) -> float:
         """Logarithm of the determinant of the covariance of the weighted equations."""
@@ -174,21 +174,19 @@ def scatters(equations: CampaignEquations, spread: Spread) -> Array:
     """Covariance of each run's contribution to the weighted normal equations' right-hand side, (runs, terms, terms)."""
     design = (spread.weights or spread).weighted(equations, equations.design)
     ends = [*equations.first_rows[1:], len(equations.values)]
-    found = np.empty((len(equations.runs), len(equations.names), len(equations.names)))
-    for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
-        block = design[start:end]
-        found[place] = block.T @ run_covariance(equations, spread, place) @ block
-    return found
+    covariances = run_covariances(equations, spread)
+    blocks = [design[start:end] for start, end in zip(equations.first_rows, ends, strict=True)]
+    return np.array([block.T @ covariance @ block for block, covariance in zip(blocks, covariances, strict=True)])
 
 
-def run_covariance(equations: CampaignEquations, spread: Spread, place: int) -> Array:
-    """Covariance of the weighted equations of one run, (rows, rows): unity if the weights are those of the spread."""
-    size = len(equations.roots[place])
+def run_covariances(equations: CampaignEquations, spread: Spread) -> list[Array]:
+    """Covariance of the weighted equations of each run, (rows, rows): unity if the weights are those of the spread."""
     if spread.weights is None:
-        return np.eye(size)
+        return [np.eye(len(root)) for root in equations.roots]
     # Both are roots of covariances of the same coefficients, one of the weights and one of the spread.
-    root = np.linalg.solve(spread.weights.run_root(equations, place), spread.run_root(equations, place))
-    return np.asarray(root @ root.T, dtype=np.float64)
+    pairs = zip(spread.weights.run_roots(equations), spread.run_roots(equations), strict=True)
+    roots = (np.linalg.solve(of_weights, of_spread) for of_weights, of_spread in pairs)
+    return [np.asarray(root @ root.T, dtype=np.float64) for root in roots]
 
 
 def efficient_solution(equations: CampaignEquations, spread: Spread) -> Solution:
