@@ -495,9 +495,8 @@ class Likelihood:
             follow = cho_solve(held, cross)
             move = _bounded(normal[:k, :k] - cross.T @ follow, pull[:k] - cross.T @ alone, low, high)
             whole = np.concatenate([move, alone - follow @ move])
-        decrease, without = (
-            float(2 * pull[-len(x) :] @ x - x @ (part @ x)) for x, part in ((whole, normal), (alone, inner))
-        )
+        decrease = float(2 * pull @ whole - whole @ (normal @ whole))
+        without = float(2 * pull[k:] @ alone - alone @ (inner @ alone))
         gain = decrease - without
         change = whole[k:] if free else alone
         base = gram[0, 0] + float(precision @ (theta - mean) ** 2)
