@@ -46,6 +46,7 @@ from tank2sim.identification.trials.problem.estimation_problem import SearchRepo
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.water_current import card_in
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.units import in_words
 
@@ -193,12 +194,14 @@ class IdentificationResult(Result):
 
     @cached_property
     def _replays(self) -> list[dict[str, object]]:
-        """Every trial, fitted or held out, next to both cards."""
+        """Every trial, fitted or held out, next to both cards in the same current."""
+        current = self.identification.current
+        before = self.before if current is None else card_in(self.before, current)
         return [
             entry
             for held_out, group in ((False, self.fitted), (True, self.held))
             if group.trials
-            for entry in replays_as_json(replays(self.before, self.identification, group), held_out=held_out)
+            for entry in replays_as_json(replays(before, self.identification, group), held_out=held_out)
         ]
 
 

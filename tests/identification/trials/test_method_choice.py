@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.identification.trials.as_json import identification_as_json
 from tank2sim.identification.trials.assessment.method_choice import choose_method, signal_residuals
 from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
@@ -53,6 +54,8 @@ def test_trials_of_a_basin_stay_with_output_error_and_the_result_says_why(card) 
     assert result.estimate.method == "output_error" and result.current is None
     assert result.choice is not None and "basin" in result.choice.reason
     assert any(notice.startswith("method: output error") for notice in result.notices)
+    said = identification_as_json(result)
+    assert said["method_reason"] == result.choice.reason and said["current"] is None
 
 
 @pytest.mark.slow
@@ -67,4 +70,6 @@ def test_gusty_trials_at_sea_are_filtered_and_a_stated_method_is_kept(card) -> N
     assert chosen(card, sea, piece_s=60.0).estimate.method == "output_error"
     calm = [replace(one, origin_deg=(54.0, 10.0)) for one in trials(gusty=False)]
     assert chosen(card, calm).estimate.method == "output_error"
+    water = identification_as_json(result)["current"]
+    assert isinstance(water, dict) and water["determined"] and water["speed_mps"] == result.current.speed_mps
     assert np.isfinite(result.estimate.standard_errors).all()

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.dynamics import build
+from tank2sim.identification.trials.identify import undetermined_notice
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.problem.problem_from_card import with_ground_velocities
+from tank2sim.identification.trials.problem.problem_from_card import driven_by_angle, with_ground_velocities
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.identification.trials.problem.water_current import (
     CURRENT_PARAMETERS,
@@ -22,6 +24,7 @@ from tank2sim.identification.trials.problem.water_current import (
     with_current,
     without_current,
 )
+from tank2sim.marks import marked
 from tank2sim.records.trials import Trial
 
 from .made_up_ship import CARD, TRUTH, problem, trial, turn, zigzag
@@ -87,9 +90,6 @@ def test_the_current_is_beside_that_of_the_card(trials, card) -> None:
     """A card that already holds half of the current needs the other half."""
     half = card_in(card, WaterCurrent(np.array([NORTH, EAST]) / 2, np.eye(2) * 1e-4, 5.0))
     assert np.allclose(current_of(half), np.array([NORTH, EAST]) / 2, atol=1e-4)
-    from tank2sim.dynamics import build
-    from tank2sim.identification.trials.problem.problem_from_card import driven_by_angle
-
     model = driven_by_angle(with_ground_velocities(build(half)))
     posed = problem(trials, free=FREE, seen=SEEN)
     posed = replace(posed, model=model, runs=tuple(prepare(model, one, SEEN) for one in trials))
@@ -118,3 +118,9 @@ def test_only_trials_at_sea_without_a_stated_current_have_one_to_estimate(trials
     measured = {**trials[0].signals, "current_speed_mps": np.full(len(trials[0].time_s), 0.4)}
     assert not of_unknown_current(card, [replace(trials[0], signals=measured)])
     assert not of_unknown_current(card_in(card, WaterCurrent(np.array([0.1, 0.0]), np.eye(2), 5.0)), trials)
+
+
+def test_a_current_that_is_not_determined_marks_the_result() -> None:
+    loose = WaterCurrent(np.array([0.2, 0.0]), np.diag([0.01, 0.3]) ** 2, 5.0)
+    assert not loose.determined and loose.standard_error_mps == pytest.approx(0.3)
+    assert marked([undetermined_notice(loose)])
