@@ -2,9 +2,9 @@
 
 The two made-up voyages of `shared/data/logs` are cut from all seven formats, the trials are brought to the same
 columns, and a card is fitted to each: the craft's from position, heading and revolutions, the Mariner's from a zigzag
-and a turn of 20 deg, by output error. Printed for each format: rms and largest difference of the coefficients from those of the ROS bag,
-which rounds nothing, over their standard errors; and the same for the bag's trials rounded to the digits of the format.
-What is beyond that are other rates and times of the samples, with other noise in them.
+and a turn of 20 deg, by output error. Printed for each format: rms and largest difference of the coefficients from
+those of the ROS bag, which rounds nothing, over their standard errors; and the same for the bag's trials rounded to the
+digits of the format. What is beyond that are other rates and times of the samples, with other noise in them.
 """
 
 from __future__ import annotations
