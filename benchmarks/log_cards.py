@@ -2,9 +2,9 @@
 
 The two made-up voyages of `shared/data/logs` are cut from all seven formats, the trials are brought to the same
 columns, and a card is fitted to each: the craft's from position, heading and revolutions, the Mariner's from a zigzag
-and a turn of 20 deg. Printed for each format: rms and largest difference of the coefficients from those of the ROS bag,
-which rounds nothing, over their standard errors; and the same for the bag's trials rounded to the digits of the format.
-What is beyond that are other rates and times of the samples, with other noise in them.
+and a turn of 20 deg, by output error. Printed for each format: rms and largest difference of the coefficients from
+those of the ROS bag, which rounds nothing, over their standard errors; and the same for the bag's trials rounded to the
+digits of the format. What is beyond that are other rates and times of the samples, with other noise in them.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def fitted(vessel: str, paths: list[Path]) -> dict[str, tuple[float, float]]:
     text = t2s.load("mariner").card.text
     text += '\n[[effects]]\nname = "current"\nparameters = { speed_mps = 0.384, direction_deg = 24.0 }\n'
     ship = t2s.Ship(parse_card(text, "mariner with current"))
-    found = t2s.identify(ship, paths, structure="card", members=0).to_dict()["derivatives"]
+    found = t2s.identify(ship, paths, method="output_error", structure="card", members=0).to_dict()["derivatives"]
     return {name: (entry["value"], entry["standard_error"]) for name, entry in found.items() if entry["standard_error"]}
 
 

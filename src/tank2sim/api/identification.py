@@ -33,10 +33,12 @@ from tank2sim.identification.trials.as_json import (
 )
 from tank2sim.identification.trials.assessment.notices import remarks
 from tank2sim.identification.trials.identify import (
+    BY_RESIDUALS,
     TRIAL_METHODS,
     Identification,
     IdentificationOptions,
     identify_trials,
+    undetermined_notice,
 )
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
@@ -44,6 +46,7 @@ from tank2sim.identification.trials.problem.estimation_problem import SearchRepo
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.water_current import card_in
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.units import in_words
 
@@ -125,9 +128,11 @@ class IdentificationResult(Result):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """That the posterior has not converged, if so; else none: the first table says it."""
-        samples = self.identification.posterior
-        return () if samples is None or samples.converged else tuple(samples.notices)
+        """That the trials do not determine the current, and that the posterior has not converged; else none: the first
+        table says it."""
+        samples, current = self.identification.posterior, self.identification.current
+        unfinished = () if samples is None or samples.converged else tuple(samples.notices)
+        return (*(() if current is None or current.determined else (undetermined_notice(current),)), *unfinished)
 
     @property
     def samples(self) -> pd.DataFrame | None:
@@ -189,12 +194,14 @@ class IdentificationResult(Result):
 
     @cached_property
     def _replays(self) -> list[dict[str, object]]:
-        """Every trial, fitted or held out, next to both cards."""
+        """Every trial, fitted or held out, next to both cards in the same current."""
+        current = self.identification.current
+        before = self.before if current is None else card_in(self.before, current)
         return [
             entry
             for held_out, group in ((False, self.fitted), (True, self.held))
             if group.trials
-            for entry in replays_as_json(replays(self.before, self.identification, group), held_out=held_out)
+            for entry in replays_as_json(replays(before, self.identification, group), held_out=held_out)
         ]
 
 
@@ -203,7 +210,7 @@ def identify(
     trials: TrialPaths,
     *,
     holdout: TrialPaths = (),
-    method: str = "output_error",
+    method: str = BY_RESIDUALS,
     structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
     inertia: bool = False,
@@ -228,7 +235,8 @@ def identify(
     trials, holdout : path, TrialRecord, or sequence of them
         Trials to fit, and trials only to compare with; a folder means the trials in it.
     method : str
-        ``output_error``, ``equation_error``, ``kalman`` or ``recursive``.
+        ``output_error``, ``equation_error``, ``kalman`` or ``recursive``; ``residuals``: the Kalman filter for trials
+        at sea in which output error leaves more than the noise of the sensors, else output error.
     structure : str
         One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`; ``auto``: by cross-validation;
         ``average``: intervals of all structures, weighted by their predictions, with the card of the best;

@@ -583,11 +583,24 @@ class PosteriorKeys(_Part):
     parameters: dict[str, SampledKeys]
 
 
+class EstimatedCurrentKeys(_Part):
+    """The current of trials at sea, estimated with the coefficients; `determined` where the trials determine it."""
+
+    speed_mps: Number
+    direction_deg: Number
+    speed_standard_error_mps: Number
+    direction_standard_error_deg: Number
+    largest_standard_error_mps: Number
+    determined: bool
+
+
 class IdentifyKeys(_Keys):
     """Coefficients identified from free-running trials."""
 
     ship: str
     method: str
+    method_reason: str | None
+    current: EstimatedCurrentKeys | None
     structure: str
     forced: list[str]
     manoeuvres: dict[str, str]

@@ -17,7 +17,7 @@ from tank2sim.cli.options import executor_option, page_option, plot_folder_optio
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.identify import TRIAL_METHODS
+from tank2sim.identification.trials.identify import BY_RESIDUALS, TRIAL_METHODS
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 
@@ -73,7 +73,13 @@ def _of_craft(
     help="Compare with these; do not fit them.",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card found.")
-@click.option("--method", type=click.Choice(TRIAL_METHODS), default="output_error", show_default=True)
+@click.option(
+    "--method",
+    type=click.Choice(TRIAL_METHODS),
+    default=BY_RESIDUALS,
+    show_default=True,
+    help=f"{BY_RESIDUALS}: kalman for trials at sea that show gusts or waves, else output_error.",
+)
 @click.option(
     "--structure",
     type=click.Choice((*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)),

@@ -26,6 +26,7 @@ from tank2sim.logs.content import (
     speed_evidence,
     steering_evidence,
 )
+from tank2sim.logs.delays import rate_delay
 from tank2sim.logs.pulses import PulseScale, pulses_of
 from tank2sim.logs.quantities import QUANTITIES, names_another, plain_words, sign_of_name
 from tank2sim.logs.reference import (
@@ -704,9 +705,28 @@ class _Search:
             if use:
                 used.discard(channel.stream + channel.quantity)
             channels.append(self._of_pulses(replace(channel, use=use)))
+        self._set_back(channels)
         order = {name: place for place, name in enumerate(QUANTITIES)}
         channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
         return ChannelSet(tuple(channels), tuple(self.findings))
+
+    def _set_back(self, channels: list[LogChannel]) -> None:
+        """Give the later of heading and rate of turn its delay, where it is certain: neither can be early."""
+        used = {channel.quantity: place for place, channel in enumerate(channels) if channel.use}
+        if not {"heading", "yaw_rate"} <= used.keys():
+            return
+        heading, rate = (channels[used[name]] for name in ("heading", "yaw_rate"))
+        rated = self._stream(rate.stream)
+        time, angle = self._angle(self._stream(heading.stream))
+        found = rate_delay(time, np.unwrap(angle), rated.time_s, rate.si(rated.values))
+        if found is None or not found.certain:
+            return
+        late, other = (rate, heading) if found.delay_s > 0 else (heading, rate)
+        delay = round(abs(found.delay_s), 2)
+        words = f"{delay:g} ± {found.standard_error_s:.1g} s behind {other.stream}"
+        channels[used[late.quantity]] = replace(late, delay_s=delay, why=f"{late.why}; {words}, and set back by it")
+        text = f"{late.stream} is {words} and is set back by it (delay_s in channels.toml)"
+        self.findings.append(LogFinding("note", text, late.stream, {"delay_s": delay}))
 
 
 def _paired(first: LogStream, second: LogStream) -> tuple[LogStream, LogStream]:

@@ -70,8 +70,6 @@ class ContentEvidence:
         Mean difference of an angle from what it should be, rad.
     spread_rad : float
         Median difference of an angle from what it should be, without its mean, rad.
-    delay_s : float
-        By how much the stream is late, s.
     text : str
         The finding in a few words.
     """
@@ -81,7 +79,6 @@ class ContentEvidence:
     unit: str = ""
     offset_rad: float = 0.0
     spread_rad: float = 0.0
-    delay_s: float = 0.0
     text: str = ""
 
 
@@ -135,14 +132,14 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
 def rate_evidence(
     time_s: Array, values: Array, motion: ReferenceMotion, windows_s: Sequence[float] = RATE_WINDOWS_S
 ) -> ContentEvidence:
-    """Compare a rate of turn (n,), in an unknown unit, with the derivative of the heading: unit, sign and delay.
+    """Compare a rate of turn (n,), in an unknown unit, with the derivative of the heading: unit and sign.
 
     The windows of the comparison, s, are tried until one is decisive.
     """
     if len(motion.heading_time_s) < FEW_SAMPLES or len(time_s) < FEW_SAMPLES or np.ptp(values) == 0:
         return UNTESTED
     area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time_s))])
-    best_lag, best, slope, other = 0.0, 0.0, np.zeros(0), np.zeros(0)
+    best, slope, other = 0.0, np.zeros(0), np.zeros(0)
     for window in windows_s:
         at, slopes = differenced(motion.heading_time_s, motion.heading_rad, window)
         rate_at, smooth = differenced(time_s, area, max(window, usual_step(motion.heading_time_s)))
@@ -151,7 +148,7 @@ def rate_evidence(
             found = _correlation(shifted, slopes)
             if abs(found) > abs(best) + 1e-4:
                 good = np.isfinite(shifted)
-                best_lag, best, slope, other = float(lag), found, slopes[good], shifted[good]
+                best, slope, other = found, slopes[good], shifted[good]
         if abs(best) > _DECISIVE:
             break
     if len(other) < FEW_SAMPLES:
@@ -159,8 +156,7 @@ def rate_evidence(
     scale = float(np.std(slope) / np.std(other))  # either may have the noise
     unit = _nearest_unit(scale, "yaw_rate")
     text = f"correlates with the derivative of the heading by {best:.3f}"
-    text += f", {abs(best_lag):g} s {'late' if best_lag > 0 else 'early'}" if best_lag else ""
-    return ContentEvidence(abs(best), 1 if best > 0 else -1, unit, delay_s=best_lag, text=text)
+    return ContentEvidence(abs(best), 1 if best > 0 else -1, unit, text=text)
 
 
 def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quantity: str) -> ContentEvidence:

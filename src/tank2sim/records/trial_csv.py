@@ -21,7 +21,8 @@ def read_trial_csv(path: Path | str) -> Trial:
     """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times unchanged.
 
     Comment lines: ``# rudder_sign: port`` turns rudder angles and orders to positive to starboard; ``# noise: u_mps
-    0.03, psi_deg 0.1`` states standard deviations; ``# scale: 45.714`` the length of the ship over that of the model.
+    0.03, psi_deg 0.1`` states standard deviations; ``# scale: 45.714`` the length of the ship over that of the model;
+    ``# origin: 54.4 10.3`` latitude and longitude of x = y = 0 (any other text behind ``# origin:`` is free).
     Columns that are not part of the format are left out, and a notice names them.
 
     Raises
@@ -55,7 +56,16 @@ def read_trial_csv(path: Path | str) -> Trial:
     if scale is not None and scale <= 0:
         raise InputError(table.path, "comment scale", f"is {scale:g}", "a positive number was expected")
     columns = {name: table.heading(name) for name in signals if table.heading(name) != name}
-    return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns)
+    return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns, origin_deg=_origin(table))
+
+
+def _origin(table: CsvTable) -> tuple[float, float] | None:
+    """Latitude and longitude, deg, of the comment ``origin``; None where it is absent or says something else."""
+    try:
+        latitude, longitude = (float(word) for word in table.comments.get("origin", "").split())
+    except ValueError:
+        return None
+    return (latitude, longitude) if abs(latitude) <= 90 and abs(longitude) <= 360 else None
 
 
 def _refuse_slip(table: CsvTable, name: str) -> None:

@@ -50,6 +50,8 @@ class Trial:
         What was done to the data on reading.
     columns : mapping
         Signal to what its column is called in the file, where that differs.
+    origin_deg : tuple or None
+        Latitude and longitude of x = y = 0, deg, where the file states them.
     """
 
     path: Path
@@ -60,6 +62,7 @@ class Trial:
     notices: tuple[str, ...] = ()
     columns: Mapping[str, str] = field(default_factory=dict)
     length_m: float | None = None
+    origin_deg: tuple[float, float] | None = None
 
     @property
     def name(self) -> str:

@@ -57,6 +57,8 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
     return {
         "ship": result.card.ship.name,
         "method": estimate.method,
+        "method_reason": None if result.choice is None else result.choice.reason,
+        "current": _current(result),
         "structure": result.structure,
         "forced": list(result.forced),
         "manoeuvres": dict(result.manoeuvres),
@@ -100,6 +102,21 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
         },
         "notices": [*unfinished, *forced, *result.notices],
         "warnings": [*unfinished, *result.notices, *known.notices, *messages],
+    }
+
+
+def _current(result: Identification) -> dict[str, object] | None:
+    current = result.current
+    if current is None:
+        return None
+    speed_error, direction_error = current.errors
+    return {
+        "speed_mps": current.speed_mps,
+        "direction_deg": float(np.degrees(current.direction_rad)),
+        "speed_standard_error_mps": speed_error,
+        "direction_standard_error_deg": float(np.degrees(direction_error)),
+        "largest_standard_error_mps": current.standard_error_mps,
+        "determined": current.determined,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -17,6 +18,11 @@ from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
 from tank2sim.identification.trials.assessment.evaluation import replay_error
 from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
+from tank2sim.identification.trials.assessment.method_choice import (
+    MethodChoice,
+    choose_method,
+    signal_residuals,
+)
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
@@ -35,7 +41,7 @@ from tank2sim.identification.trials.assessment.prediction_intervals import (
     criteria_or_none,
 )
 from tank2sim.identification.trials.methods.equation_error import equation_error
-from tank2sim.identification.trials.methods.kalman import kalman
+from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.posterior_sampling import (
@@ -59,6 +65,16 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_range,
 )
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.water_current import (
+    WaterCurrent,
+    at_sea,
+    card_in,
+    current_alone,
+    of_unknown_current,
+    with_current,
+    without_current,
+)
+from tank2sim.marks import CHECK
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -83,7 +99,14 @@ WHOLE_RUN_MISFIT = 3.0
 
 _NO_UNCERTAINTY = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
 
-TRIAL_METHODS: tuple[str, ...] = ("output_error", "equation_error", "kalman", "recursive")
+BY_RESIDUALS = "residuals"
+"""Name of the choice between output error and the Kalman filter by the residuals of the former."""
+
+TRIAL_METHODS: tuple[str, ...] = (BY_RESIDUALS, "output_error", "equation_error", "kalman", "recursive")
+
+
+METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error": ("output error", "kalman")}
+"""Method that a choice takes, to its name in words and the other method."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +116,8 @@ class IdentificationOptions:
     Parameters
     ----------
     method : str
-        One of :data:`TRIAL_METHODS`.
+        One of :data:`TRIAL_METHODS`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts
+        or waves, and all others by output error (:mod:`.method_choice`).
     structure : str
         One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.BY_EVIDENCE`,
         :data:`.structures.AUTO` or :data:`.structures.AVERAGE`.
@@ -117,7 +141,7 @@ class IdentificationOptions:
         Draws of each chain of the posterior.
     """
 
-    method: str = "output_error"
+    method: str = BY_RESIDUALS
     structure: str = BY_EVIDENCE
     inertia: bool = False
     piece_s: float | None = None
@@ -169,6 +193,10 @@ class Identification:
     bootstrap : array (members, k) or None
         Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
     notices : tuple of str
+    current : WaterCurrent or None
+        Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have it.
+    choice : MethodChoice or None
+        Of the method, and its reason; None where the options name the method.
     """
 
     started: ManoeuvringCard
@@ -190,6 +218,8 @@ class Identification:
     manoeuvres: Mapping[str, str]
     forced: tuple[str, ...]
     notices: tuple[str, ...]
+    current: WaterCurrent | None = None
+    choice: MethodChoice | None = None
 
     @property
     def comparisons(self) -> tuple[tuple[str, Comparison, Comparison], ...]:
@@ -248,12 +278,12 @@ def _identified(
     progress: SearchReport,
     executor: Executor | None,
 ) -> Identification:
-    if trials.captive is not None and options.method != "output_error":
+    if trials.captive is not None and not _by_output_error(options):
         problem_text = f"{options.method} fits trials alone"
         raise InputError("--campaign", "", problem_text, "leave --method out, or fit the card that reduce makes of it")
     if options.posterior:
         check_sampler(options.posterior)
-        if options.method != "output_error":
+        if not _by_output_error(options):
             raise InputError("--posterior", "", f"{options.method} has no density to sample", "leave --method out")
     if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
         problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
@@ -261,6 +291,9 @@ def _identified(
             "--structure", "", problem_text, "leave it out, or fit what tank2sim convert makes of the card"
         )
     given, card = card, polynomial_over_trials(card, trials.trials)
+    drifts = of_unknown_current(card, trials.trials)
+    if drifts:
+        card = card_in(card, _first_current(card, trials))
     structures: Mapping[str, CrossValidation] = {}
     weights: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
@@ -279,7 +312,9 @@ def _identified(
         names = ", ".join(trial.name for trial in trials.trials)
         problem_text = f"not trials of the ship of {card.source}: {'; '.join(evidence)}"
         raise InputError(names, "", problem_text, "give the card and the trials of one ship, or --force")
-    started, unseen, fitted = _fitted(card, structure, trials, options, progress)
+    fit = _fitted(card, structure, trials, options, progress, drifts=drifts)
+    started, fitted, current = fit.started, fit.fitted, fit.current
+    card = card if current is None else card_in(card, current)
     samples = None
     if options.posterior:
         samples = sample_posterior(fitted.problem, fitted.estimate, options.posterior, options.draws)
@@ -289,7 +324,7 @@ def _identified(
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
     average = [
-        WeightedFit(fitted if name == structure else _fitted(card, name, trials, options)[-1], weight)
+        WeightedFit(fitted if name == structure else _fitted(card, name, trials, options, drifts=drifts).fitted, weight)
         for name, weight in weights.items()
     ]
     return Identification(
@@ -313,6 +348,8 @@ def _identified(
         ),
         forced=evidence,
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
+        current=current,
+        choice=fit.choice,
         notices=(
             *trials.notices,
             *(held.notices if held else ()),
@@ -320,7 +357,9 @@ def _identified(
             *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
             *_captive_notice(card, trials.captive),
             *chosen,
-            *_unseen_notice(unseen),
+            *_unseen_notice(fit.unseen),
+            *_current_notice(current),
+            *_choice_notice(fit.choice),
             *(samples.notices if samples is not None and samples.converged else ()),
             *estimate.notices,
         ),
@@ -333,23 +372,73 @@ def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str
     return {name: manoeuvre.words for name, manoeuvre in known.items() if manoeuvre is not None}
 
 
+def _by_output_error(options: IdentificationOptions) -> bool:
+    return options.method in (BY_RESIDUALS, "output_error")
+
+
 def estimate_parameters(problem: Problem, options: IdentificationOptions, progress: SearchReport = silent) -> Estimate:
-    """The estimate by the method of the options; output error starts at the estimate of equation error."""
+    """The estimate by the method of the options, output error for :data:`BY_RESIDUALS`."""
     if options.method == "kalman":
-        return kalman(problem, progress=progress)
+        return _filtered(problem, options, progress)
     if options.method == "recursive":
         return _recursive(problem, options, progress)
     if options.method == "equation_error":
         return equation_error(problem, progress=progress)
+    return _over_whole_runs(problem, _over_pieces(problem, options, progress), options, progress)
+
+
+def _filtered(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
+    return kalman(problem, settings=KalmanSettings(scale_prior=options.scale_prior), progress=progress)
+
+
+def _over_pieces(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
+    """Output error in pieces, which starts at the estimate of equation error."""
     length = options.piece_s or PIECE * problem.ship_time
     if length < LEAST_PIECE * problem.ship_time:
         least = LEAST_PIECE * problem.ship_time
         raise InputError("--piece", "", f"is {length:g} s", f"give {least:.3g} s or more ({LEAST_PIECE:g} L/u0)")
     settings = OutputErrorSettings(piece_s=length, scale_prior=options.scale_prior)
-    in_pieces = output_error(problem, _start(problem), settings, progress)
+    return output_error(problem, _start(problem), settings, progress)
+
+
+def _over_whole_runs(
+    problem: Problem, in_pieces: Estimate, options: IdentificationOptions, progress: SearchReport
+) -> Estimate:
+    """Output error over whole runs where the estimate in pieces follows them; else that estimate."""
     if in_pieces.notices or not _follows_whole_runs(problem, in_pieces):
         return in_pieces
-    return output_error(problem, in_pieces.values, replace(settings, piece_s=None), progress)
+    settings = OutputErrorSettings(scale_prior=options.scale_prior)
+    return output_error(problem, in_pieces.values, settings, progress)
+
+
+def _estimate_and_choice(
+    problem: Problem, trials: Measured, options: IdentificationOptions, progress: SearchReport
+) -> tuple[Estimate, MethodChoice | None]:
+    """The estimate, and the choice of its method where the options leave it open."""
+    if options.method != BY_RESIDUALS:
+        return estimate_parameters(problem, options, progress), None
+    in_pieces = _over_pieces(problem, options, progress)
+    choice = _choice(problem, in_pieces, trials, options)
+    if choice.method == "kalman" and not in_pieces.notices:
+        filtered = _filtered(problem, options, progress)
+        if np.isfinite([*filtered.cost[-1:], *filtered.values, *filtered.standard_errors]).all():
+            return filtered, choice
+        choice = MethodChoice("output_error", "the Kalman filter diverged on these trials")
+    return _over_whole_runs(problem, in_pieces, options, progress), choice
+
+
+def _choice(problem: Problem, in_pieces: Estimate, trials: Measured, options: IdentificationOptions) -> MethodChoice:
+    if not at_sea(trials.trials):
+        reason = "no trial has a position or a velocity over the ground at sea, and a basin has no gusts and waves"
+        return MethodChoice("output_error", reason)
+    for given, words in (
+        (trials.captive is not None, "captive tests are fitted together with the trials"),
+        (bool(options.posterior), "the posterior is sampled from its density"),
+        (options.piece_s is not None, "the length of its pieces was given"),
+    ):
+        if given:
+            return MethodChoice("output_error", words)
+    return choose_method(signal_residuals(problem, in_pieces))
 
 
 def structure_by_evidence(
@@ -394,21 +483,51 @@ def cross_validate_structures(
     return results
 
 
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The start card, parameters that the trials do not show, the fit, the current and the choice of the method."""
+
+    started: ManoeuvringCard
+    unseen: tuple[str, ...]
+    fitted: FittedProblem
+    current: WaterCurrent | None
+    choice: MethodChoice | None
+
+
 def _fitted(
     card: ManoeuvringCard,
     structure: str,
     trials: Measured,
     options: IdentificationOptions,
     progress: SearchReport = silent,
-) -> tuple[ManoeuvringCard, tuple[str, ...], FittedProblem]:
-    """The start card in a structure, parameters that the trials do not show, and the fit."""
+    *,
+    drifts: bool,
+) -> _Fit:
+    """A fit in a structure; with a current of its own if the water `drifts`.
+
+    Output error and the Kalman filter estimate the current with the parameters; the other methods take the card's.
+    """
     started = STRUCTURES[structure].start(card)
     problem = _posed(card, started, trials, options)
     unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
     problem = problem.without(unseen)
-    estimate = estimate_parameters(problem, options, progress)
+    current = None
+    if drifts and options.method not in ("equation_error", "recursive"):
+        joint, choice = _estimate_and_choice(with_current(problem), trials, options, progress)
+        estimate, current = without_current(joint, started)
+        started = card_in(started, current)
+        problem = _posed(card, started, trials, options).without(unseen)
+    else:
+        estimate, choice = _estimate_and_choice(problem, trials, options, progress)
     improved = with_range(card_with_estimate(started, estimate), problem)
-    return started, unseen, FittedProblem(problem, estimate, improved, started.model.valid_speed_mps is None)
+    fitted = FittedProblem(problem, estimate, improved, started.model.valid_speed_mps is None)
+    return _Fit(started, unseen, fitted, current, choice)
+
+
+def _first_current(card: ManoeuvringCard, trials: Measured) -> WaterCurrent:
+    """The current by the card's own coefficients; what they do not explain counts as random accelerations."""
+    problem = current_alone(problem_from_card(card, trials.trials, trials.driven_by))
+    return without_current(kalman(problem, settings=KalmanSettings(scale_prior=False)), card)[1]
 
 
 def _with_samples(fitted: FittedProblem, started: ManoeuvringCard, samples: PosteriorSamples) -> FittedProblem:
@@ -445,7 +564,7 @@ def _posed(
 
 def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
     """The estimate of a fold: pieces only and fewer rounds, which is enough for a comparison of folds."""
-    if options.method != "output_error":
+    if not _by_output_error(options):
         return estimate_parameters(problem, options)
     length = options.piece_s or PIECE * problem.ship_time
     return output_error(
@@ -482,6 +601,34 @@ def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Seque
     times = card.ship.length_m / captive.campaign.model.length_m
     words = f"{captive.campaign.path}: {len(captive.runs)} captive tests are fitted together with the trials"
     return (f"{words}, scaled by Froude's law to a ship {times:.4g} times as long",)
+
+
+def _current_notice(current: WaterCurrent | None) -> Sequence[str]:
+    if current is None:
+        return ()
+    speed_error, direction_error = current.errors
+    words = f"a current of {current.speed_mps:.2f} ± {speed_error:.2g} m/s towards "
+    words += (
+        f"{math.degrees(current.direction_rad):.0f} ± {math.degrees(direction_error):.2g} deg was estimated with the "
+    )
+    words += "coefficients: the card has it as its effect current; leave that out for still water"
+    return (words,) if current.determined else (undetermined_notice(current), words)
+
+
+def undetermined_notice(current: WaterCurrent) -> str:
+    """That the trials do not determine the current, as a marked sentence."""
+    return (
+        f"{CHECK} the trials do not determine the current (to {current.standard_error_mps:.2g} m/s in one direction): "
+        "coefficients and figures may hold a part of it; add speed through the water or a full turn, or give the card "
+        "its effect current"
+    )
+
+
+def _choice_notice(choice: MethodChoice | None) -> Sequence[str]:
+    if choice is None:
+        return ()
+    name, other = METHOD_WORDS[choice.method]
+    return (f"method: {name}, because {choice.reason}; --method {other} takes the other",)
 
 
 def _unseen_notice(names: Sequence[str]) -> Sequence[str]:
