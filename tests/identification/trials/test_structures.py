@@ -23,6 +23,8 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_correlations,
 )
 from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent, structure_that_adds
+from tank2sim.marks import marked
+from tank2sim.records.trials import RUDDERS
 
 
 @pytest.fixture(scope="module")
@@ -146,6 +148,28 @@ def test_evidence_takes_the_terms_that_made_the_trials(ship: str, start: str, ex
     trials = measured(sorted(tmp_path.glob("*.csv")), card)
     structure, notices = structure_by_evidence(card, trials, IdentificationOptions())
     assert structure == expected and bool(notices) == (expected == "cross_flow")
+
+
+def test_structures_that_noise_hides_are_marked_unless_a_hard_turn_is_held_out(tmp_path: Path) -> None:
+    """In a zigzag with much noise the hull might be either, and the two turn differently with hard rudder."""
+    card = read_card("mariner")
+    assert isinstance(card, ManoeuvringCard)
+    ship, trials = t2s.load("mariner"), {}
+    for name, run in {"zigzag": ship.zigzag(10, 10), "hard": ship.turn(35), "gentle": ship.turn(20)}.items():
+        run.to_csv(tmp_path / f"{name}.csv")
+        trials[name] = measured([tmp_path / f"{name}.csv"], card)
+    random = np.random.default_rng(4)
+    (trial,) = trials["zigzag"].trials
+    signals = {
+        name: values + (0 if name in RUDDERS else 0.3 * np.std(values) * random.standard_normal(len(values)))
+        for name, values in trial.signals.items()
+    }
+    noisy = replace(trials["zigzag"], trials=(replace(trial, signals=signals),))
+    marks = [
+        marked(structure_by_evidence(card, noisy, IdentificationOptions(), held)[1])
+        for held in (None, trials["hard"], trials["gentle"])
+    ]
+    assert marks[0] and marks[0] == marks[2] and not marks[1]
 
 
 @pytest.mark.parametrize(("sign", "expected"), [("starboard", 0.8), ("port", -0.8)])
