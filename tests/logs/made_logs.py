@@ -57,8 +57,9 @@ def voyage() -> MadeVoyage:
         if t == 800.0:
             phase = "steady"
         delta += float(np.clip(order - delta, -np.radians(2.5), np.radians(2.5)))
+        before = rate
         rate += step * (gain * delta - rate) / constant
-        psi += step * rate
+        psi += step * 0.5 * (before + rate)
         rows.append((t, delta, rate, psi))
     time, rudder, rates, heading = np.array(rows).T
     drift = heading - 3.0 * rates  # a ship turns about its pivot point, and drifts outwards

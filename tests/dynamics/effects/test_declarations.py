@@ -31,6 +31,7 @@ OTHER_MEANINGS = {
     'name="current"': "current of a motor",
     '"current": "current_A"': "the same",
     '"current": None if': "key of the JSON of a log: the current found in it",
+    '"current": _current(result)': "key of the JSON of identify: the current found with the coefficients",
     '"wind" if true else': "part of the name of a quantity of a log",
     'quantity.startswith("wind")': "the same",
     '"bank": "Polygon"': "kind of a feature of a scenario",

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
 from tank2sim.identification.trials.assessment.evaluation import replay_error
@@ -513,9 +514,8 @@ def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard) -> Sequence[str
 def _tactical_diameter(card: ManoeuvringCard, rudder: float) -> float:
     """In lengths, in still water; nan if the ship does not turn round."""
     model = build(card)
-    still = dict.fromkeys({"current.speed", "wind.speed"} & set(model.input_names), 0.0)
     try:
-        run = simulate(model, Turn(rudder), inputs=still)
+        run = simulate(model, Turn(rudder), inputs=undisturbed_inputs(model))
     except InputError:  # a polynomial that drives itself out of all bounds
         return math.nan
     size = run.figures["tactical_diameter_lengths"]

@@ -15,7 +15,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import revised
-from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.surroundings import CURRENT
 from tank2sim.dynamics.model import Parameter
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.structures import with_effect
@@ -32,7 +32,7 @@ KNOWN_TO = 0.01
 """Largest standard error of a component, over the ship's speed, of a current that the trials determine (project choice:
 a current of 5 % of the speed that was left out changed the tactical diameter of a turn by 30 %, 1 % by about 6 %)."""
 
-_STRONGEST = next(each.maximum for each in EFFECTS["current"].parameters if each.name == "speed_mps")
+_STRONGEST = next(each.maximum for each in CURRENT.parameters if each.name == "speed_mps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def at_sea(trials: Sequence[Trial]) -> bool:
 
 def of_unknown_current(card: ManoeuvringCard, trials: Sequence[Trial]) -> bool:
     """Whether trials at sea are in a current that neither the card nor a sensor states; a basin has none."""
-    stated = any(entry.name == "current" for entry in card.effects) or any(
+    stated = any(entry.name == CURRENT.name for entry in card.effects) or any(
         "current_speed_mps" in trial.signals for trial in trials
     )
     return at_sea(trials) and not stated
@@ -164,7 +164,7 @@ def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate
 def current_of(card: ManoeuvringCard) -> Array:
     """Velocity of the current of a card to north and east (2,), m/s; 0 without one."""
     for entry in card.effects:
-        if entry.name == "current":
+        if entry.name == CURRENT.name:
             given = entry.parameters
             speed, direction = given["speed_mps"], given["direction_rad"]
             return speed * np.array([math.cos(direction), math.sin(direction)])
@@ -182,10 +182,10 @@ def card_in(card: ManoeuvringCard, current: WaterCurrent) -> ManoeuvringCard:
         ),
     }
     for number, entry in enumerate(card.effects):
-        if entry.name == "current":
+        if entry.name == CURRENT.name:
             changes: dict[str, object] = {}
             for key, pair in found.items():
                 for section, value in zip(("parameters", "uncertainty"), pair, strict=True):
                     changes[f"effects.{number}.{section}.{key}"] = value
             return revised(card, {}, changes, comment="estimated with the coefficients")
-    return with_effect(card, "current", found)
+    return with_effect(card, CURRENT.name, found)
