@@ -248,6 +248,23 @@ def test_a_parameter_at_its_bound_stays_there() -> None:
     assert again.noise.force[2] > NOISE.force[2]
 
 
+def test_beside_a_parameter_at_its_bound_the_others_go_where_they_fit_best(monkeypatch) -> None:
+    """Two effects that act alike, of which one may not be as large as it is: against the density along the bound."""
+    monkeypatch.setattr(form_error, "FORM", 1e-6)
+
+    class Alike(Toy):
+        bounds = np.array([-0.2, -10.0]), np.array([0.3, 10.0])
+
+        def rates_between(self, motion, theta):
+            return super().rates_between(motion, np.array([[1.0, 0.9], [0.0, 0.4]]) @ theta)
+
+    toy = Alike((None, None))
+    of = judge(toy_motion((0.8, -0.6)))
+    along = minimize_scalar(lambda size: dense_cost(of, toy, np.array([0.3, size])), bounds=(-5, 5), method="bounded")
+    assert along.x > 0  # without the bound it is -1.5
+    assert fitted(of, toy).theta == pytest.approx([0.3, along.x], abs=1e-3)
+
+
 def test_about_an_explanation_the_motion_is_nearer_to_the_true_one() -> None:
     motion, true = toy_trials((0.8,))
     of, toy = judge(motion), Toy((None,))
