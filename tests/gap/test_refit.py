@@ -14,7 +14,8 @@ from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics import build
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
-from tank2sim.gap.outcome.refit import refit_coefficients
+from tank2sim.gap.outcome.refit import effects_like, refit_coefficients
+from tank2sim.gap.result import Refitted
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tests.records.motions import motion, trial
@@ -32,6 +33,16 @@ ESTIMATES = CoefficientEstimates(
     ),
 )
 """Rudder positive to starboard."""
+
+
+def test_an_effect_that_is_the_change_of_a_coefficient_is_named_next_to_it() -> None:
+    def refitted(name: str, moved: float) -> Refitted:
+        return Refitted(name, -1.0 - 0.02 * moved, 0.01, -1.0, 0.02)
+
+    coefficients = [refitted("Xvr", 7.5), refitted("Yv", 6.0), refitted("Nv", -9.0), refitted("Yvrr", 3.0)]
+    found = effects_like([*coefficients, refitted("Yd", 20.0)], {"turning_drag"})
+    assert {name: one.name for name, one in found.items()} == {"linear_sway_damping": "Nv"}
+    assert list(effects_like(coefficients, ())) == ["turning_drag", "linear_sway_damping"]
 
 
 def test_the_covariance_of_refitted_coefficients_is_written_with_the_sign_of_the_file(

@@ -32,7 +32,7 @@ from tank2sim.gap.outcome.combine import combine_passes, without_effect
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
-from tank2sim.gap.outcome.refit import refit_coefficients
+from tank2sim.gap.outcome.refit import effects_like, refit_coefficients
 from tank2sim.gap.outcome.surroundings import (
     ByTrial,
     CommonSurroundings,
@@ -749,6 +749,10 @@ def _notices(
                 f"identify with --structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
                 "trials together with the hull's derivatives, from the card as it was given"
             )
+    notices += [
+        f"{name}: the same to these trials as {one.name}, which was refitted by {one.moved:.2g} of its standard errors"
+        for name, one in effects_like(judged.proof.coefficients, {name for name, *_ in judged.estimated}).items()
+    ]
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [f"{name}: the improved card follows it worse than the given one" for name in worse_trials(results)]
     for variable, values in agreement.items():

@@ -2,17 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.result import Refitted
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters
+
+FAR = 5.0
+"""Standard errors of the given card from which a refitted coefficient has moved far (project choice: of thirty, chance
+moves one by two)."""
+
+FEW_TERMS = 2
+"""Derivatives at most that an effect changes which is named next to a refitted coefficient: more, and it is a change of
+the whole ship or rudder."""
+
+
+def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> dict[str, Refitted]:
+    """Effects that change a refitted coefficient which has moved by :data:`FAR`, and that coefficient.
+
+    Trials alone do not distinguish such an effect from a coefficient that is off.
+
+    Parameters
+    ----------
+    coefficients : sequence of Refitted
+    named : collection of str
+        Effects that are named already.
+    """
+    found = {}
+    for name, effect in EFFECTS.items():
+        moved = [one for one in coefficients if one.name in effect.changes and one.moved > FAR]
+        if moved and name not in named and len(effect.changes) <= FEW_TERMS:
+            found[name] = max(moved, key=lambda one: one.moved)
+    return found
 
 
 def refit_coefficients(
