@@ -750,8 +750,11 @@ def _notices(
                 "trials together with the hull's derivatives, from the card as it was given"
             )
     notices += [
-        f"{name}: the same to these trials as {one.name}, which was refitted by {one.moved:.2g} of its standard errors"
-        for name, one in effects_like(judged.proof.coefficients, {name for name, *_ in judged.estimated}).items()
+        f"{name}: the same to these trials as {coefficient.name}, which was refitted by {coefficient.moved:.2g} of its "
+        "standard errors"
+        for name, coefficient in effects_like(
+            judged.proof.coefficients, {name for name, *_ in judged.estimated}
+        ).items()
     ]
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [f"{name}: the improved card follows it worse than the given one" for name in worse_trials(results)]

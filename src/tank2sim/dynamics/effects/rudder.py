@@ -17,10 +17,10 @@ STALL_WIDTH = math.radians(5.0)
 rudders falls off over some degrees past its maximum (Molland and Turnock 2007, Marine Rudders and Control Surfaces)."""
 
 
-def with_rudder_force(model: Model, multiplier: ca.SX) -> Model:
-    """The model with ``rudder.X``, ``rudder.Y`` and ``rudder.N`` times `multiplier`."""
-    for name in ("rudder.X", "rudder.Y", "rudder.N"):
-        model = model.redefine(name, lambda force: multiplier * force)
+def with_rudder_force(model: Model, multiplier: ca.SX, equations: str = "XYN") -> Model:
+    """The model with ``rudder.X``, ``rudder.Y`` and ``rudder.N``, or those of some `equations`, times `multiplier`."""
+    for equation in equations:
+        model = model.redefine(f"rudder.{equation}", lambda force: multiplier * force)
     return model
 
 
@@ -134,10 +134,7 @@ def _stalled(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
     """
     a = ca.fmax(0, ca.fmin(1, (ca.fabs(model.symbol("rudder.effective")) - given["angle"]) / given["width"]))
     lost = given["loss"] * a**2 * (3 - 2 * a)
-    model = model.redefine("rudder.X", lambda force: (1 - given["drag"] * lost) * force)
-    for name in ("rudder.Y", "rudder.N"):
-        model = model.redefine(name, lambda force: (1 - lost) * force)
-    return model
+    return with_rudder_force(with_rudder_force(model, 1 - given["drag"] * lost, "X"), 1 - lost, "YN")
 
 
 RUDDER_STALL = Effect(

@@ -22,7 +22,7 @@ moves one by two)."""
 
 FEW_TERMS = 2
 """Derivatives at most that an effect changes which is named next to a refitted coefficient: more, and it is a change of
-the whole ship or rudder."""
+the whole ship or rudder (project choice)."""
 
 
 def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> dict[str, Refitted]:
@@ -38,9 +38,9 @@ def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> di
     """
     found = {}
     for name, effect in EFFECTS.items():
-        moved = [one for one in coefficients if one.name in effect.changes and one.moved > FAR]
+        moved = [entry for entry in coefficients if entry.name in effect.changes and entry.moved > FAR]
         if moved and name not in named and len(effect.changes) <= FEW_TERMS:
-            found[name] = max(moved, key=lambda one: one.moved)
+            found[name] = max(moved, key=lambda coefficient: coefficient.moved)
     return found
 
 

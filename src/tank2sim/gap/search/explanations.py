@@ -255,8 +255,8 @@ def _shapes(fit: ExplanationFit) -> NDArray[np.bool_]:
     """Mask of the parameters that give an effect its shape, and that every card with it must state (k,)."""
     return np.array(
         [
-            one.run is None and not one.is_amplitude and one.parameter.default is None
-            for one in fit.hypothesis.estimated
+            estimate.run is None and not estimate.is_amplitude and estimate.parameter.default is None
+            for estimate in fit.hypothesis.estimated
         ],
         dtype=bool,
     )
@@ -272,8 +272,8 @@ def _of_typical_shape(fit: ExplanationFit) -> dict[str, Array]:
     """Parameters of a fit by effect, with those of the shape at the likeliest of their typical values."""
     card = fit.hypothesis.card
     typical = [
-        one.parameter.typical_values(card)[0] if shape else value
-        for one, shape, value in zip(fit.hypothesis.estimated, _shapes(fit), fit.theta, strict=True)
+        estimate.parameter.typical_values(card)[0] if shape else value
+        for estimate, shape, value in zip(fit.hypothesis.estimated, _shapes(fit), fit.theta, strict=True)
     ]
     return thetas_of(replace(fit, theta=np.array(typical)))
 

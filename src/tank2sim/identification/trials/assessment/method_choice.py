@@ -5,7 +5,7 @@ off that motion, and leave residuals far above the noise that hang together over
 them for coefficients, and the filter-error method is the right one (Maine and Iliff 1981, SIAM J. Appl. Math. 41; Klein
 and Morelli 2006, Aircraft System Identification, chapter 6; Jategaonkar 2015, Flight Vehicle System Identification,
 chapter 5). Errors of the model leave such residuals as well. What distinguishes the two is where the trials are from:
-there is no weather in a basin.
+a basin has no weather.
 """
 
 from __future__ import annotations
