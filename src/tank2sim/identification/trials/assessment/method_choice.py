@@ -19,6 +19,8 @@ from tank2sim.identification.trials.assessment.evaluation import replay_error
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.measured_motion import sensor_noise
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.records.signals.columns import SignalName
 
 ABOVE_NOISE = 2.0
 """Residuals of whole runs of this many times the sensor's white noise are not that noise (project choice: on made-up
@@ -28,10 +30,7 @@ times in wind; the filter nests output error, so that it is the smaller mistake)
 MANY_SAMPLES = 3.0
 """Samples over which residuals of pieces hang together, if they are not white (project choice)."""
 
-_WORDS = {
-    **{"motion.u": "speed ahead", "motion.v": "sway velocity", "motion.r": "yaw rate", "motion.psi": "heading"},
-    **{"motion.x": "northing", "motion.y": "easting", "motion.sog": "speed over the ground"},
-}
+_SIGNALS = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def choose_method(residuals: Sequence[SignalResidual]) -> MethodChoice:
     if not process:
         return MethodChoice("output_error", "its residuals are the noise of the sensors")
     worst = max(process, key=lambda residual: residual.above_noise)
-    size, name = f"{worst.above_noise:.2g}", _WORDS.get(worst.name, worst.name)
+    size, name = f"{worst.above_noise:.2g}", SignalName(_SIGNALS[worst.name]).words
     return MethodChoice(
         "kalman",
         f"what output error leaves in the {name} is {size} times the sensor's noise and hangs together over "
