@@ -9,8 +9,8 @@ import pytest
 
 from tank2sim.gap import workflow
 from tank2sim.gap.outcome.combine import combine_passes, without_effect
-from tank2sim.gap.result import Named, Passed, Refitted
-from tests.gap.made_up import missing
+from tank2sim.gap.result import AMBIGUOUS, MISSING, Named, Passed, Refitted
+from tests.gap.made_up import missing, passed
 
 DRAG = Named("cross_flow_drag", {"drag_coefficient": 0.4}, {"drag_coefficient": 0.02}, 0.99)
 
@@ -37,6 +37,28 @@ def test_effects_of_both_searches_are_named_and_those_of_the_first_as_they_were_
     assert (current.name, drag) == ("current", DRAG)
     assert current.parameters["speed_mps"] == 0.5 and current.standard_errors["speed_mps"] == 0.01
     assert current.parameters["direction_rad"] == pytest.approx(-np.pi / 2)
+
+
+def test_what_the_first_search_could_not_distinguish_is_not_distinguished_by_a_second(passes) -> None:
+    first, further = passes
+    unsure = replace(first, verdict=AMBIGUOUS, alternatives=(("wind",), ("bank_suction", "gyro_bias")))
+    combined = combine_passes(unsure, further)
+    assert combined.verdict == AMBIGUOUS
+    assert combined.alternatives == (("wind", "cross_flow_drag"), ("bank_suction", "gyro_bias", "cross_flow_drag"))
+    assert combine_passes(first, further).verdict == MISSING and combine_passes(first, further).alternatives == ()
+
+
+@pytest.mark.parametrize(
+    ("alternatives", "after", "more"),
+    [((("wind",),), 5.0, True), ((), 5.0, True), ((("wind",), ()), 5.0, False), ((("wind",),), 1.0, False)],
+)
+def test_more_is_sought_where_something_is_surely_missing_and_the_trials_are_still_missed(
+    alternatives: tuple, after: float, more: bool
+) -> None:
+    verdict = AMBIGUOUS if alternatives else MISSING
+    found = replace(missing(), verdict=verdict, alternatives=alternatives, passed=(passed("turn35", 9.0, after),))
+    assert workflow._seeks_more(found, workflow.GapOptions()) == more
+    assert not workflow._seeks_more(found, workflow.GapOptions(most_effects=1))
 
 
 def test_coefficients_are_compared_with_those_of_the_given_card(passes) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -40,14 +40,16 @@ def pushed(t):
 class Toy:
     """What a likelihood asks of an explanation; `priors` mean and standard deviation of each theta, or None.
 
-    Its effects are the first of :data:`SHAPES`, or those at the places `indices`.
+    Its effects are the first of :data:`SHAPES`, or those at the places `indices`. On its card are effects that push it
+    by `known` times the first of them.
     """
 
     priors: tuple = ()
     directed: bool = False
     indices: tuple | None = None
+    known: float = 0.0
+    card: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(steering_gear=None, effects=()))
     model = SimpleNamespace(input_names=("rudder.command",))
-    card = SimpleNamespace(steering_gear=None)
     each = recorded = ()
 
     @property
@@ -92,9 +94,8 @@ class Toy:
     def rates_between(self, motion, theta):
         x = 0.5 * (motion.states[:, 1:] + motion.states[:, :-1])
         t = motion.begin_s[:, None] + (np.arange(x.shape[1]) + 0.5) * motion.step_s
-        return (
-            x @ A.T + pushed(t) + sum(size * SHAPES[place](t) for size, place in zip(theta, self.places, strict=True))
-        )
+        added = sum(size * SHAPES[place](t) for size, place in zip(theta, self.places, strict=True))
+        return x @ A.T + pushed(t) + self.known * SHAPES[0](t) + added
 
     def fine_rates(self, motion, theta):
         return motion.over_blocks(self.rates_between(motion, theta))

@@ -179,16 +179,18 @@ def run_gap_workflow(
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
         gap, trials = _search_once(card, (fitted, held), options, progress, pool)
+        without = gap.base
         while _seeks_more(gap, options):
             named = tuple(effect.name for effect in gap.effects)
+            known = dict.fromkeys([*named, *(name for names in gap.alternatives for name in names)])
             most = min(options.max_effects, options.most_effects - len(named))
-            wanted = None if options.effects is None else tuple(name for name in options.effects if name not in named)
+            wanted = None if options.effects is None else tuple(name for name in options.effects if name not in known)
             if wanted == () or gap.improved is card:
                 break
-            simpler = [name for effect in named for name in EFFECTS[effect].includes]
-            without = (*options.without, *named, *simpler)
-            more = replace(options, effects=wanted, without=without, max_effects=most)
-            further, found_trials = _search_once(gap.improved, trials, more, progress, pool)
+            simpler = [name for effect in known for name in EFFECTS[effect].includes]
+            excluded = (*options.without, *known, *simpler)
+            more = replace(options, effects=wanted, without=excluded, max_effects=most)
+            further, found_trials = _search_once(gap.improved, trials, more, progress, pool, without)
             if not _adds(gap, further, 1 - options.false_discovery):
                 break
             both = combine_passes(gap, further)
@@ -219,10 +221,14 @@ def _search_once(
     options: GapOptions,
     progress: StageReport,
     pool: Executor | None,
+    without: ManoeuvringCard | None = None,
 ) -> tuple[Gap, tuple[Measured, Measured]]:
-    """One search, the decision and its proof; and the trials with the winds and currents that were found."""
+    """One search, the decision and its proof; and the trials with the winds and currents that were found.
+
+    `without` is the card without the effects that an earlier search found.
+    """
     names = _names(card, trials[0], options)
-    found = search(likelihood_from_card(card, trials[0]), progress, pool, names, most=options.max_effects)
+    found = search(likelihood_from_card(card, trials[0], without), progress, pool, names, most=options.max_effects)
     decision = decide(found, options.false_discovery)
     progress("proving")
     replays = TrialReplays({name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, pool)
@@ -233,8 +239,11 @@ def _search_once(
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
-    """Whether effects of the ship were named, and the fitted trials are still missed."""
-    if gap.verdict != MISSING or len(gap.effects) >= options.most_effects:
+    """Whether effects of the ship were named, also as one of several that look alike, and the fitted trials are still
+    missed."""
+    if gap.verdict not in (MISSING, AMBIGUOUS) or not all(gap.alternatives):
+        return False
+    if not 0 < len(gap.effects) < options.most_effects:
         return False
     if any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
         return False  # the trials would have to be corrected first

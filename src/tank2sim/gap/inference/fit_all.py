@@ -92,6 +92,7 @@ class _LikelihoodParts:
     coefficients: NuisanceParameters
     belief: Belief
     scale: Array
+    without: ManoeuvringCard | None
 
 
 class Fitting:
@@ -120,7 +121,8 @@ class Fitting:
         self.likelihood, self.hypotheses, self.progress, self.executor = likelihood, hypotheses, progress, executor
         self.found: dict[tuple[str, ...], ExplanationFit] = dict(found or {})
         none = likelihood.none
-        parts = likelihood.motion, likelihood.coefficients, likelihood.belief, likelihood.scale
+        without = None if likelihood.without is None else likelihood.without.card
+        parts = likelihood.motion, likelihood.coefficients, likelihood.belief, likelihood.scale, without
         self._parts = _LikelihoodParts(uuid4().hex, none.card, none.driven_by, *parts)
 
     def fit(self, proposals: Sequence[Proposal]) -> None:
@@ -199,7 +201,8 @@ def _fit_in_worker(sent: _LikelihoodParts, proposal: Proposal) -> ExplanationFit
             hypotheses = next((cache for _, cache in _LIKELIHOODS.values() if _same_trials(cache, ship, sent)), None)
             none = hypotheses.none if hypotheses else Hypothesis(*ship)
             _LIKELIHOODS.clear()
-            likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief, sent.scale)
+            without = None if sent.without is None else Hypothesis(sent.without, sent.driven_by)
+            likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief, sent.scale, without)
             _LIKELIHOODS[sent.token] = likelihood, hypotheses or HypothesisCache(none, sent.motion)
         likelihood_and_hypotheses = _LIKELIHOODS[sent.token]
     found = _fit(*likelihood_and_hypotheses, proposal)

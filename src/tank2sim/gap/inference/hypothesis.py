@@ -6,7 +6,7 @@ motion from the recorded inputs; the rates of the measured states, and the readi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -87,6 +87,11 @@ class TrialSurroundings:
     runs: int = 0
 
 
+def directed(effects: Iterable[str]) -> bool:
+    """Whether one of the effects comes from a direction of the compass."""
+    return any(parameter.name == "direction_rad" for effect in effects for parameter in EFFECTS[effect].parameters)
+
+
 class Hypothesis:
     """The model of a card with added effects.
 
@@ -151,8 +156,7 @@ class Hypothesis:
     @property
     def directed(self) -> bool:
         """Whether one of the effects comes from a direction of the compass."""
-        names = {parameter.name for effect in self.effects for parameter in EFFECTS[effect].parameters}
-        return "direction_rad" in names
+        return directed(self.effects)
 
     @cached_property
     def influences(self) -> tuple[bool, bool, bool]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.result import Gap, Named, Passed, Refitted
+from tank2sim.gap.result import AMBIGUOUS, Gap, Named, Passed, Refitted
 
 
 def combine_passes(first: Gap, further: Gap) -> Gap:
@@ -31,14 +31,18 @@ def combine_passes(first: Gap, further: Gap) -> Gap:
         for name, coefficient in refitted.items()
         if name.partition(".")[0] not in {effect.name for effect in first.effects}
     )
+    named, added = ([effect.name for effect in gap.effects] for gap in (first, further))
+    alternatives = [(*names, *added) for names in first.alternatives]
+    alternatives += [(*named, *names) for names in further.alternatives]
     return replace(
         further,
         card=first.card,
+        verdict=AMBIGUOUS if alternatives else further.verdict,
         base=further.base if further.coefficients else first.base,
         effects=(*(_updated(effect, refitted) for effect in first.effects), *further.effects),
         coefficients=coefficients or first.coefficients,
         effect_alone={**further.effect_alone, **first.effect_alone},
-        alternatives=(*first.alternatives, *further.alternatives),
+        alternatives=tuple(alternatives),
         rivals=first.rivals,
         where=first.where,
         equation=first.equation,
@@ -46,6 +50,7 @@ def combine_passes(first: Gap, further: Gap) -> Gap:
         figures_before=first.figures_before,
         missing_force=first.missing_force,
         agreement={**first.agreement, **further.agreement},
+        next_test=further.next_test or first.next_test,
         notices=tuple(dict.fromkeys((*further.notices, *_of_names(first, further)))),
     )
 
