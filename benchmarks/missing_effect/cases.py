@@ -1,11 +1,15 @@
 """Write the cases of the public benchmark of missing effects: trials of ships, and the truth in a file of its own.
 
-    python benchmarks/missing_effect/cases.py FOLDER [--cases N] [--seed S]
+    python benchmarks/missing_effect/cases.py FOLDER [--cases N] [--seed S] [--harder]
 
 Each case is a folder: ``ship.toml`` (the model that the analyst has), ``fit/*.csv`` and ``holdout/*.csv``. What was
 hidden is in ``truth.csv`` next to the folders, and in nothing else. A case is drawn at random: one of four ships, 10, 2
 or 1 rows a second, nothing, one or two effects of the catalogue or one thing that the catalogue does not hold, at full
 or a quarter strength, and in one of four with each coefficient 2 % off the card's. The catalogue is ``catalogue.csv``.
+
+The cases of ``--harder`` are in turn of four groups: three effects at once; one effect and a card whose derivatives are
+10 % off and say so; one effect and records of position and heading alone; a wind or current that differs from trial to
+trial.
 """
 
 from __future__ import annotations
@@ -19,15 +23,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from gap_truth import EFFECTS, FIT, HULLS, OUTSIDERS, Setting, make, sampled, write
+from gap_truth import EFFECTS, FIT, HULLS, OUTSIDERS, SENSORS, Setting, make, sampled, write, wrong_card
 
 HERTZ = (10, 2, 1)
 GROUPS = {"single": 0.4, "weak": 0.15, "pair": 0.2, "none": 0.15, "outside": 0.1}
 """Share of each group of cases: a choice of this benchmark."""
 
+HARDER = ("triple", "wrong card", "positions", "by trial")
+CARD_ERROR = 0.1
+"""Relative standard error of the derivatives of a wrong card: a choice of this benchmark."""
+
+OF_THE_SHIP = [name for name in EFFECTS if name not in SENSORS]
+VELOCITIES = ("u_mps", "v_mps", "r_degps")
 TRUTH_COLUMNS = ("case", "group", "ship", "hertz", "verdict", "effects", "parameters")
 VERDICTS = {"no missing effect": "none", "missing effect": "missing", "outside the library": "outside"}
 
@@ -63,6 +74,22 @@ def draw_cases(count: int, seed: int) -> list[Case]:
     return cases
 
 
+def draw_harder_cases(count: int, seed: int) -> list[Case]:
+    """`count` cases of the harder groups in turn, the same for the same seed."""
+    cases = []
+    for number in range(1, count + 1):
+        generator = np.random.default_rng([seed, number, 77])  # not the numbers of the other draw
+        group = HARDER[(number - 1) % len(HARDER)]
+        ship, hertz = str(generator.choice(list(HULLS))), int(generator.choice(HERTZ))
+        possible = ("wind", "current") if group == "by trial" else OF_THE_SHIP
+        effects = generator.choice(possible, 3 if group == "triple" else 1, replace=False)
+        setting = Setting(
+            tuple(map(str, effects)), seed=int(generator.integers(2**31)), ship=ship, by_trial=group == "by trial"
+        )
+        cases.append(Case(f"case_{number:04d}", group, hertz, setting))
+    return cases
+
+
 def write_case(case: Case, folder: Path) -> dict[str, str]:
     """Write one case into `folder`, and return its row of the truth."""
     (made,) = make([case.setting])
@@ -71,9 +98,14 @@ def write_case(case: Case, folder: Path) -> dict[str, str]:
     shutil.rmtree(place, ignore_errors=True)
     write(made, place)
     (place / "truth.json").unlink()
+    if case.group == "wrong card":
+        (place / "ship.toml").write_text(wrong_card(made, CARD_ERROR), encoding="utf-8")
     for file in sorted(place.glob("*.csv")):
         part = place / ("fit" if file.stem in FIT else "holdout")
         part.mkdir(exist_ok=True)
+        if case.group == "positions":
+            table = pd.read_csv(file, dtype=str)
+            table.drop(columns=list(VELOCITIES)).to_csv(file, index=False)
         file.rename(part / file.name)
     return {
         "case": case.name,
@@ -99,9 +131,11 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--cases", type=int, default=120, metavar="N", help="number of cases (120)")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the draw (1: the published set)")
+    parser.add_argument("--harder", action="store_true", help="three effects, wrong cards, positions alone, by trial")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
-    rows = [write_case(case, args.folder) for case in draw_cases(args.cases, args.seed)]
+    draw = draw_harder_cases if args.harder else draw_cases
+    rows = [write_case(case, args.folder) for case in draw(args.cases, args.seed)]
     write_rows(args.folder / "truth.csv", TRUTH_COLUMNS, rows)
     write_rows(args.folder / "catalogue.csv", ("effect",), [{"effect": name} for name in EFFECTS])
     print(f"{len(rows)} cases in {args.folder}")

@@ -237,7 +237,7 @@ def _with_trials(folder: Path, new: Path) -> Path:
         (["mariner", "turn20.csv", "--effects", "curent"], ["--effects", "curent", "did you mean current"]),
         (["mariner", "turn20.csv", "--without", "kraken"], ["--without", "kraken"]),
         (["mariner", "turn20.csv", "--without", "--workers", "2"], ["--without names no effect"]),
-        (["mariner", "turn20.csv", "--max-effects", "3"], ["--max-effects"]),
+        (["mariner", "turn20.csv", "--max-effects", "5"], ["--max-effects"]),
         (["mariner", "empty"], ["empty", "holds no trial"]),
     ],
 )

@@ -58,7 +58,7 @@ def test_more_is_sought_where_something_is_surely_missing_and_the_trials_are_sti
     verdict = AMBIGUOUS if alternatives else MISSING
     found = replace(missing(), verdict=verdict, alternatives=alternatives, passed=(passed("turn35", 9.0, after),))
     assert workflow._seeks_more(found, workflow.GapOptions()) == more
-    assert not workflow._seeks_more(found, workflow.GapOptions(most_effects=1))
+    assert not workflow._seeks_more(found, workflow.GapOptions(max_effects=1))
 
 
 def test_coefficients_are_compared_with_those_of_the_given_card(passes) -> None:

@@ -134,6 +134,12 @@ def test_where_waves_were_found_scores_count_half_as_much() -> None:
         ([fit(0), fit(-5, 0, sure=1.0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
         ([fit(0), fit(-5, 0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
         ([fit(0), fit(-8, 0), fit(-12, 0, 1)], NO_EFFECT_MISSING, (), []),
+        # so must a third, against the best with fewer
+        ([fit(0), fit(-50, 0), fit(-70, 0, 1), fit(-80.1, 0, 1, 2)], MISSING, (YAW, SURGE, SWAY), []),
+        ([fit(0), fit(-50, 0), fit(-70, 0, 1), fit(-79.9, 0, 1, 2)], MISSING, (YAW, SURGE), []),
+        ([fit(0), fit(-50, 0), fit(-58, 0, 1), fit(-65, 0, 1, 2)], MISSING, (YAW,), []),
+        ([fit(0), fit(-50, 0), fit(-58, 0, 1), fit(-69, 0, 1, 2)], MISSING, (YAW, SURGE, SWAY), []),
+        ([fit(0), fit(-50, 0), fit(-70, 0, 1), fit(-90, 0, 1, 2, sure=2.0)], MISSING, (YAW, SURGE), []),
     ],
 )
 def test_verdicts_follow_the_scores(fits, verdict, effects, alike) -> None:
@@ -182,6 +188,15 @@ def test_a_second_effect_of_the_same_kind_must_have_a_share_of_the_gain(pair, sh
         assert found.best.hypothesis.effects == (names if part > max(share * 2000, EVIDENCE_NEEDED) else names[:1]), (
             part
         )
+
+
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(("third", "share"), [(DRAG, SAME_KIND_SHARE["force"]), (LAG, 0.0)])
+def test_a_third_effect_of_the_kind_of_another_must_have_a_share_of_the_gain(third: int, share: float) -> None:
+    pair = (0, FORCE)
+    for part in (share * 2000 - 1, share * 2000 + 1, EVIDENCE_NEEDED + 1):
+        found = of_scores(fit(0), fit(-1000, 0), fit(-2000 + part, *pair), fit(-2000, *pair, third))
+        assert len(found.best.hypothesis.effects) == (3 if part > max(share * 2000, EVIDENCE_NEEDED) else 2), part
 
 
 @pytest.mark.usefixtures("calm")

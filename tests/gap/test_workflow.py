@@ -178,6 +178,14 @@ def test_straight_runs_alone_never_make_a_wrong_name_sure(effect: str, tmp_path:
     assert case.gap.verdict in (NO_EFFECT_MISSING, AMBIGUOUS) or (case.sole and case.named == {effect})
 
 
+@pytest.mark.slow
+def test_three_hidden_effects_are_all_named(tmp_path: Path) -> None:
+    (made,) = make([Setting(("engine_droop", "rudder_backlash", "cross_flow_drag"), SEED, manoeuvres=FOUR)])
+    names = ("engine_droop", "rudder_backlash", "cross_flow_drag", "hull_fouling", "turning_drag", "gyro_bias")
+    case = sought(tmp_path, made, options=GapOptions(workers=1, effects=names))
+    assert case.sole and case.named == set(made.setting.effects)
+
+
 SOME = GapOptions(workers=1, effects=("cross_flow_drag", "wind", "rudder_lag", "rudder_time_offset"))
 
 

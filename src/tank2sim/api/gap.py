@@ -38,7 +38,7 @@ from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
 from tank2sim.gap.search.model_choice import SUREST
-from tank2sim.gap.workflow import GapOptions
+from tank2sim.gap.workflow import MOST_EFFECTS, GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import fitted_as, with_fitted_trials
@@ -348,7 +348,7 @@ def find_gap(
     holdout: TrialPaths = (),
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
-    max_effects: int = 2,
+    max_effects: int = MOST_EFFECTS,
     false_discovery: float = 0.5,
     executor: str = PROCESSES,
     workers: int | None = None,
@@ -365,7 +365,7 @@ def find_gap(
     effects, without : sequence of str
         Look for these alone; do not look for these. By default the whole library.
     max_effects : int
-        1 or 2 effects at a time.
+        Effects named at most, 1 to 4.
     false_discovery : float
         Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5; what is less sure is one of
         several candidates.
@@ -379,7 +379,8 @@ def find_gap(
     Raises
     ------
     InputError
-        A file is at fault, a trial is too short, or an effect is not known or cannot be tried on this card.
+        A file is at fault, a trial is too short, an effect is not known or cannot be tried on this card, or an option
+        is out of its range.
     """
     ship = nonlinear_card(as_ship(card).card)
     options = gap_options(effects, without, max_effects, workers, false_discovery)
@@ -410,11 +411,11 @@ def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
 def gap_options(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
-    max_effects: int = 2,
+    max_effects: int = MOST_EFFECTS,
     workers: int | None = None,
     false_discovery: float = 0.5,
 ) -> GapOptions:
-    """Options of the search. Raises InputError for an effect that is not known.
+    """Options of the search. Raises InputError for an effect that is not known, or a number out of its range.
 
     Parameters
     ----------
@@ -425,6 +426,8 @@ def gap_options(
         for name in names:
             if EFFECTS.get(name) is None:
                 raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
+    if not 1 <= max_effects <= MOST_EFFECTS:
+        raise InputError("--max-effects", "", f"is {max_effects}", f"give 1 to {MOST_EFFECTS}")
     if not SUREST_WRONG <= false_discovery <= 0.5:
         problem = f"is {false_discovery:g}: no name is surer than {1 - SUREST_WRONG:g}, and half is a guess"
         raise InputError("--false-discovery", "", problem, f"give {SUREST_WRONG:g} to 0.5")

@@ -40,7 +40,7 @@ from tank2sim.gap.fleet.ships import GAP, HOLDOUT, ship_alone
 @executor_option
 @click.option("--effects", multiple=True, metavar="NAME...", help="Look for these alone.")
 @click.option("--without", multiple=True, metavar="NAME...", help="Do not look for these.")
-@click.option("--max-effects", type=click.IntRange(1, 2), default=2, show_default=True, help="Effects at a time.")
+@click.option("--max-effects", type=click.IntRange(1, 4), default=4, show_default=True, help="Effects named at most.")
 @click.option(
     "--false-discovery",
     type=float,

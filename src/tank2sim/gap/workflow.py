@@ -126,10 +126,7 @@ class GapOptions:
     without : tuple of str
         Effects not to try.
     max_effects : int
-        Effects sought at a time, 1 or 2.
-    most_effects : int
-        Effects in all: where the trials are still missed with those that were found, more are sought on the improved
-        card, up to this number.
+        Effects named at most, 1 to :data:`MOST_EFFECTS`.
     workers : int, optional
         Processes; by default as many as there are processors.
     false_discovery : float
@@ -138,8 +135,7 @@ class GapOptions:
 
     effects: tuple[str, ...] | None = None
     without: tuple[str, ...] = ()
-    max_effects: int = 2
-    most_effects: int = MOST_EFFECTS
+    max_effects: int = MOST_EFFECTS
     workers: int | None = None
     false_discovery: float = 1 - LIKELY
 
@@ -183,7 +179,7 @@ def run_gap_workflow(
         while _seeks_more(gap, options):
             named = tuple(effect.name for effect in gap.effects)
             known = dict.fromkeys([*named, *(name for names in gap.alternatives for name in names)])
-            most = min(options.max_effects, options.most_effects - len(named))
+            most = options.max_effects - len(named)
             wanted = None if options.effects is None else tuple(name for name in options.effects if name not in known)
             if wanted == () or gap.improved is card:
                 break
@@ -243,7 +239,7 @@ def _seeks_more(gap: Gap, options: GapOptions) -> bool:
     missed."""
     if gap.verdict not in (MISSING, AMBIGUOUS) or not all(gap.alternatives):
         return False
-    if not 0 < len(gap.effects) < options.most_effects:
+    if not 0 < len(gap.effects) < options.max_effects:
         return False
     if any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
         return False  # the trials would have to be corrected first
@@ -282,8 +278,6 @@ def _smaller(
     reached = _misfit_of(both.passed, "after", held_out=False)
     for dropped in first.effects:
         others = tuple(effect.name for effect in both.effects if effect.name != dropped.name)
-        if len(others) > options.max_effects:
-            continue
         again, found_trials = _search_once(card, trials, replace(options, effects=others), lambda text: None, pool)
         same = again.verdict == MISSING and {effect.name for effect in again.effects} == set(others)
         if same and _misfit_of(again.passed, "after", held_out=False) <= (1 + BETTER) * reached:

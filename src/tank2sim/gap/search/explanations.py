@@ -1,4 +1,5 @@
-"""The search for the explanation: none, single effects, pairs; screened together, then each fitted by itself.
+"""The search for the explanation: none, single effects, pairs; screened together, then each fitted by itself; then
+more effects on top of the best pair, one at a time.
 
 The screen is linear and at one noise, the fit is not and estimates the noise again; so the screen only proposes. It is
 evaluated at the noise of "none" (large, for it must cover the missing effect), and again at that of the best
@@ -38,7 +39,8 @@ COMPARABLE = 0.5
 the effect, and of a large effect it is wrong by a share of itself."""
 
 WORTH = 5.0
-"""Proposals whose gain in the screen is further below 0 are not fitted (project choice)."""
+"""Proposals whose gain in the screen is further below 0 are not fitted; nor is more sought on top of a set that gained
+less with its last effect (project choice)."""
 
 HOPELESS = 100.0
 """Proposals whose gain, or whose score in the first fit, is this far behind the best of their kind are not fitted
@@ -103,7 +105,7 @@ def search(
     names : sequence of str, optional
         Effects to try; by default all that can be tried.
     most : int
-        Effects at a time, 1 or 2.
+        Effects together, at least 1.
     """
     hypotheses = HypothesisCache(likelihood.none, likelihood.motion)
     believed = likelihood.belief.logs
@@ -138,6 +140,7 @@ def search(
     )
     _explore(fitting, every, believed, most)
     _let_surroundings_differ(fitting, every, most)
+    _add_more(fitting, every, most)
     _polish(fitting)
     fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
     return Search(fitting.likelihood, tuple(fits), every)
@@ -207,6 +210,36 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
                 if proposed.gain > -WORTH
             ]
         )
+
+
+def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
+    """More effects on top of the best pair, one at a time, as long as the last one gained :data:`WORTH`; and the sets
+    without each of the others.
+
+    Without the further ones the coefficients of the card take their place: all are then believed to be wronger than
+    they are.
+    """
+    for count in range(2, most):
+        best = fitting.best()
+        if len(best.hypothesis.effects) < count:
+            return
+        _fit_more(fitting, _on_top_of(fitting, best, every)[:WITH_THE_BEST], best)
+        larger = fitting.best()
+        if larger.score > best.score - WORTH:
+            return
+        thetas = thetas_of(larger)
+        smaller = [{name: theta for name, theta in thetas.items() if name != dropped} for dropped in thetas]
+        _fit_more(fitting, [Screened(parts, 0.0) for parts in smaller], larger)
+
+
+def _fit_more(fitting: Fitting, screened: Sequence[Screened], best: ExplanationFit) -> None:
+    """Fit proposals from the noise of the best, with the winds and currents that differ there between trials."""
+    starts, limit = [best.logs, fitting.likelihood.belief.logs], best.score + _FAR
+    chosen = _proposals(fitting, screened, starts, limit=limit)
+    each = best.hypothesis.each
+    fitting.fit(
+        [replace(proposal, each=tuple(name for name in each if name in proposal.thetas)) for proposal in chosen]
+    )
 
 
 def _still(hypothesis: Hypothesis) -> Array:

@@ -1,6 +1,6 @@
 """The verdict from the scores: one explanation, none, several, or none in the library.
 
-An explanation needs a score well below that of "none"; a second effect one well below that of the best single effect.
+An explanation needs a score well below that of "none", and each further effect one well below that without it.
 All that are as good as the best are named next to it. Some explanation always fits best: where the innovations of the
 best explanation are not noise, a name would be a guess, and is withheld.
 """
@@ -130,13 +130,17 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
     best = none
     doubt = IN_WAVES if search.likelihood.belief.waves else 1.0
     needed, temper = doubt * EVIDENCE_NEEDED, doubt * TEMPER
-    single = next((fit for fit in search.fits if len(fit.hypothesis.effects) == 1 and is_significant(fit)), None)
-    pair = next((fit for fit in search.fits if len(fit.hypothesis.effects) == 2 and is_significant(fit)), None)
-    if single is not None and single.score < none.score - needed:
-        best = single
-    if pair is not None:
-        worth = max(needed, _share(pair) * (none.score - pair.score))
-        best = pair if pair.score < min(fit.score for fit in (best, single) if fit is not None) - worth else best
+    least = none.score  # of all that need fewer effects
+    counts = [len(fit.hypothesis.effects) for fit in search.fits]
+    for count in range(1, max(counts) + 1):
+        of_count = (fit for fit, number in zip(search.fits, counts, strict=True) if number == count)
+        larger = next(filter(is_significant, of_count), None)
+        if larger is None:
+            continue
+        share = _share(larger, best) if count > 1 else 0.0
+        if larger.score < least - max(needed, share * (none.score - larger.score)):
+            best = larger
+        least = min(least, larger.score)
     scores = np.array([fit.score for fit in search.fits]) / temper
     weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
     probabilities = {fit.hypothesis.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
@@ -165,10 +169,16 @@ def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> 
     return float(min(sum(p for effects, p in probabilities.items() if effect in effects), SUREST))
 
 
-def _share(pair: ExplanationFit) -> float:
-    """Share of the whole gain that the second of two effects must have."""
-    kinds = {EFFECTS[name].looks_like for name in pair.hypothesis.effects}
-    return SAME_KIND_SHARE.get(kinds.pop(), 0.0) if len(kinds) == 1 else 0.0
+def _share(larger: ExplanationFit, best: ExplanationFit) -> float:
+    """Share of the whole gain that effects which the best explanation so far lacks must have, where they look like
+    others of the larger one."""
+    kinds = {name: EFFECTS[name].looks_like for name in larger.hypothesis.effects}
+    alike = [
+        kind
+        for name, kind in kinds.items()
+        if name not in best.hypothesis.effects and kind in [kinds[other] for other in kinds if other != name]
+    ]
+    return max((SAME_KIND_SHARE.get(kind, 0.0) for kind in alike), default=0.0)
 
 
 def is_significant(fit: ExplanationFit) -> bool:
