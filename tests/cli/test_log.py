@@ -15,6 +15,7 @@ import tank2sim as t2s
 from tank2sim.logs.channel_file import channels_text, read_channels
 from tests.cli.command_line import refused, tank2sim
 from tests.logs.made_logs import T0, frame, nmea_lines
+from tests.marks import first_fast
 
 
 @pytest.fixture
@@ -164,7 +165,7 @@ def test_bad_input_is_refused_in_one_line(folder) -> None:
     assert not (folder / "voyage").exists()
 
 
-@pytest.mark.parametrize("ahead_s", [7.5, -20.0])
+@first_fast("ahead_s", [7.5, -20.0])
 def test_clocks_of_two_logs_that_differ_are_marked(folder, ahead_s) -> None:
     pytest.importorskip("pynmea2")
     (folder / "bridge.nmea").write_text("\n".join(nmea_lines()) + "\n", encoding="ascii")

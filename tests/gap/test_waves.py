@@ -98,6 +98,7 @@ def likelihood_of(setting: Setting, hertz: int, folder) -> tuple[Likelihood, Exp
     return likelihood, fit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS[:2], ids=["no effect", "wind"])
 def test_the_frequency_of_a_made_up_sea_is_found(setting: Setting, tmp_path) -> None:
     truth = setting.generator("sea").uniform(*WAVE_BAND_RADPS)

@@ -102,6 +102,7 @@ def test_where_nothing_is_hidden_nothing_is_named(made, tmp_path: Path) -> None:
     assert case.gap.misfit("before", held_out=False) == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.slow
 def test_an_effect_that_cannot_be_tried_is_refused(made, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="rudder_walk cannot be tried"):
         sought(tmp_path, made["nothing"], options=GapOptions(workers=1, effects=("rudder_walk",)))

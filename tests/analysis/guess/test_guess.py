@@ -131,6 +131,7 @@ def test_figures_of_an_option_are_read_with_their_errors() -> None:
             parse_figures("turn35", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "named"),
     [

@@ -13,6 +13,7 @@ from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
+from tests.marks import first_fast
 
 ACCELERATIONS = ("Yvdot", "Yrdot", "Nvdot", "Nrdot")
 DAMPING = ("Yv", "Nv", "Yr", "Nr")
@@ -28,7 +29,7 @@ def errors_over(found, written, names):
     return [(derivatives[name].value - written.derivatives[name]) / derivatives[name].standard_error for name in names]
 
 
-@pytest.mark.parametrize("delay", [-0.05, 0.01, 0.1])
+@first_fast("delay", [-0.05, 0.01, 0.1])
 def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
     found, written = reduced_with_truth(Campaign(seed=21, rate_hz=10.0, force_delay_s=delay), tmp_path)
     (error,) = found.systematic
@@ -45,6 +46,7 @@ def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
     assert "CORRECTED" in reduction_findings(found)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [21, pytest.param(22, marks=pytest.mark.slow)])
 def test_a_low_pass_filter_of_the_gauges_is_found_as_its_group_delay(tmp_path, seed):
     """A Butterworth filter of the second order and 2 Hz delays slow signals by sqrt(2)/(2 pi 2 Hz) = 0.1125 s."""
@@ -105,8 +107,8 @@ def with_memory(campaign, written, kinds, share, time_s):
     return replace(campaign, runs=tuple(changed))
 
 
-@pytest.mark.parametrize(
-    ("kinds", "share", "time_s", "seed"),
+@first_fast(
+    "kinds, share, time_s, seed",
     [
         (("pure_sway",), 0.3, 0.8, 21),
         (("pure_yaw", "yaw_with_drift"), 0.3, 0.8, 22),

@@ -91,6 +91,7 @@ def test_a_yaw_rate_in_degrees_read_as_radians_is_refused(tmp_path):
         reduced(path)
 
 
+@pytest.mark.slow
 def test_a_yaw_rate_of_the_other_sign_is_in_the_first_lines(tmp_path):
     path = write_arm(tmp_path, TRUTH)
     rows = list(csv.DictReader((tmp_path / "runs.csv").open()))

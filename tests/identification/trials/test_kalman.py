@@ -60,6 +60,7 @@ def test_filter_and_smoother_are_those_of_dense_gaussian_algebra():
     np.testing.assert_allclose(errors.ravel(), spread, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
     problem = pushed[0][0]
     run = problem.runs[0]
@@ -146,6 +147,7 @@ def test_without_process_noise_it_is_output_error():
         assert found.process_noise[name].deviation < 0.05 * push
 
 
+@pytest.mark.slow
 def test_what_was_not_measured_is_skipped(pushed):
     problem, _, whole = pushed[1]
     runs = []
@@ -179,6 +181,7 @@ def test_white_process_noise_has_no_time_constant(pushed):
     assert np.all(np.abs(found.values - VALUES) < 4 * found.standard_errors)
 
 
+@pytest.mark.slow
 def test_the_drift_of_a_sensor_is_found():
     problem, _ = pushed_problem(5)
     rng, size, time_s = np.random.default_rng(5), 0.02, 20.0
@@ -199,6 +202,7 @@ def test_the_drift_of_a_sensor_is_found():
     assert np.all(np.abs(found.values - VALUES) < 3.5 * found.standard_errors)
 
 
+@pytest.mark.slow
 def test_each_iteration_is_better_and_is_reported(pushed):
     reported = []
     problem: Problem = pushed[0][0]
