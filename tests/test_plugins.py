@@ -137,6 +137,7 @@ print(json.dumps(found))
     np.testing.assert_allclose(pushed - without, [0, force, LEVER * L * force], rtol=1e-9, atol=1e-6)
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_it_simulates_and_its_fmu_does_the_same_without_the_package(site: Path, work: Path) -> None:
     bare = simulate(

@@ -46,6 +46,7 @@ def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     refused(missing, "run_001.csv")
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_a_trial_is_written_with_its_orders(tmp_path):
     result = tank2sim(

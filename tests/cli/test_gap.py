@@ -311,7 +311,8 @@ LONG = ("current", "rudder_rate_limit", "flow_memory", "trim")
 @pytest.mark.parametrize(
     "name",
     [
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ("wind", "roll_coupling")),
+        pytest.param("wind", marks=[pytest.mark.slow, pytest.mark.essential]),
+        pytest.param("roll_coupling", marks=pytest.mark.slow),
         *(pytest.param(one, marks=pytest.mark.long) for one in LONG),
     ],
 )

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler"
 SHIP = ("guess", "--length", "160", "--beam", "23.2", "--draught", "7.5", "--block", "0.6", "--speed", "15")
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_a_guess_writes_card_page_and_json(tmp_path) -> None:
     files = ("-o", "ship.toml", "--page", "g.html", "--json", "g.json")

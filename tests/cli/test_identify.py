@@ -62,6 +62,7 @@ SHORT = ("--method", "equation_error", "--structure", "card", *NO_BANDS)
 FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
     result = tank2sim(

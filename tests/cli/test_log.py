@@ -53,6 +53,7 @@ def test_trials_go_on_to_audit_and_signals(folder) -> None:
         assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_trials_go_on_to_identify_and_gap(data, tmp_path) -> None:
     source = data / "data" / "logs" / "ship_21" / "voyage.csv"

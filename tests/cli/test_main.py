@@ -66,6 +66,7 @@ def test_an_input_is_not_written_over(tmp_path, given, bundled, arguments) -> No
     assert (tmp_path / given).read_bytes() == data and len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_one_file_for_two_outputs_is_refused(tmp_path) -> None:
     tows = str(MODELS / "wilinski-zellman/tows.csv")
     refused(tank2sim("tow", tows, "--terms", "B3", "-o", "x", "--json", "x", cwd=tmp_path), "two outputs")
@@ -103,6 +104,7 @@ def test_every_command_is_in_one_group_of_the_help(tmp_path) -> None:
     assert all(f"\n{title}:\n" in helped for title in GROUPS)
 
 
+@pytest.mark.slow
 def test_a_shell_completes_commands(tmp_path) -> None:
     completing = {"_TANK2SIM_COMPLETE": "bash_complete", "COMP_WORDS": "tank2sim sim", "COMP_CWORD": "1"}
     command = [str(Path(sys.executable).parent / "tank2sim")]

@@ -44,6 +44,7 @@ def test_an_fmu_agrees_with_its_model(
     assert max(report.errors["ModelExchange"].values()) < 1e-6
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 @FMI
 @pytest.mark.parametrize("ship", ["mariner", "wilinski-zellman"])

@@ -135,7 +135,7 @@ def run_in(engine: str, unpacked: UnpackedFmu, path: Path, answer: Path) -> tupl
     return rows, [line for line in said if line.strip() and not (fault and re.fullmatch(fault, line.strip()))]
 
 
-@FMI
+@first_fast("fmi", [2, 3])
 def test_the_zigzag_of_fmpy_is_that_of_the_model(
     fmi: int, by_the_model: np.ndarray, by_fmpy: Callable[[int], Any]
 ) -> None:

@@ -111,7 +111,8 @@ def test_times_are_those_of_source_date_epoch(
 # ---- what is in it ----
 
 
-@first_fast("fmi", [2, 3])
+@pytest.mark.slow
+@FMI
 def test_sources_compile_alone(fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path) -> None:
     sources = sorted(str(path) for path in (unpacked("hull", fmi).folder / "sources").glob("*.c"))
     library = tmp_path / "library.so"

@@ -260,7 +260,8 @@ def page_of(files: dict[str, str]) -> etree._Element:
     return etree.fromstring(files[PASSPORT_PAGE].encode("utf-8"), etree.HTMLParser())
 
 
-@first_fast("fmi", [2, 3])
+@pytest.mark.slow
+@FMI
 def test_names_of_a_card_stay_out_of_the_c_sources_and_of_paths(
     fmi: int, models: dict[str, Model], tmp_path: Path
 ) -> None:

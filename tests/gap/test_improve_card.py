@@ -126,7 +126,7 @@ def test_the_improved_card_has_the_model_that_was_fitted(kind: str, name: str) -
     assert not np.allclose(after[:, : before.shape[1]], before, rtol=1e-7, atol=0), "it does nothing"
 
 
-@first_fast("other", [*READING, "rudder_stall"], count=2)
+@first_fast("other", [*READING, "rudder_stall"])
 def test_several_have_the_model_that_was_fitted_in_either_order(other: str) -> None:
     card = read(CARDS["total"])
     changes = ["linear_sway_damping", "cubic_yaw_damping", "rudder_effectiveness"]

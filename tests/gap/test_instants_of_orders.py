@@ -60,6 +60,7 @@ def test_a_right_model_follows_zigzags_of_a_record_of_one_row_a_second(tmp_path:
     assert max(misfits) < 1.5
 
 
+@pytest.mark.slow
 def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
     card, trials, given = written(tmp_path, "model", 1)
     noise = noise_of("model")

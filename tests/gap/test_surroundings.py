@@ -90,6 +90,7 @@ def test_each_trial_is_moved_by_its_own_wind_alone(windy: tuple) -> None:
     assert (found.speed_mps, found.direction_rad) == pytest.approx((8.0, -np.pi / 2))
 
 
+@pytest.mark.slow
 def test_a_recorded_wind_is_the_input_of_its_trial(windy: tuple) -> None:
     made, card, fitted, _ = windy
     truth = made.parameters["wind"]
@@ -155,6 +156,7 @@ def test_a_wind_of_the_first_half_predicts_nothing_where_there_is_none(tmp_path:
     assert np.median(fit_common_surroundings(with_wind, fitted, "wind", NOISE).predicted) > 0.9
 
 
+@pytest.mark.slow
 def test_probabilities_by_simulation_are_those_of_the_misfits_and_of_the_numbers_they_took(windy: tuple) -> None:
     _, card, fitted, _ = windy
 

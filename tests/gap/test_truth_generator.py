@@ -115,6 +115,7 @@ def test_turn_agrees_with_an_independent_program(data: Path, long: dict[str, lis
         assert at == pytest.approx(reference[name][then], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_none_is_the_worked_case_without_an_effect(data: Path, long: dict[str, list[Trial]]) -> None:
     assert misfit(long["case"], case(data, 6, "turn20_port", "zigzag20_20", "slowdown")) < 1.6
 
@@ -127,6 +128,7 @@ def test_effects_explain_the_worked_cases(data: Path, long: dict[str, list[Trial
     assert misfit(long[f"case {number}"], measured) < left * misfit(long["case"], measured)
 
 
+@pytest.mark.slow
 def test_symmetric_hull_turns_alike_to_both_sides(long: dict[str, list[Trial]]) -> None:
     stbd, port = long["sides"]
     for name in ("v_mps", "r_degps", "psi_deg", "y_m"):

@@ -112,6 +112,7 @@ def test_the_frequency_of_a_made_up_sea_is_found(setting: Setting, tmp_path) -> 
     assert cost(waves) - cost(None) == pytest.approx(explained.score - fit.score, rel=1e-3, abs=1.0)
 
 
+@pytest.mark.slow
 def test_no_waves_are_found_in_gusts(tmp_path) -> None:
     assert fit_waves(*likelihood_of(SETTINGS[2], 1, tmp_path)) is None
 

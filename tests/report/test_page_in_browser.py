@@ -10,7 +10,6 @@ import pytest
 from tank2sim.report.kit.chart_parts import STACKS
 from tank2sim.report.kit.charts import TrackData, track_chart
 from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
-from tests.marks import first_fast
 from tests.report.opened_page import CHROMIUM, opened
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
@@ -43,6 +42,7 @@ setTimeout(() => {
 </script>"""
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path, scheme):
@@ -79,7 +79,8 @@ def test_a_track_keeps_equal_scales_when_it_is_zoomed_and_when_the_window_is_nar
     assert zoomed["x"] < 0.9 * before["x"]
 
 
-@first_fast("name", ["history", "bode"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["history", "bode"])
 def test_stacked_charts_are_zoomed_along_their_common_axis(charts, tmp_path, name):
     before, wheel, zoomed = wheel_over(charts[name], tmp_path)
     assert wheel == before

@@ -121,6 +121,7 @@ def parse_toml(text: str) -> dict[str, dict[str, float]]:
     return tomllib.loads(text)
 
 
+@pytest.mark.slow
 def test_an_mmg_card_in_other_scalings_is_the_same_ship() -> None:
     for scaling in ("prime", "dimensional", "bis"):
         made = t2s.convert("kvlcc2-l7-mmg", to="mmg", scaling=scaling).converted

@@ -28,7 +28,6 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tests.dynamics.effects.ships import ship
-from tests.marks import first_fast
 
 NO_SLYCOT = "slycot is not installed"
 
@@ -91,8 +90,9 @@ def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str)
     assert 0 < margins.gain_margin_down < 0.5  # with too little gain she goes her own way
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
-@first_fast("name", ["mariner", "kvlcc2-captive"])
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2-captive"])
 def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: str) -> None:
     from tank2sim.analysis.heading.robust import POLE_SHIFT
 

@@ -60,7 +60,8 @@ def test_an_aligned_model_shows_none_and_its_error_is_honest(tmp_path):
     assert 0.17 < np.std(ratios) < 1.7  # as 98 % of the spreads of 4 normal errors of size 1
 
 
-@first_fast("seed", [7, 8, 9])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [7, 8, 9])
 def test_a_single_screw_is_not_taken_for_a_turned_model(tmp_path, seed):
     found, _ = turned(tmp_path, 0.0, seed, asymmetry=True)
     assert not found.alignment.shown

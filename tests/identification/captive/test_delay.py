@@ -65,6 +65,7 @@ def test_a_low_pass_filter_of_the_gauges_is_found_as_its_group_delay(tmp_path, s
     assert np.max(np.abs(errors_over(found, written, (*ACCELERATIONS, *DAMPING)))) < 3.0
 
 
+@pytest.mark.slow
 def test_without_a_delay_none_is_corrected_and_its_uncertainty_is_in_the_derivatives(tmp_path):
     found, _ = reduced_with_truth(Campaign(seed=21, rate_hz=10.0), tmp_path)
     assert not found.systematic
@@ -75,6 +76,7 @@ def test_without_a_delay_none_is_corrected_and_its_uncertainty_is_in_the_derivat
         assert derivative.standard_error == pytest.approx(np.sqrt(squares), rel=1e-12), name
 
 
+@pytest.mark.slow
 def test_a_stated_uncertainty_of_the_delay_takes_the_place_of_the_estimated_one(tmp_path):
     written = write(Campaign(seed=21, rate_hz=10.0), tmp_path)
     written.path.write_text(written.path.read_text().replace("[test]", "[uncertainty]\nforce_delay_s = 0.0\n[test]"))
@@ -107,8 +109,9 @@ def with_memory(campaign, written, kinds, share, time_s):
     return replace(campaign, runs=tuple(changed))
 
 
-@first_fast(
-    "kinds, share, time_s, seed",
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kinds", "share", "time_s", "seed"),
     [
         (("pure_sway",), 0.3, 0.8, 21),
         (("pure_yaw", "yaw_with_drift"), 0.3, 0.8, 22),
@@ -133,6 +136,7 @@ def test_oscillations_at_one_frequency_show_no_delay_and_say_what_it_would_do(tm
     assert "10 ms would change Yvdot by" in sentence
 
 
+@pytest.mark.slow
 def test_a_delay_that_sway_alone_shows_is_reported_and_not_corrected(tmp_path):
     """Memory of the flow in sway would look the same."""
     written = write(Campaign(seed=21, rate_hz=10.0, force_delay_s=0.03), tmp_path)

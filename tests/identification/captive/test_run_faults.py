@@ -165,7 +165,8 @@ def test_no_run_of_a_sound_campaign_is_at_fault(tmp_path, seed):
     assert not reduce_campaign(read_campaign(path)).faults
 
 
-@first_fast("times_noise", [1.0, 2.0, 4.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("times_noise", [1.0, 2.0, 4.0])
 def test_coarse_gauges_are_not_saturated_or_dead(tmp_path, times_noise):
     written = write(Campaign(seed=5), tmp_path)
     step = times_noise * NOISE_SHARE * written.ship.force_N

@@ -27,7 +27,6 @@ from tests.identification.captive_mmg.tank import (
     with_common_errors,
     write_campaign,
 )
-from tests.marks import first_fast
 
 SEEDS = 20
 
@@ -309,7 +308,8 @@ def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> No
     assert found["Nv"].value == pytest.approx(-0.137, rel=0.1)
 
 
-@first_fast("on_model", [False, True])
+@pytest.mark.slow
+@pytest.mark.parametrize("on_model", [False, True])
 def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path, on_model) -> None:
     path = write_campaign(tmp_path, KVLCC2, seed=4)
     by_rows = fit_mmg(read_steady_tests(path))
