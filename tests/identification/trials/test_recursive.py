@@ -18,7 +18,6 @@ def found(problem):
     return recursive(problem, settings=RecursiveSettings(passes=4))
 
 
-@pytest.mark.slow
 def test_it_converges_to_the_batch_estimate(problem, found):
     batch = kalman(problem)
     np.testing.assert_allclose((found.values - batch.values) / batch.standard_errors, 0, atol=0.15)
