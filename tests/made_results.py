@@ -132,10 +132,13 @@ OWN_DOCUMENTS = ("pilotcard", "poster", "steer")
 """Commands whose result is a document of its own, which is no page of tables and charts."""
 
 SLOW = (
-    *("autopilot", "autopilot along a track", "check", "design", "design of a sea trial", "guess", "identify", "steer"),
-    "stability with small probabilities",
+    *("autopilot", "autopilot along a track", "autopilot of a craft", "check", "compare", "convert", "design"),
+    *("design of a sea trial", "export", "gap with an unnamed effect", "gap without an effect", "glide of a programme"),
+    *("guess", "identify", "influence of a steering card", "run and repeat", "signals", "signals with a filter"),
+    *("simulate an ensemble", "stability", "stability of an ensemble", "stability with small probabilities", "steer"),
+    *("tow of one term", "validate"),
 )
-"""Names whose result takes 5 s or more."""
+"""Names whose result and page take 2 s or more."""
 
 
 def marked(names: Iterable[str]) -> list[ParameterSet]:

@@ -32,6 +32,7 @@ def errors(data: Path) -> dict[str, dict[str, np.ndarray]]:
     return found
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_the_kvlcc2_turns_as_marin_measured_though_that_turn_was_not_fitted(errors) -> None:
     turn = errors["kvlcc2 kvlcc2_marin"]
@@ -40,6 +41,7 @@ def test_the_kvlcc2_turns_as_marin_measured_though_that_turn_was_not_fitted(erro
     assert np.sqrt(np.mean(turn["overshoot_1_deg"] ** 2)) < 1.0
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_the_kvlcc2_overshoots_as_hsva_measured(errors) -> None:
     zigzags = errors["kvlcc2 kvlcc2_hsva"]
@@ -48,6 +50,7 @@ def test_the_kvlcc2_overshoots_as_hsva_measured(errors) -> None:
     assert np.sqrt(np.mean(zigzags["overshoot_2_deg"] ** 2)) < 2.0
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_the_esso_osaka_turns_as_wide_as_its_records(errors) -> None:
     """The advance is 11 % long on average in the wind of the pond."""

@@ -137,6 +137,7 @@ print(json.dumps(found))
     np.testing.assert_allclose(pushed - without, [0, force, LEVER * L * force], rtol=1e-9, atol=1e-6)
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_it_simulates_and_its_fmu_does_the_same_without_the_package(site: Path, work: Path) -> None:
     bare = simulate(
@@ -197,6 +198,7 @@ def test_its_parameters_are_validated_with_file_and_place(site: Path, tmp_path: 
         refused(result, f"wrong_{number}.toml", *words)
 
 
+@pytest.mark.slow
 def test_the_page_of_effects_has_it(site: Path, work: Path) -> None:
     pytest.importorskip("sphinx", reason="Sphinx is not installed (extra docs)")
     code = f"import sys; sys.path.insert(0, {str(ROOT / 'docs')!r}); import generated; print(generated.effects())"
@@ -271,11 +273,13 @@ print(json.dumps({"t_s": trial.time_s.tolist(), **{name: column.tolist() for nam
     assert {"Y0", "N0", "Y0u", "N0u"} <= set(better["uncertainty"]), "the terms of the structure of the package"
 
 
+@pytest.mark.slow
 def test_a_fault_of_a_log_is_named_by_file_and_line(site: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.log").write_text("BRIDGE LOG\n0 0 0 15 0 0\n1 0 0 fifteen 0 0\n")
     refused(*tank2sim(site, "audit bad.log", cwd=tmp_path), "bad.log", "line 3", "ahead (kn)", "fifteen")
 
 
+@pytest.mark.slow
 def test_without_the_package_a_log_and_its_effect_are_refused(tmp_path: Path) -> None:
     (tmp_path / "thruster.toml").write_text(mariner_text() + THRUSTER)
     empty = tmp_path / "site"

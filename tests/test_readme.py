@@ -39,6 +39,7 @@ def test_the_readme_has_exactly_two_one_line_commands_that_set_up_what_they_need
     assert "tank2sim demo" in setting_up[0] and "pytest" in setting_up[1]
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_the_python_example_prints_what_the_readme_says(tmp_path: Path) -> None:
     prepare(tmp_path)

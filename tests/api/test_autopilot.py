@@ -19,6 +19,7 @@ def pilot() -> t2s.AutopilotResult:
     return ship.autopilot(course_change_deg=-30, track=[[0, 0], [3000, 0], [5000, 2000]])
 
 
+@pytest.mark.slow
 def test_figures_of_a_course_change_are_those_of_its_motion(pilot: t2s.AutopilotResult) -> None:
     motion, change = pilot.runs["change"], pilot.course_changes.loc["change"]
     turned = -(motion["psi_deg"] - motion["psi_deg"].iloc[0])
@@ -37,6 +38,7 @@ def test_margins_are_those_of_the_loop_that_is_drawn(pilot: t2s.AutopilotResult)
     assert pilot.margins["phase_margin_deg"].iloc[0] == pytest.approx(phase % 360 - 180, abs=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["file", pytest.param("table", marks=pytest.mark.slow)])
 def test_a_track_is_kept_whatever_form_it_has(pilot: t2s.AutopilotResult, tmp_path: Path, form: str) -> None:
     waypoints = pd.DataFrame({"y_m": [0, 0, 2000], "x_m": [0, 3000, 5000], "name": ["a", "b", "c"]})

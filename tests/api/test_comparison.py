@@ -45,6 +45,7 @@ def test_the_json_has_the_same_numbers(found):
     assert content["notices"] == list(found.notices)
 
 
+@pytest.mark.slow
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()
@@ -61,6 +62,7 @@ def test_bad_input_is_refused_with_place_and_remedy(cards, place):
     assert refusal.value.place == place and refusal.value.problem and refusal.value.remedy
 
 
+@pytest.mark.slow
 def test_the_examples_run():
     outcome = doctest.testmod(module)
     assert outcome.attempted and not outcome.failed

@@ -34,6 +34,7 @@ def test_thrust_is_compared_and_the_place_of_a_thruster_does_not_agree_by_chance
     assert found.summary["compared"].to_list() == [1]
 
 
+@pytest.mark.slow
 def test_errors_of_the_card_give_deviations(otter) -> None:
     found = t2s.compare([otter, otter], members=6)
     speed = found.figures.query("figure == 'final_speed_mps'").iloc[0]

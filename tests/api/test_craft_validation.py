@@ -45,6 +45,7 @@ def test_the_true_card_predicts_and_one_of_half_the_thrust_does_not(truth, ship,
     assert wrong.determination["u"] < right.determination["u"] - 0.1
 
 
+@pytest.mark.slow
 def test_a_trial_that_is_too_short_is_said(truth, ship, tmp_path) -> None:
     with pytest.raises(InputError, match="longer than 20 s"):
         t2s.validate(ship, written(tmp_path, truth, ["straight"]))

@@ -47,6 +47,7 @@ def test_a_range_is_the_way_of_its_cycles(glider: t2s.Ship) -> None:
     np.testing.assert_allclose(ranges["range_m"], way, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_result_fits_a_screen_and_has_a_picture(glider: t2s.Ship) -> None:
     found = glider.glide([25, 30])
     assert len(repr(found).splitlines()) <= 24

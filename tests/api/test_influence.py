@@ -45,6 +45,7 @@ def test_shares_of_independent_errors_make_up_the_variance(found: t2s.InfluenceR
     np.testing.assert_allclose(found.variance_shares.sum(), 1.0, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_result_fits_a_screen_and_has_a_picture(found: t2s.InfluenceResult) -> None:
     assert len(repr(found).splitlines()) <= 24
     assert "data:image/png;base64," in found._repr_html_()
@@ -52,6 +53,7 @@ def test_a_result_fits_a_screen_and_has_a_picture(found: t2s.InfluenceResult) ->
     assert all(len(line) <= 80 for table in found.tables for line in ["".join(table.columns).replace("\n", "")])
 
 
+@pytest.mark.slow
 def test_the_tuned_ship_makes_the_turn_that_was_the_target(mariner: t2s.Ship) -> None:
     tuning = mariner.tune("tactical_diameter_m@35=1000", by="fewest")
     assert tuning.reached and len(tuning.moves) == 1
@@ -70,6 +72,7 @@ def test_targets_that_contradict_each_other_are_named_and_their_card_is_refused(
     assert refused.value.source == "--tune" and "--within" in refused.value.remedy
 
 
+@pytest.mark.slow
 def test_a_tuned_card_carries_the_covariance_of_what_hardly_moved(tmp_path: Path) -> None:
     path = tmp_path / "ship.toml"
     text = t2s.load("mariner").card.text + "\n[uncertainty]\nNd = 4e-5\nYv = 2e-4\nNv = 1e-4\n"
@@ -94,6 +97,7 @@ def test_the_scaled_ship_turns_through_both_points(mariner: t2s.Ship) -> None:
     assert len(repr(tuning).splitlines()) <= 24
 
 
+@pytest.mark.slow
 def test_models_of_a_steering_card_turn_as_the_paper_prints() -> None:
     """Poznyakov & Yudin (2007), radius at 20 deg of rudder of the Japanese model, and K of C_m^omega."""
     models = t2s.steering_models("poznyakov-yudin")

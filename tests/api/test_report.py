@@ -34,6 +34,7 @@ def test_the_name_of_the_schema_is_not_a_figure_of_the_page(turn: t2s.ManoeuvreR
     assert "tank2sim/simulate/1" not in t2s.make_report(turn).page().partition("<script")[0]
 
 
+@pytest.mark.slow
 def test_a_report_fits_a_screen_and_has_a_picture(turn: t2s.ManoeuvreResult) -> None:
     found = t2s.make_report(turn)
     assert len(repr(found).splitlines()) <= 24

@@ -63,6 +63,7 @@ def test_every_command_but_those_with_long_searches_has_a_result_here() -> None:
     assert {name.split()[0] for name in RESULTS} == set(KEYS) - {"demo"}
 
 
+@pytest.mark.slow
 def test_a_campaign_follows_its_schema(data) -> None:
     found = t2s.reduce(data / "data/pmm_synthetic_11/campaign.toml", fill="clarke1983")
     jsonschema.validate(json.loads(found.to_json()), t2s.json_schema("reduce"))

@@ -74,6 +74,7 @@ def test_an_angle_of_no_rudder_is_refused(ship) -> None:
     assert "90 deg" in raised.value.remedy
 
 
+@pytest.mark.slow
 def test_results_fit_a_screen_and_a_notebook(ship) -> None:
     run = ship.turn(35)
     assert len(repr(run).splitlines()) <= 24 and "tactical diameter" in repr(run)

@@ -60,6 +60,7 @@ def test_a_filter_removes_the_sine_and_the_trial_is_written_elsewhere(path, tmp_
     assert t2s.signals(path).filtered is None
 
 
+@pytest.mark.slow
 def test_it_fits_a_screen_and_shows_its_charts(path):
     found = t2s.signals(path)
     assert len(repr(found).splitlines()) <= 24

@@ -58,6 +58,7 @@ def test_the_card_has_the_numbers_and_simulates(found, tmp_path):
     assert found.ship.model.state_names
 
 
+@pytest.mark.slow
 def test_a_force_is_a_number_or_a_polynomial(path):
     constant = t2s.tow(path, force_N=2 * FORCE_N, terms=["B3"])
     assert constant.total_mass_kg == pytest.approx(2 * TOTAL_KG, rel=0.01)  # (1.5) is linear in T, M and B
@@ -88,6 +89,7 @@ def test_bad_input_is_refused_with_place_and_remedy(path, options, source):
     assert refusal.value.source == source and refusal.value.problem and refusal.value.remedy
 
 
+@pytest.mark.slow
 def test_the_examples_run():
     outcome = doctest.testmod(module)
     assert outcome.attempted and not outcome.failed

@@ -81,6 +81,7 @@ def test_a_folder_is_for_its_trials(write, tmp_path):
     assert len(found.findings) == 0 and found.passed
 
 
+@pytest.mark.slow
 def test_an_audit_fits_a_screen_and_shows_its_charts(write):
     found = t2s.audit(write("bad.csv", rudder_sign=-1.0))
     assert len(repr(found).splitlines()) <= 24
@@ -102,6 +103,7 @@ def test_the_examples_run(module):
     assert outcome.attempted and not outcome.failed
 
 
+@pytest.mark.slow
 def test_trials_to_fit_may_be_files_folders_or_records(write, tmp_path, mariner_card):
     path = write("zigzag.csv")
     by_file, _ = fitted_and_held(path, (), mariner_card)

@@ -32,6 +32,7 @@ def test_a_ship_agrees_with_its_trial(found, folder):
     assert 0 < numerical[("zigzag 20/20", "overshoot_1_deg")] < 0.01
 
 
+@pytest.mark.slow
 def test_another_ship_is_refuted(folder):
     ship = t2s.load("mariner", {"derivatives.Nd": -1.5 * 139e-5})
     other = t2s.validate(ship, [folder / "zigzag.csv"], members=2)

@@ -67,6 +67,7 @@ def test_a_record_is_simulated_once(tmp_path):
     assert refusal.value.source == str(path) and refusal.value.remedy
 
 
+@pytest.mark.slow
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()
@@ -104,6 +105,7 @@ def test_a_method_without_an_estimate_is_refused_before_a_card_is_made(folder):
     assert refusal.value.source == "--method" and "energy_least_squares" in refusal.value.remedy
 
 
+@pytest.mark.slow
 def test_the_examples_run():
     outcome = doctest.testmod(module)
     assert outcome.attempted and not outcome.failed

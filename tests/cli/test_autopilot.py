@@ -50,6 +50,7 @@ def test_the_fmu_is_valid_and_the_page_has_its_charts(result: Path) -> None:
         assert heading in page
 
 
+@pytest.mark.slow
 def test_what_is_wrong_is_reported_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
     (tmp_path / "track.csv").write_text("x_m,y_m\n0,0\n0,0\n")
     (tmp_path / "short.csv").write_text("x_m,y_m\n0,0\n2,0\n0,9000\n")

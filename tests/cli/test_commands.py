@@ -41,6 +41,7 @@ def test_stability_gives_json(tmp_path) -> None:
     assert {"eigenvalues", "nomoto", "imo"} <= set(found)
 
 
+@pytest.mark.slow
 def test_set_changes_a_value_in_the_cards_conventions(tmp_path) -> None:
     setting = "model.yaw_rate_terms=hydrodynamic"
     result = tank2sim("stability", "mariner", "--set", setting, "--json", "s.json", cwd=tmp_path)
@@ -73,6 +74,8 @@ def test_if_one_file_cannot_be_written_none_is(tmp_path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_export_and_check_agree_and_a_wrong_card_fails(tmp_path) -> None:
     assert tank2sim("export", "mariner", "-o", "m.fmu", "--fmi", "3", cwd=tmp_path).returncode == 0
     right = tank2sim("check", "m.fmu", "--json", "c.json", cwd=tmp_path)
@@ -111,6 +114,8 @@ def test_without_a_compiler_nothing_is_written(tmp_path, arguments) -> None:
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_tow_writes_a_card_that_exports(tmp_path) -> None:
     tows = str(Path(__file__).parents[2] / "models/wilinski-zellman/tows.csv")
     result = tank2sim("tow", tows, "--force-N", "11.63", "--mass-kg", "2243", "--json", "t.json", cwd=tmp_path)

@@ -10,6 +10,7 @@ from .command_line import refused, tank2sim
 FAST = ("--figures", "steady_radius_m@20", "--draws", "0")
 
 
+@pytest.mark.slow
 def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     result = tank2sim(
         *(
@@ -45,6 +46,8 @@ def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     refused(missing, "run_001.csv")
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_a_trial_is_written_with_its_orders(tmp_path):
     result = tank2sim(
         *("design", "mariner", "--figures", "steady_radius_m@20", "--trial", "--minutes", "8"),
@@ -85,6 +88,7 @@ def test_one_file_for_two_outputs_is_refused_before_the_work(tmp_path, option, m
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_plan_in_the_place_of_orders_is_refused(tmp_path):
     (tmp_path / "orders").mkdir()
     trial = ("--figures", "steady_radius_m@20", "--trial", "--minutes", "8", "--orders", "orders")

@@ -62,6 +62,7 @@ def test_a_cluster_without_an_ensemble_and_no_executor_are_refused(tmp_path) -> 
     refused(tank2sim(*TURN, "--ensemble", "1", cwd=tmp_path), "ensemble")
 
 
+@pytest.mark.slow
 def test_reduce_writes_the_covariance_and_simulate_draws_from_it(data, tmp_path) -> None:
     campaign = data / "data" / "pmm_synthetic_11" / "campaign.toml"
     result = tank2sim("reduce", str(campaign), "-o", "ship.toml", "--fill", "clarke1983", cwd=tmp_path)

@@ -184,6 +184,7 @@ def test_what_no_earlier_run_says_it_wrote_is_left(folder: Path, tmp_path: Path,
     assert result.returncode == 0 and (tmp_path / "corrected/turn20.csv").exists()
 
 
+@pytest.mark.slow
 def test_lines_on_the_screen_are_not_broken_and_what_is_no_number_is_a_dash(
     folder: Path, tmp_path: Path, finding, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -201,6 +202,7 @@ def test_lines_on_the_screen_are_not_broken_and_what_is_no_number_is_a_dash(
     assert "nan" not in result.stdout
 
 
+@pytest.mark.slow
 def test_trials_are_not_corrected_for_what_is_only_possible(folder: Path, tmp_path: Path, finding) -> None:
     finding((BIAS,), AMBIGUOUS)
     result = tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path), cwd=folder)
@@ -309,7 +311,8 @@ LONG = ("current", "rudder_rate_limit", "flow_memory", "trim")
 @pytest.mark.parametrize(
     "name",
     [
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ("wind", "roll_coupling")),
+        pytest.param("wind", marks=[pytest.mark.slow, pytest.mark.essential]),
+        pytest.param("roll_coupling", marks=pytest.mark.slow),
         *(pytest.param(one, marks=pytest.mark.long) for one in LONG),
     ],
 )

@@ -99,6 +99,7 @@ def touched(folder: Path) -> dict[str, tuple[int, int]]:
     return {str(path): (stat.st_mtime_ns, stat.st_ino) for path, stat in reported.items()}
 
 
+@pytest.mark.slow
 def test_a_fleet_has_for_each_ship_what_the_ship_alone_has(ships: Path, tmp_path: Path, finding) -> None:
     calls = finding()
     result = tank2sim("gap", "ships", "-o", "out", "--json", "f.json", *ONE, cwd=tmp_path)
@@ -125,6 +126,7 @@ def test_a_fleet_has_for_each_ship_what_the_ship_alone_has(ships: Path, tmp_path
     assert cells == ["gamma ray #1", "missing effect", "current", "8.00", "1.00", "computed"]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_stopped_goes_on_where_it_was(ships: Path, tmp_path: Path, finding) -> None:
     arguments = ("gap", "ships", *ONE, "-o")
     finding(fails={"beta": KeyboardInterrupt()})
@@ -169,6 +171,7 @@ def test_a_run_killed_between_two_files_is_not_taken_for_the_one_before(
     assert contents(tmp_path / "out") == whole
 
 
+@pytest.mark.slow
 def test_what_changed_is_computed_again_and_the_rest_is_not(ships: Path, tmp_path: Path, finding) -> None:
     calls = finding()
     arguments = ("gap", "ships", "-o", "ships/out", *ONE)

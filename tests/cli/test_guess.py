@@ -10,12 +10,15 @@ import pytest
 import tank2sim as t2s
 from tank2sim.native.lanes import widest_lanes
 from tests.cli.command_line import refused, tank2sim
+from tests.marks import first_fast
 
 pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
 
 SHIP = ("guess", "--length", "160", "--beam", "23.2", "--draught", "7.5", "--block", "0.6", "--speed", "15")
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_a_guess_writes_card_page_and_json(tmp_path) -> None:
     files = ("-o", "ship.toml", "--page", "g.html", "--json", "g.json")
     result = tank2sim(*SHIP, "--turn35", "advance=560 tactical=650+-20", "--members", "150", *files, cwd=tmp_path)
@@ -29,8 +32,8 @@ def test_a_guess_writes_card_page_and_json(tmp_path) -> None:
     assert "samples of the posterior" in " ".join(again.stdout.split())
 
 
-@pytest.mark.parametrize(
-    ("given", "named"), [("advance=56", "advance=56"), ("advance=x", "advance=x"), ("tactical=6500", "tactical=6500")]
+@first_fast(
+    "given, named", [("advance=x", "advance=x"), ("advance=56", "advance=56"), ("tactical=6500", "tactical=6500")]
 )
 def test_figures_of_no_ship_are_refused_and_nothing_is_written(tmp_path, given: str, named: str) -> None:
     refused(tank2sim(*SHIP, "--turn35", given, "--members", "150", "-o", "ship.toml", cwd=tmp_path), named)

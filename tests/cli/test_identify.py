@@ -62,6 +62,8 @@ SHORT = ("--method", "equation_error", "--structure", "card", *NO_BANDS)
 FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
     result = tank2sim(
         *("identify", "off.toml", *FITTED, "--holdout", "turn-35.csv"),
@@ -97,6 +99,7 @@ def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
     assert found["Nd"]["value"] == pytest.approx(TRUTH["Nd"], rel=0.08)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["equation_error", pytest.param("recursive", marks=pytest.mark.slow)])
 def test_other_methods_answer_the_same_question(folder: Path, method: str) -> None:
     result = tank2sim("identify", "off.toml", *FITTED[::2], "--method", method, "--json", f"{method}.json", cwd=folder)
@@ -112,6 +115,7 @@ def test_a_trial_without_excitation_is_refused_by_the_terms_it_cannot_see(folder
     assert not (folder / "never.toml").exists()
 
 
+@pytest.mark.slow
 def test_a_card_that_was_never_measured_in_yaw_holds_after_the_fit_as_far_as_the_trials_went(folder: Path) -> None:
     text = (folder / "off.toml").read_text()
     narrow = "valid_yaw_rate_prime = 0.0\nvalid_rudder_deg = 12.0\nvalid_drift_deg = 60.0\n"
@@ -132,6 +136,7 @@ def test_a_card_that_was_never_measured_in_yaw_holds_after_the_fit_as_far_as_the
     assert np.degrees(card.model.valid_drift_rad) == pytest.approx(60.0)  # stated further than the trials went: kept
 
 
+@pytest.mark.slow
 def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     arguments = ("identify", "off.toml", *FITTED[::2], "--hold", "Xvv", "-o", "held.toml", "--json", "held.json")
     result = tank2sim(*arguments, *NO_BANDS, cwd=folder)
@@ -148,6 +153,7 @@ def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
 
 
+@pytest.mark.slow
 def test_the_figures_reported_are_those_of_the_card_written(folder: Path) -> None:
     """Of a hard turn too, in which the ship is slower than in any of the zigzags fitted."""
     options = ("--method", "equation_error", "--members", "0")
@@ -166,6 +172,7 @@ def test_the_figures_reported_are_those_of_the_card_written(folder: Path) -> Non
     assert "turn-35" in reported["yaw_rate_error_over_windows"]["holdout"]
 
 
+@pytest.mark.slow
 def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None:
     for name in ("zigzag20", "turn25"):
         lines = [line.split(",") for line in (folder / f"{name}.csv").read_text().splitlines()]
@@ -185,6 +192,7 @@ def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None
     assert after.derivatives["Xvv"] == before.derivatives["Xvv"]
 
 
+@pytest.mark.slow
 def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) -> None:
     several = ("--holdout", "turn-35.csv", "turn25.csv", *SHORT, "--json", "several.json")
     result = tank2sim(
@@ -202,6 +210,7 @@ def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) ->
     assert set(found["holdout"]) == {"turn-35", "turn25", "small", "all"}
 
 
+@pytest.mark.slow
 def test_what_the_trials_demand_of_the_prior_is_reported(folder: Path) -> None:
     result = tank2sim("identify", "off.toml", *FITTED[::2], "--method", "equation_error", cwd=folder)
     assert "standard errors were widened" in " ".join(result.stdout.split())
@@ -270,6 +279,7 @@ def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path) -> None:
         assert identified(*wrong) == pytest.approx(right, rel=1e-3), name
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> None:
     """Under another name, with other digits and a comment: neither for identify nor gap, nor as a repeat."""
     lines = (folder / "zigzag20.csv").read_text().splitlines()
@@ -285,6 +295,7 @@ def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> No
         refused(result, "another_run.csv", "zigzag20.csv again")
 
 
+@pytest.mark.slow
 def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: Path) -> None:
     """Its columns in another order, with fewer digits, every second row, and its first rows cut."""
     made = ("identify", "off.toml", "zigzag10.csv", "turn25.csv", *SHORT, "-o", "signed.toml")
@@ -312,6 +323,7 @@ def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: 
     assert [one.name for one in card.fitted_trials] == ["zigzag10", "turn25", "zigzag20"]
 
 
+@pytest.mark.slow
 def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     """The same card twice as long: its rudder would have to turn four times the inertia as fast."""
     text = (folder / "off.toml").read_text()
@@ -331,6 +343,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     assert json.loads((folder / "o.json").read_text())["forced"] == []
 
 
+@pytest.mark.slow
 def test_a_trial_of_another_ship_among_the_trials_is_refused(folder: Path) -> None:
     write(folder, "stranger", zigzag(20), seed=8, truth={**TRUTH, "Nd": 5 * TRUTH["Nd"], "Nr": 3 * TRUTH["Nr"]})
     result = tank2sim("identify", "off.toml", *FITTED, "stranger.csv", "-o", "two.toml", cwd=folder)

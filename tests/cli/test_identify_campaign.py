@@ -56,6 +56,7 @@ def test_captive_tests_determine_what_a_zigzag_does_not(folder: Path) -> None:
         assert abs(after["value"] - truth[name]) < 4 * after["standard_error"], name
 
 
+@pytest.mark.slow
 def test_what_a_campaign_cannot_be_fitted_with_is_one_line(folder: Path) -> None:
     command = ["identify", str(folder / "off.toml"), str(folder / "zigzag.csv"), "-o", str(folder / "out.toml")]
     campaign = ["--campaign", str(folder / "tank/campaign.toml")]

@@ -15,6 +15,7 @@ import tank2sim as t2s
 from tank2sim.logs.channel_file import channels_text, read_channels
 from tests.cli.command_line import refused, tank2sim
 from tests.logs.made_logs import T0, frame, nmea_lines
+from tests.marks import first_fast
 
 
 @pytest.fixture
@@ -52,6 +53,7 @@ def test_trials_go_on_to_audit_and_signals(folder) -> None:
         assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_trials_go_on_to_identify_and_gap(data, tmp_path) -> None:
     source = data / "data" / "logs" / "ship_21" / "voyage.csv"
@@ -164,7 +166,7 @@ def test_bad_input_is_refused_in_one_line(folder) -> None:
     assert not (folder / "voyage").exists()
 
 
-@pytest.mark.parametrize("ahead_s", [7.5, -20.0])
+@first_fast("ahead_s", [7.5, -20.0])
 def test_clocks_of_two_logs_that_differ_are_marked(folder, ahead_s) -> None:
     pytest.importorskip("pynmea2")
     (folder / "bridge.nmea").write_text("\n".join(nmea_lines()) + "\n", encoding="ascii")

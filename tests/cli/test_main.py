@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command_line import refused, tank2sim
+from tests.marks import first_fast
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -49,8 +50,8 @@ def test_asked_for_nothing_it_helps(tmp_path) -> None:
     assert result.stdout == tank2sim("--help", cwd=tmp_path).stdout
 
 
-@pytest.mark.parametrize(
-    ("given", "bundled", "arguments"),
+@first_fast(
+    "given, bundled, arguments",
     [
         ("tows.csv", "wilinski-zellman/tows.csv", ["tow", "tows.csv", "--terms", "B3", "-o", "tows.csv"]),
         ("ship.toml", "mariner/ship.toml", ["stability", "ship.toml", "--json", "ship.toml"]),
@@ -65,12 +66,14 @@ def test_an_input_is_not_written_over(tmp_path, given, bundled, arguments) -> No
     assert (tmp_path / given).read_bytes() == data and len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_one_file_for_two_outputs_is_refused(tmp_path) -> None:
     tows = str(MODELS / "wilinski-zellman/tows.csv")
     refused(tank2sim("tow", tows, "--terms", "B3", "-o", "x", "--json", "x", cwd=tmp_path), "two outputs")
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_ship_may_be_named_like_markup(tmp_path) -> None:
     result = tank2sim("stability", "mariner", "--set", 'ship.name="[/] [bold]x"', cwd=tmp_path)
     assert result.returncode == 0 and "[/] [bold]x at" in result.stdout, result.stderr
@@ -101,6 +104,7 @@ def test_every_command_is_in_one_group_of_the_help(tmp_path) -> None:
     assert all(f"\n{title}:\n" in helped for title in GROUPS)
 
 
+@pytest.mark.slow
 def test_a_shell_completes_commands(tmp_path) -> None:
     completing = {"_TANK2SIM_COMPLETE": "bash_complete", "COMP_WORDS": "tank2sim sim", "COMP_CWORD": "1"}
     command = [str(Path(sys.executable).parent / "tank2sim")]

@@ -50,6 +50,7 @@ def test_card_json_and_plots_are_written_and_agree(path, tmp_path):
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
 
 
+@pytest.mark.slow
 def test_a_missing_run_is_refused_and_nothing_is_written(tmp_path):
     faulty = write(Campaign(seed=6, size="linear", rate_hz=5.0, faults={"drift_+04": "missing"}), tmp_path / "c").path
     card = tmp_path / "card.toml"
@@ -67,6 +68,7 @@ def test_what_is_estimated_and_what_is_missing_is_said(path, tmp_path):
     assert "ESTIMATED" in (tmp_path / "card.toml").read_text()
 
 
+@pytest.mark.slow
 def test_the_card_says_how_far_the_tests_went_and_marks_what_goes_beyond(path, tmp_path):
     card_file = tmp_path / "card.toml"
     run(path, "-o", card_file, "--fill", "clarke1983")
@@ -84,6 +86,7 @@ def test_the_card_says_how_far_the_tests_went_and_marks_what_goes_beyond(path, t
     assert "rudder" not in gentle.how
 
 
+@pytest.mark.slow
 def test_a_card_at_ship_scale_tells_the_reynolds_ratio(path, tmp_path):
     shown = run(path, "--scale", "25", "-o", tmp_path / "card.toml").output
     assert "125 times the model's" in shown.replace("\n", " ")
@@ -100,6 +103,7 @@ def _model_card(path, folder):
     return folder / "model.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", ["on_gauge", "hydrodynamic"])
 def test_a_wrong_force_convention_is_warned_of_before_the_numbers(path, convention):
     wrong = path.with_name(f"{convention}.toml")

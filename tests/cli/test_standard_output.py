@@ -27,6 +27,7 @@ def test_json_on_standard_output_is_json_alone(tmp_path, arguments) -> None:
     assert again.stdout.strip() and not again.stderr.strip()
 
 
+@pytest.mark.slow
 def test_no_other_output_goes_there(tmp_path) -> None:
     refused(tank2sim("export", "mariner", "-o", "-", cwd=tmp_path), "standard output")
     assert not list(tmp_path.iterdir())

@@ -46,6 +46,7 @@ def test_a_ship_card_is_scaled_to_turn_through_two_points(tmp_path: Path) -> Non
     assert isinstance(card, ManoeuvringCard) and "turn through 35@35 1400m@3" in card.ship.source
 
 
+@pytest.mark.slow
 def test_two_points_have_a_page_and_a_steering_card_a_picture(tmp_path: Path) -> None:
     points = ("influence", "mariner", "--through", "35@35", "1400m@3")
     result = tank2sim(*points, "--page", "page.html", "--json", "out.json", cwd=tmp_path)

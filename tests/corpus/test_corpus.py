@@ -1,7 +1,7 @@
 """A corpus of 3 000 mutated inputs over all commands: no fault, no hang, no memory, and refusals that name the file.
 
-A hundred of them run always, 400 more with ``-m slow``, all with ``-m long``. The jobs of a command are numbered; a
-failure tells the command and the number, and ``python -m tests.corpus COMMAND NUMBER DIR`` writes its files.
+A hundred of them run with every change, 400 more with ``-m slow``, all with ``-m long``. The jobs of a command are
+numbered; a failure tells command and number, and ``python -m tests.corpus COMMAND NUMBER DIR`` writes its files.
 """
 
 from __future__ import annotations
@@ -80,7 +80,16 @@ def test_the_corpus_has_3000_jobs_and_they_are_the_same_again(crew: Crew) -> Non
     ]
 
 
-@pytest.mark.parametrize("command", QUICK)
+LENGTHY = ("autopilot", "design", "influence")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, marks=[pytest.mark.slow, pytest.mark.essential] if command in LENGTHY else [])
+        for command in QUICK
+    ],
+)
 def test_a_hundred_bad_inputs(crew: Crew, command: str) -> None:
     check(crew, command, range(part(command, 110)))
 

@@ -72,6 +72,7 @@ def test_a_captive_run_that_is_all_zero_is_refused_by_its_file(folder):
     refused(tank2sim("reduce", "tank/campaign.toml", cwd=folder), "rudder_-10.csv")
 
 
+@pytest.mark.slow
 def test_one_bad_time_among_good_ones_asks_for_no_gigabytes(folder):
     path = folder / "zigzag.csv"
     lines = path.read_text().splitlines()

@@ -29,6 +29,7 @@ def plan(**options):
     return design_campaign("esso-osaka", **{"figures": FIGURES, "hours": 8.0, "draws": 0, **options})
 
 
+@pytest.mark.slow
 def test_the_plan_keeps_the_hours_and_makes_every_figure_more_certain_than_the_usual_matrix():
     found = plan(hours=None)
     hours = found.design.usual_hours
@@ -46,6 +47,7 @@ def test_the_usual_matrix_in_twice_the_hours_has_half_the_variance():
     assert (long.figures["design"] < short.figures["design"]).all()
 
 
+@pytest.mark.slow
 def test_runs_and_template_are_the_same_plan(tmp_path):
     found = plan()
     (tmp_path / "campaign.toml").write_text(found.template, encoding="utf-8")
@@ -94,6 +96,7 @@ def test_ranges_of_the_gauges_leave_out_what_is_too_strong(tmp_path):
     assert max(forces) <= 0.6 * reach["Y"]
 
 
+@pytest.mark.slow
 def test_errors_of_a_symmetric_zero_cancel_in_the_mean_of_both_sides():
     card = read_card("kvlcc2-captive")
     asked = [figure_of_text("overshoot1_deg@10/10")]
@@ -143,7 +146,7 @@ def test_the_other_side_of_a_figure_has_the_opposite_rudder():
     ("options", "words"),
     [
         ({"hours": -1.0}, "--hours"),
-        ({"hours": 0.05}, "--hours"),
+        pytest.param({"hours": 0.05}, "--hours", marks=pytest.mark.slow),
         ({"figures": "advanc@35"}, "advance_m"),
         ({"figures": ""}, "no figure"),
         ({"carriage_length_m": 2.0}, "--carriage-length"),
@@ -199,6 +202,7 @@ def test_a_hardly_certain_figure_is_marked_with_the_gauge_at_fault():
     assert not any(text.startswith(CHECK) for text in certain.notices)
 
 
+@pytest.mark.slow
 def test_what_is_assumed_is_marked_item_by_item():
     def texts(gauges, **more):
         tank = TankFile.model_validate({"gauges": gauges, **more})
@@ -215,6 +219,7 @@ def test_what_is_assumed_is_marked_item_by_item():
     assert "model of 3 m" in rest and "carriage way 240 m" in rest and "acceleration" in rest and "waiting" not in rest
 
 
+@pytest.mark.slow
 def test_derivatives_without_a_stated_error_are_marked_where_ships_are_drawn():
     card = plan().design.card
     bare = replace(card, uncertainty={})

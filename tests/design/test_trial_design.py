@@ -22,6 +22,7 @@ def trial(minutes=None, factor=1.0):
     return design_trial("mariner", figures=FIGURES, minutes=minutes, sensors=sensors)
 
 
+@pytest.mark.slow
 def test_the_plan_keeps_the_time_and_is_as_good_as_the_usual_set():
     found = trial()
     assert found.design.minutes_used <= found.design.minutes
@@ -40,6 +41,7 @@ def test_more_time_and_better_sensors_make_figures_more_certain():
     assert ((ratio > 1.2) & (ratio < 2.0001)).all()
 
 
+@pytest.mark.slow
 def test_orders_are_files_that_simulate_takes(tmp_path):
     found = trial()
     assert set(found.orders) == set(found.manoeuvres["orders"])
@@ -78,7 +80,7 @@ def test_a_ship_that_is_unstable_on_a_straight_course_is_marked():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"minutes": 0.01}, "--minutes"),
+        pytest.param({"minutes": 0.01}, "--minutes", marks=pytest.mark.slow),
         ({"minutes": -5.0}, "--minutes"),
         ({"sensors": {"q_degps": 1.0}}, "q_degps"),
         ({"sensors": {"r_degps": 0.0}}, "r_degps"),

@@ -51,6 +51,7 @@ def test_identification_finds_the_truth_of_the_made_up_trials(tmp_path: Path) ->
     assert abs(found["value"] - -174e-5) < 3 * found["standard_error"] < 5e-5
 
 
+@pytest.mark.slow
 def test_the_made_up_trials_differ_by_a_current_of_half_a_metre_a_second_to_the_east(tmp_path: Path) -> None:
     make_trials("current", tmp_path)
     head, *rows = (tmp_path / "turn.csv").read_text(encoding="utf-8").splitlines()

@@ -14,6 +14,8 @@ from .examples import MANUAL, alike, chosen, examples, pages, prepare, run
 _FOLDER = re.compile(r"`([\w-]+)/`")  # as `campaign/`: a folder in the text of a page
 
 PAGES = [page.relative_to(MANUAL).as_posix() for page in pages()]
+SHORT = ("logs.md", "python.md", "runs.md")
+"""Those that run with every change."""
 
 
 def test_every_tutorial_has_examples() -> None:
@@ -22,7 +24,9 @@ def test_every_tutorial_has_examples() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(page, marks=pytest.mark.essential if page in SHORT else ()) for page in PAGES]
+)
 def test_examples_print_what_the_manual_says(name: str, tmp_path: Path) -> None:
     page = MANUAL / name
     prepare(tmp_path)

@@ -95,6 +95,7 @@ def test_unknown_force_and_a_force_on_an_ensemble_are_refused() -> None:
         mariner.simulate("turn:10", external={"X": 1.0}, members=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_fmu_has_the_inputs_and_accelerates_as_the_model(fmi: int, tmp_path: Path) -> None:
     mariner = t2s.load("mariner")

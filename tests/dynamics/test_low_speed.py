@@ -180,6 +180,7 @@ def test_a_bare_hull_is_regular_at_rest_too(mariner_card, kind: str) -> None:
     assert np.isfinite(np.array(ca.Function("slopes", [model.x, model.u, model.p], [slopes])(*at))).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", "XYN")
 def test_forces_and_their_slopes_are_continuous_on_the_way_through_rest(axis: str) -> None:
     model = driven_ship()

@@ -202,6 +202,7 @@ def test_every_scaling_of_the_card_is_the_same_ship() -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_polynomial_of_a_ship_that_rolls_rolls_alike() -> None:
     made = t2s.convert("container", to="abkowitz")
     assert {change.after is None for change in made.made.changes} == {False}
@@ -210,6 +211,7 @@ def test_the_polynomial_of_a_ship_that_rolls_rolls_alike() -> None:
         assert second["largest_heel_deg"] == pytest.approx(first["largest_heel_deg"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_origin_moved_forward_and_back_is_the_same_ship() -> None:
     made = t2s.convert("container", to="abkowitz").converted
     there = t2s.convert(made, origin_m=10.0).converted
@@ -238,6 +240,7 @@ def test_an_mss_function_has_the_rates_of_the_ship_that_rolls(tmp_path: Path) ->
     assert [float(word) for word in done.stdout.split()] == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_fmu_is_the_model_and_shows_heel(tmp_path: Path) -> None:
     import fmpy
 
@@ -248,6 +251,7 @@ def test_the_fmu_is_the_model_and_shows_heel(tmp_path: Path) -> None:
     assert {causality[name] for name in ("motion.phi", "motion.p", "force.K")} == {"output"}
 
 
+@pytest.mark.slow
 def test_terms_of_roll_are_found_in_trials_that_measured_heel(tmp_path: Path) -> None:
     """Wrong by 10, 10 and 25 %: found within three of the errors that are stated, with the other trial held out."""
     true = {"Yv": -0.0116, "Nr": -0.00222, "Kv": 0.0003026}

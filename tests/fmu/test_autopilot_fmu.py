@@ -15,6 +15,8 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.autopilot import co_simulate_heading, loop_difference, make_autopilot_fmu
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def design(mariner: Model) -> HeadingDesign:

@@ -19,6 +19,8 @@ from tank2sim.simulation.running import Running
 
 from ..dynamics.effects.ships import N0, TYPICAL, U0, ship
 
+pytestmark = pytest.mark.slow
+
 KINDS = get_args(FmuType)
 
 
@@ -28,7 +30,7 @@ def driven() -> Model:
     return ship({"current": TYPICAL["current"], "wind": TYPICAL["wind"]})
 
 
-@pytest.fixture(scope="module", params=[2, 3])
+@pytest.fixture(scope="module", params=[2, pytest.param(3, marks=pytest.mark.slow)])
 def unpacked_ship(request, driven: Model, tmp_path_factory) -> UnpackedFmu:
     folder: Path = tmp_path_factory.mktemp("berth")
     write_fmu(driven, folder / "ship.fmu", fmi=request.param)

@@ -14,6 +14,8 @@ import tank2sim as t2s
 from tank2sim.cli.export import command
 from tank2sim.dynamics import build
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[bool, Path]:

@@ -25,13 +25,14 @@ from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors
 from tank2sim.fmu.unpacking import embedded_card
+from tests.marks import first_fast
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 KINDS = ("ModelExchange", "CoSimulation")
 
 
-@FMI
-@pytest.mark.parametrize("name", ["hull", "body", "gain"])
+@first_fast("fmi", [2, 3])
+@first_fast("name", ["hull", "body", "gain"])
 def test_an_fmu_agrees_with_its_model(
     name: str, fmi: int, fmu_file: Callable[[str, int], Path], models: dict[str, Model]
 ) -> None:
@@ -43,6 +44,8 @@ def test_an_fmu_agrees_with_its_model(
     assert max(report.errors["ModelExchange"].values()) < 1e-6
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 @FMI
 @pytest.mark.parametrize("ship", ["mariner", "wilinski-zellman"])
 def test_a_bundled_ship_agrees_with_its_model(
@@ -78,8 +81,8 @@ def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> 
     assert report.errors["CoSimulation"]["motion.v"] > LIMITS["CoSimulation"]
 
 
-@pytest.mark.parametrize(
-    ("quantity", "wrong"),
+@first_fast(
+    "quantity, wrong",
     [
         ("force.N", lambda value: -value),
         ("motion.beta", lambda value: -value),
@@ -109,6 +112,7 @@ def test_an_error_of_a_direction_counts_by_the_size_of_its_velocity(share: float
     assert not any(errors.values())
 
 
+@pytest.mark.slow
 def test_a_sign_changed_in_the_generated_code_fails(
     hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,6 +149,7 @@ def test_a_library_that_fails_is_a_failed_check(hull: Model, tmp_path: Path) -> 
     assert any("not finite" in line for line in report.differences)
 
 
+@pytest.mark.slow
 def test_a_description_with_a_fault_fails(fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path) -> None:
     with zipfile.ZipFile(fmu_file("hull", 2)) as source, zipfile.ZipFile(tmp_path / "x.fmu", "w") as target:
         for entry in source.infolist():
@@ -194,6 +199,7 @@ def test_whatever_is_falsified_in_a_description_is_reported(
     assert any(re.search(reported, line) for line in differences), differences
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "reported"), [(b'start="-0.12"', "start is 0.7"), (b'factor="1.9438444924406046"', "knots")]
 )
@@ -209,6 +215,7 @@ def test_an_fmu_with_a_falsified_description_fails(
     assert max(report.errors["CoSimulation"].values()) < 1e-9
 
 
+@pytest.mark.slow
 def test_another_spelling_of_a_number_is_no_difference(
     fmu_file: Callable[[str, int], Path], models: dict[str, Model], tmp_path: Path
 ) -> None:
@@ -232,8 +239,8 @@ def another_token(name: str, data: bytes) -> bytes:
     return re.sub(rb'(guid|instantiationToken)="\{........', rb'\1="{00000000', data) if name.endswith(".xml") else data
 
 
-@FMI
-@pytest.mark.parametrize("damage", [cut, empty, another_token])
+@first_fast("fmi", [2, 3])
+@first_fast("damage", [cut, empty, another_token])
 def test_a_library_that_cannot_be_used_is_a_failed_check(
     damage: Callable[[str, bytes], bytes],
     fmi: int,
@@ -271,6 +278,7 @@ def test_without_a_model_the_file_alone_is_validated(fmu_file: Callable[[str, in
     assert (report.passed, report.compared, report.max_error) == (True, False, {})
 
 
+@pytest.mark.slow
 def test_the_report_is_plain_data_and_nothing_is_printed(
     fmu_file: Callable[[str, int], Path], hull: Model, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -337,6 +345,7 @@ def test_the_manoeuvre_goes_both_ways_within_the_bounds(hull: Model) -> None:
         assert (run.inputs[first:behind] == run.inputs[first]).all()
 
 
+@pytest.mark.slow
 def test_the_scheme_approaches_the_exact_solution_as_its_step_shrinks(hull: Model) -> None:
     run = manoeuvre(hull)
     exact = exactly(hull, run)

@@ -25,6 +25,7 @@ from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tank2sim.simulation.scheme import runge_kutta_step
 from tests.fmu import engines
 from tests.fmu.descriptions import whole_description
+from tests.marks import first_fast
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 STEP, STEPS = 0.1, 1000
@@ -134,7 +135,7 @@ def run_in(engine: str, unpacked: UnpackedFmu, path: Path, answer: Path) -> tupl
     return rows, [line for line in said if line.strip() and not (fault and re.fullmatch(fault, line.strip()))]
 
 
-@FMI
+@first_fast("fmi", [2, 3])
 def test_the_zigzag_of_fmpy_is_that_of_the_model(
     fmi: int, by_the_model: np.ndarray, by_fmpy: Callable[[int], Any]
 ) -> None:
@@ -187,6 +188,6 @@ def test_the_manipulation_toolbox_finds_nothing(
     assert found_by_the_toolbox(described(spoilt, tmp_path / "spoilt.fmu"), caplog) != []
 
 
-@FMI
+@first_fast("fmi", [2, 3])
 def test_fmpy_validates_the_ship(fmi: int, mariner_fmu: Callable[[int], Path]) -> None:
     assert validate_fmu(str(mariner_fmu(fmi))) == []

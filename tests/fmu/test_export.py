@@ -28,6 +28,7 @@ from tank2sim.fmu.interface import interface
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu, embedded_card
 from tank2sim.native.compiler import require_compiler
+from tests.marks import first_fast
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 OURS = ["derivatives.c", "instance.c", "simulation.c", "snapshot.c", "values.c", "variables.c"]
@@ -110,6 +111,7 @@ def test_times_are_those_of_source_date_epoch(
 # ---- what is in it ----
 
 
+@pytest.mark.slow
 @FMI
 def test_sources_compile_alone(fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path) -> None:
     sources = sorted(str(path) for path in (unpacked("hull", fmi).folder / "sources").glob("*.c"))
@@ -119,8 +121,8 @@ def test_sources_compile_alone(fmi: int, unpacked: Callable[[str, int], Unpacked
     assert library.stat().st_size > 10_000
 
 
-@FMI
-@pytest.mark.parametrize("name", ["hull", "body", "gain"])
+@first_fast("fmi", [2, 3])
+@first_fast("name", ["hull", "body", "gain"])
 def test_sources_are_c99_without_a_warning(
     name: str, fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path
 ) -> None:
@@ -147,6 +149,7 @@ def test_sources_are_listed(fmi: int, unpacked: Callable[[str, int], UnpackedFmu
         assert [file.get("name") for file in build.getroot().iter("SourceFile")] == there
 
 
+@pytest.mark.slow
 @FMI
 def test_documentation_names_source_units_and_licences(fmi: int, hull: Model, tmp_path: Path) -> None:
     documents = Documents(card_text='name = "x"', source="Towing tank A & B", validity="3 to 9 m/s")
@@ -190,6 +193,7 @@ def test_any_name_gives_a_c_identifier(name: str) -> None:
     assert identifier.lower() not in ("int", "con")
 
 
+@pytest.mark.slow
 @FMI
 def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, models: dict[str, Model], tmp_path: Path) -> None:
     # All of them at once: an export of each would only take longer.

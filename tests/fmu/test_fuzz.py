@@ -87,6 +87,7 @@ def fuzzed(program: Path, seed: int, calls: int, *before: str) -> None:
     assert min(modes[:6]) > 0, "no mode of an instance is left out"
 
 
+@pytest.mark.slow
 @FMI
 @pytest.mark.skipif(not shutil.which("nm"), reason="nm lists the symbols of objects")
 def test_nothing_is_written_that_instances_share(fmi: int, hull: Model, sources: Sources, tmp_path: Path) -> None:
@@ -100,6 +101,7 @@ def test_nothing_is_written_that_instances_share(fmi: int, hull: Model, sources:
     assert [name for _, kind, name in symbols if kind in "bBcCdDsS"] == []
 
 
+@pytest.mark.slow
 @FMI
 def test_nothing_is_allocated_while_an_fmu_runs(fmi: int, hull: Model, sources: Sources) -> None:
     wrapped = ("-O2", f"-DFMI={fmi}", *(f"-Wl,--wrap={name}" for name in ("malloc", "calloc", "realloc")))
@@ -110,11 +112,13 @@ def test_nothing_is_allocated_while_an_fmu_runs(fmi: int, hull: Model, sources: 
     assert ("1000 updates" in done.stdout) == (fmi == 3)
 
 
+@pytest.mark.slow
 @FMI
 def test_calls_at_random_do_no_harm(fmi: int, hull: Model, sources: Sources) -> None:
     fuzzed(program(sources(hull, fmi), FUZZ[fmi], *SANITISED), seed=1, calls=100_000)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("valgrind"), reason="valgrind is not installed")
 @FMI
 def test_calls_at_random_leak_nothing(fmi: int, hull: Model, sources: Sources) -> None:

@@ -55,7 +55,7 @@ def test_a_path_out_of_the_archive_is_refused(name: str, fmu_file: Callable[[str
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("bomb", ["large", "many"])
+@pytest.mark.parametrize("bomb", [pytest.param("large", marks=pytest.mark.slow), "many"])
 def test_an_archive_that_would_fill_the_disk_is_not_unpacked(bomb: str, tmp_path: Path) -> None:
     path, folder = tmp_path / "bomb.fmu", tmp_path / "unpacked"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:

@@ -243,6 +243,7 @@ def with_another_position(text: str) -> str:
     return "\n".join([*rows, ",".join([time, "12.5", *rest])])
 
 
+@pytest.mark.slow
 def test_a_check_repeats_the_reference_result(mariner_fmu: Fmu, tmp_path: Path) -> None:
     ended = tank2sim("check", str(mariner_fmu(2)), "--json", "x.json", cwd=tmp_path)
     assert ended.returncode == 0, ended.stdout

@@ -195,6 +195,7 @@ def test_a_rudder_order_past_the_stops_is_held_there_and_one_in_degrees_is_refus
     assert fmu.read(["rudder.command"]) == [math.radians(60.0)]
 
 
+@pytest.mark.slow
 def test_revolutions_in_rpm_where_rad_per_s_belong_are_refused(mariner_card: ManoeuvringCard) -> None:
     text = mariner_card.text + "\n[propulsion]\nnominal_rpm = 90.0\nXnn = 77e-5\n"
     model = build(parse_card(text, "ship.toml"))

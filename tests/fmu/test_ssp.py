@@ -65,6 +65,7 @@ class Joined:
         return np.append(moved, float(self.pilot.rhs(x[-1:], given, self.pilot_p)))
 
 
+@pytest.mark.slow
 def test_the_package_is_valid(mariner_ssp: Path, tmp_path: Path) -> None:
     description = read_ssd(str(mariner_ssp))  # holds it against the schema of SSP 1.0
     assert [part.name for part in description.system.elements] == ["ship", "autopilot"]
@@ -149,6 +150,7 @@ def every_input(mariner: Model, made: Path) -> bytes:
     return ship_with_autopilot(mariner, exported, every_input=True)
 
 
+@pytest.mark.slow
 def test_every_input_may_be_a_connector(
     mariner: Model, mariner_fmu: Callable[[int], Path], tmp_path: Path, run: np.ndarray
 ) -> None:
@@ -195,11 +197,13 @@ def test_the_command_writes_the_package_next_to_the_fmu(tmp_path: Path) -> None:
         assert archive.read("resources/ship.fmu") == (tmp_path / "k.fmu").read_bytes()
 
 
+@pytest.mark.slow
 def test_what_has_no_rudder_has_no_autopilot(tmp_path: Path) -> None:
     refused(tank2sim("export", "wilinski-zellman", "-o", "w.fmu", "--ssp", "w.ssp", cwd=tmp_path), "has no rudder")
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_names_of_a_card_cannot_break_the_package(mariner: Model, tmp_path: Path) -> None:
     name = "*/ ../../x \x00\x07 ]]> <a b='\"'> & C:\\NUL 船 \ud800 {{ 7 }}"
     ship = replace(mariner, name=name, description=name)

@@ -21,6 +21,7 @@ from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tests.fmu.conftest import quantity, state, tunable
 from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, by_casadi, steps, time_of, untyped
+from tests.marks import first_fast
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 
@@ -99,7 +100,7 @@ def decaying() -> Model:
     )
 
 
-@FMI
+@first_fast("fmi", [2, 3])
 def test_a_parameter_tuned_while_running_reaches_what_only_parameters_determine(fmi: int, tmp_path: Path) -> None:
     write_fmu(decaying(), tmp_path / "decay.fmu", fmi=fmi)
     with running(unpack(tmp_path / "decay.fmu", tmp_path / "decay"), "CoSimulation") as fmu:

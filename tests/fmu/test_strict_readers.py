@@ -31,9 +31,11 @@ from tank2sim.fmu.unpacking import UnpackedFmu
 from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.run import Run
 from tests.fmu.descriptions import model_of, whole_description
+from tests.marks import first_fast
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 SHIPS = pytest.mark.parametrize("ship", [*bundled_cards(), "autopilot"])
+A_SHIP = first_fast("ship", [*bundled_cards(), "autopilot"])
 
 
 @cache
@@ -155,7 +157,7 @@ def test_unknowns_are_complete_and_depend_on_knowns_alone(ship: str, fmi: int) -
 
 
 @FMI
-@SHIPS
+@A_SHIP
 def test_fmpy_finds_nothing_to_object_to(ship: str, fmi: int, tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", whole_description(ship, fmi))
@@ -258,6 +260,7 @@ def page_of(files: dict[str, str]) -> etree._Element:
     return etree.fromstring(files[PASSPORT_PAGE].encode("utf-8"), etree.HTMLParser())
 
 
+@pytest.mark.slow
 @FMI
 def test_names_of_a_card_stay_out_of_the_c_sources_and_of_paths(
     fmi: int, models: dict[str, Model], tmp_path: Path

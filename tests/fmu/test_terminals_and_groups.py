@@ -209,6 +209,7 @@ def test_the_engine_of_osp_joins_ship_and_autopilot_by_their_groups(
     assert float(words[0]) == pytest.approx(0.3, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_beside_the_fmu_osp_finds_a_system_of_the_ship(tmp_path: Path) -> None:
     t2s.load("mariner").to_fmu(tmp_path / "my ship.fmu", fmi=2, osp=True)
     described = fmpy.read_model_description(str(tmp_path / "my ship.fmu"), validate=False)

@@ -153,6 +153,7 @@ def test_a_trial_without_what_the_sensor_shows_needs_no_file(tmp_path: Path) -> 
     assert corrected_text(trial.path, trial, [("current", {"speed_mps": 1.0}, {})]) is None
 
 
+@pytest.mark.slow
 def test_a_published_record_becomes_a_trial_csv(data: Path, tmp_path: Path) -> None:
     path = next(iter(sorted((data / "data" / "kvlcc2_hsva").glob("*.dat"))))
     trial, _ = repair_trial(read_trial_file(path))

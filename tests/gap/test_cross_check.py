@@ -78,6 +78,7 @@ def test_a_name_that_brings_no_simulation_nearer_closes_nothing(sizes, closed: b
     assert closes_gap(passed) == closed
 
 
+@pytest.mark.slow
 def test_a_linear_change_is_found_by_the_black_box_and_counts_no_more_terms_than_asked() -> None:
     truth = {**made_up_ship.TRUTH, "Nr": 1.2 * made_up_ship.TRUTH["Nr"]}
     trials = [

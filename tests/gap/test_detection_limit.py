@@ -62,6 +62,7 @@ def test_what_could_hide_goes_with_the_root_of_what_is_enough(card) -> None:
     assert set(limits["current"]) == {"speed_mps"} and set(limits) == set(HIDDEN)
 
 
+@pytest.mark.slow
 def test_what_could_hide_grows_with_the_noise_and_falls_with_the_length(card) -> None:
     standard, loud, long = (sizes(judged(card, **how)) for how in ({}, {"noise": 4.0}, {"duration": 480.0}))
     # a rate is a mean over the time, half as uncertain over four times as long; a current is a way over the time
@@ -70,6 +71,7 @@ def test_what_could_hide_grows_with_the_noise_and_falls_with_the_length(card) ->
         assert least < long[name][parameter] / standard[name][parameter] < most, name
 
 
+@pytest.mark.slow
 def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
     """Three times as much is reported by more than is enough, a quarter is not: by fits of trials that have it.
 
@@ -86,6 +88,7 @@ def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
     assert gains[0] < 10.0 < gains[1]
 
 
+@pytest.mark.slow
 def test_next_to_what_is_named_it_is_not_reported_again(card) -> None:
     likelihood = judged(card, bias=0.002)
     hypothesis = Hypothesis(card, "angle", ["gyro_bias"])
@@ -94,6 +97,7 @@ def test_next_to_what_is_named_it_is_not_reported_again(card) -> None:
     assert set(could_hide(Search(likelihood, (best,), tuple(every)), best, 10.0)) == set(HIDDEN) - {"gyro_bias"}
 
 
+@pytest.mark.slow
 def test_of_an_effect_without_amplitude_a_value_is_reported_that_does_not_show(card) -> None:
     """A lag of the gear: the longest that was tried and does not show, and the next longer one would."""
     trial = made_up_ship.trial(made_up_ship.zigzag(20, rate_degps=1000.0), duration=150, step=0.5)

@@ -69,7 +69,7 @@ def executors() -> dict[str, Executor]:
     return {"threads": ThreadPoolExecutor(3), "processes": ProcessPoolExecutor(1, get_context("spawn"))}
 
 
-@pytest.fixture(params=["threads", "processes"])
+@pytest.fixture(params=["threads", pytest.param("processes", marks=pytest.mark.slow)])
 def executor(request) -> Iterator[Executor]:
     with executors()[request.param] as pool:
         yield pool
@@ -82,6 +82,7 @@ def test_the_result_does_not_depend_on_who_does_the_work(likelihood, alone, exec
     assert_same(fitted(likelihood, executor, *EVERY[:2]), {name: alone[name] for name in EVERY[:2]})
 
 
+@pytest.mark.slow
 def test_another_ship_in_the_same_worker_is_another_ship(card, likelihood, alone) -> None:
     """By the order in place of the angle: the same card, and a gear between."""
     trial = made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=60, step=0.5)

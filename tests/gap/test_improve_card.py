@@ -17,6 +17,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.outcome.improve_card import _rounded, add_effects_to_card, card_with_effects_text
 from tank2sim.units import to_si
 from tests.dynamics.effects.ships import TYPICAL, card_with, mariner_text
+from tests.marks import first_fast
 
 ON_THE_SHIP = [name for name, effect in EFFECTS.items() if effect.acts_on != "sensor"]
 KEYS = [name for name, effect in EFFECTS.items() if effect.in_place_of or effect.changes]
@@ -100,10 +101,10 @@ def rates(model: Model) -> np.ndarray:
 def same(found: Model, expected: Model) -> None:
     """Equal rates, to 1e-9 of the largest of each state."""
     assert found.state_names == expected.state_names
-    wanted = rates(expected)
-    np.testing.assert_allclose(rates(found), wanted, rtol=0, atol=1e-9 * np.abs(wanted).max(axis=0).max())
+    obtained, wanted = rates(found), rates(expected)
+    np.testing.assert_allclose(obtained, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max(axis=0).max())
     scale = np.maximum(np.abs(wanted).max(axis=0), 1e-12)
-    np.testing.assert_allclose(rates(found) / scale, wanted / scale, rtol=0, atol=2e-9)
+    np.testing.assert_allclose(obtained / scale, wanted / scale, rtol=0, atol=2e-9)
 
 
 BUILT: dict[str, Model] = {}
@@ -119,14 +120,13 @@ def with_all(card: ManoeuvringCard, found: list[tuple[str, Mapping[str, float], 
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in TRIED.items() for name in names])
 def test_the_improved_card_has_the_model_that_was_fitted(kind: str, name: str) -> None:
     card = read(CARDS[kind])
-    improved = add_effects_to_card(card, [(name, si(name), {})])
-    expected = with_all(card, [(name, si(name), {})])
-    same(build(improved), expected)
-    before, after = rates(build(card)), rates(build(improved))
+    improved = build(add_effects_to_card(card, [(name, si(name), {})]))
+    same(improved, with_all(card, [(name, si(name), {})]))
+    before, after = rates(with_all(card, [])), rates(improved)
     assert not np.allclose(after[:, : before.shape[1]], before, rtol=1e-7, atol=0), "it does nothing"
 
 
-@pytest.mark.parametrize("other", [*READING, "rudder_stall"])
+@first_fast("other", [*READING, "rudder_stall"])
 def test_several_have_the_model_that_was_fitted_in_either_order(other: str) -> None:
     card = read(CARDS["total"])
     changes = ["linear_sway_damping", "cubic_yaw_damping", "rudder_effectiveness"]
@@ -226,7 +226,7 @@ def test_an_effect_bears_its_parameters_and_their_errors_rounded() -> None:
     same(build(improved), with_all(read(text), [("current", dict(current.parameters), {})]))
 
 
-@pytest.mark.parametrize("end", ["minimum", "maximum"])
+@first_fast("end", ["minimum", "maximum"])
 def test_values_at_their_bounds_are_read_again(end: str) -> None:
     names = ["current", "wind", "rudder_bias", "rudder_stall", "rudder_backlash", "rudder_dead_band"]
     for error in (0.0, 0.01):

@@ -51,6 +51,7 @@ def noise_of(ship: str) -> dict[str, float]:
     return {variable: radians[signal] for signal, variable in OBSERVED_SIGNALS.items() if signal in radians}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ship", ["tanker", "model"])
 def test_a_right_model_follows_zigzags_of_a_record_of_one_row_a_second(tmp_path: Path, ship: str) -> None:
     """The tanker is unstable: an error of half a second at an order is many noises later."""
@@ -59,6 +60,7 @@ def test_a_right_model_follows_zigzags_of_a_record_of_one_row_a_second(tmp_path:
     assert max(misfits) < 1.5
 
 
+@pytest.mark.slow
 def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
     card, trials, given = written(tmp_path, "model", 1)
     noise = noise_of("model")
@@ -101,6 +103,7 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
     assert np.abs(found).max(axis=(0, 1)).min() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hertz", [1, 2])
 def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz: int) -> None:
     """The true delay follows the zigzags to the noise; half an interval more or less does not."""
@@ -119,6 +122,7 @@ def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz:
     assert misfits[0] < 1.6 and misfits[1] > 1.5 * misfits[0]
 
 
+@pytest.mark.slow
 def test_fine_records_are_taken_as_they_are(tmp_path: Path) -> None:
     card, trials, _ = written(tmp_path, "tanker", 10)
     noise = noise_of("tanker")

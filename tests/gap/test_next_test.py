@@ -67,6 +67,7 @@ def test_a_stall_of_the_rudder_asks_for_large_rudders(mariner_card: ManoeuvringC
     assert stall[0] == "rudder_stall" and stall[1][0] == {"angle_rad": 0.35, "loss": 0.3}
 
 
+@pytest.mark.slow
 def test_play_and_lag_of_the_gear_ask_for_many_reversals(mariner_card: ManoeuvringCard, tmp_path: Path) -> None:
     found = asked(
         explanation(mariner_card, "rudder_backlash", width_rad=0.02),
@@ -76,6 +77,7 @@ def test_play_and_lag_of_the_gear_ask_for_many_reversals(mariner_card: Manoeuvri
     assert found.expected["straight run"] < found.expected["zigzag:5/5"] > found.expected["turn:35"]
 
 
+@pytest.mark.slow
 def test_damping_and_heel_ask_for_transients(mariner_card: ManoeuvringCard, tmp_path: Path) -> None:
     found = asked(
         explanation(mariner_card, "linear_yaw_damping", factor=0.1),
@@ -85,6 +87,7 @@ def test_damping_and_heel_ask_for_transients(mariner_card: ManoeuvringCard, tmp_
     assert found.expected["zigzag:20/10"] > found.expected["course keeping"]
 
 
+@pytest.mark.slow
 def test_what_depends_on_heading_is_asked_on_two(mariner_card: ManoeuvringCard) -> None:
     carried = explanation(mariner_card, "current", speed_mps=0.3, direction_rad=np.pi / 2)
     # Carried to starboard, a ship seems to head too far to port.
@@ -94,12 +97,14 @@ def test_what_depends_on_heading_is_asked_on_two(mariner_card: ManoeuvringCard) 
     assert found.expected["turn:20"] > 5 * found.expected["straight run"]
 
 
+@pytest.mark.slow
 def test_what_no_test_can_tell_is_said(mariner_card: ManoeuvringCard) -> None:
     found = asked(explanation(mariner_card, "rudder_effectiveness", factor=1e-5), explanation(mariner_card))
     assert found.why.startswith("No manoeuvre considered would distinguish rudder_effectiveness from none for sure")
     assert next_test([explanation(mariner_card)], NOISE) is None
 
 
+@pytest.mark.slow
 def test_coloured_readings_tell_less_and_the_nearest_rival_counts(mariner_card: ManoeuvringCard) -> None:
     card = linear_card(mariner_card)
     damped, bare = explanation(card, "linear_yaw_damping", factor=0.1), Explanation("none", card, (), np.zeros((0, 0)))
@@ -113,6 +118,7 @@ def test_coloured_readings_tell_less_and_the_nearest_rival_counts(mariner_card: 
     assert 0 < three < 0.1 * white
 
 
+@pytest.mark.slow
 def test_the_orders_run_and_a_zigzag_in_them_is_one(mariner_card: ManoeuvringCard, tmp_path: Path) -> None:
     found = asked(
         explanation(mariner_card, "rudder_lag", time_constant_s=3.0),
@@ -181,6 +187,7 @@ def test_the_straight_run_on_two_headings_turns_after_a_third_of_its_length(mari
     assert helmsman(20.0, np.pi / 2, 0.0) == pytest.approx(0.0)
 
 
+@pytest.mark.slow
 def test_a_lag_behind_another_needs_the_instants_of_the_orders(mariner_card: ManoeuvringCard) -> None:
     """They differ by a delay of the gear's own time constant, which orders read seldom hide."""
     lags = [explanation(mariner_card, name, time_constant_s=6.0) for name in ("rudder_lag", "telemotor_lag")]

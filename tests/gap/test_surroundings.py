@@ -68,6 +68,7 @@ def windy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Made, ManoeuvringCa
     return case(tmp_path_factory.mktemp("windy"), "wind")
 
 
+@pytest.mark.slow
 def test_each_trial_is_moved_by_its_own_wind_alone(windy: tuple) -> None:
     _, card, fitted, _ = windy
     none = Hypothesis(card, fitted.driven_by)
@@ -89,6 +90,7 @@ def test_each_trial_is_moved_by_its_own_wind_alone(windy: tuple) -> None:
     assert (found.speed_mps, found.direction_rad) == pytest.approx((8.0, -np.pi / 2))
 
 
+@pytest.mark.slow
 def test_a_recorded_wind_is_the_input_of_its_trial(windy: tuple) -> None:
     made, card, fitted, _ = windy
     truth = made.parameters["wind"]
@@ -114,6 +116,7 @@ def with_columns(trial, truth: dict[str, float]):
 SIGNALS = ("speed_mps", "direction_deg")
 
 
+@pytest.mark.slow
 def test_the_current_of_a_trial_is_found_from_its_replay(tmp_path: Path) -> None:
     made, card, fitted, _ = case(tmp_path, "current")
     with_current = add_effects_to_card(card, [("current", {}, {})])
@@ -131,6 +134,7 @@ def test_the_current_of_a_trial_is_found_from_its_replay(tmp_path: Path) -> None
         assert trial.misfit("before") < 0.1 * still.misfit("before")
 
 
+@pytest.mark.slow
 def test_the_winds_of_all_trials_and_their_coefficients_are_found_from_replays(windy: tuple) -> None:
     made, card, fitted, _ = windy
     with_wind = add_effects_to_card(card, [("wind", at_rest("wind"), {})])
@@ -152,6 +156,7 @@ def test_a_wind_of_the_first_half_predicts_nothing_where_there_is_none(tmp_path:
     assert np.median(fit_common_surroundings(with_wind, fitted, "wind", NOISE).predicted) > 0.9
 
 
+@pytest.mark.slow
 def test_probabilities_by_simulation_are_those_of_the_misfits_and_of_the_numbers_they_took(windy: tuple) -> None:
     _, card, fitted, _ = windy
 

@@ -101,6 +101,7 @@ def long() -> dict[str, list[Trial]]:
     return run(groups)
 
 
+@pytest.mark.slow
 def test_turn_agrees_with_an_independent_program(data: Path, long: dict[str, list[Trial]]) -> None:
     reference = columns(data / "reference" / "mariner_turn_35.csv")
     (run,) = long["from 0"]
@@ -114,6 +115,7 @@ def test_turn_agrees_with_an_independent_program(data: Path, long: dict[str, lis
         assert at == pytest.approx(reference[name][then], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_none_is_the_worked_case_without_an_effect(data: Path, long: dict[str, list[Trial]]) -> None:
     assert misfit(long["case"], case(data, 6, "turn20_port", "zigzag20_20", "slowdown")) < 1.6
 
@@ -126,6 +128,7 @@ def test_effects_explain_the_worked_cases(data: Path, long: dict[str, list[Trial
     assert misfit(long[f"case {number}"], measured) < left * misfit(long["case"], measured)
 
 
+@pytest.mark.slow
 def test_symmetric_hull_turns_alike_to_both_sides(long: dict[str, list[Trial]]) -> None:
     stbd, port = long["sides"]
     for name in ("v_mps", "r_degps", "psi_deg", "y_m"):
@@ -134,6 +137,7 @@ def test_symmetric_hull_turns_alike_to_both_sides(long: dict[str, list[Trial]]) 
     assert stbd["psi_deg"][-1] > 90.0
 
 
+@pytest.mark.slow
 def test_a_model_turns_like_its_ship() -> None:
     """Froude's law: lengths with the scale, times with L/U, speeds as shares of the approach."""
     full, small = HULLS["tanker"], HULLS["model"]
@@ -235,6 +239,7 @@ def test_coefficient_errors_are_two_percent_and_grouped() -> None:
     assert ratio["Yv"] != pytest.approx(ratio["Nv"], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_written_files_read_like_the_worked_cases(tmp_path: Path) -> None:
     (made,) = make([Setting(("out_oscillation",), 2, manoeuvres=("straight",))])
     write(made, tmp_path)

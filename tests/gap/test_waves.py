@@ -98,6 +98,7 @@ def likelihood_of(setting: Setting, hertz: int, folder) -> tuple[Likelihood, Exp
     return likelihood, fit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS[:2], ids=["no effect", "wind"])
 def test_the_frequency_of_a_made_up_sea_is_found(setting: Setting, tmp_path) -> None:
     truth = setting.generator("sea").uniform(*WAVE_BAND_RADPS)
@@ -111,6 +112,7 @@ def test_the_frequency_of_a_made_up_sea_is_found(setting: Setting, tmp_path) -> 
     assert cost(waves) - cost(None) == pytest.approx(explained.score - fit.score, rel=1e-3, abs=1.0)
 
 
+@pytest.mark.slow
 def test_no_waves_are_found_in_gusts(tmp_path) -> None:
     assert fit_waves(*likelihood_of(SETTINGS[2], 1, tmp_path)) is None
 

@@ -79,6 +79,7 @@ def made() -> dict[str, Made]:
     return dict(zip(("current", "nothing"), cases, strict=True))
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_a_current_is_found_and_proved_on_a_trial_held_out(made, tmp_path: Path) -> None:
     case = sought(tmp_path, made["current"], HELD, FEW)
@@ -93,6 +94,7 @@ def test_a_current_is_found_and_proved_on_a_trial_held_out(made, tmp_path: Path)
     assert case.gap.equation == "kinematics"
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 def test_where_nothing_is_hidden_nothing_is_named(made, tmp_path: Path) -> None:
     case = sought(tmp_path, made["nothing"], options=FEW)
@@ -102,6 +104,7 @@ def test_where_nothing_is_hidden_nothing_is_named(made, tmp_path: Path) -> None:
     assert case.gap.misfit("before", held_out=False) == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.slow
 def test_an_effect_that_cannot_be_tried_is_refused(made, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="rudder_walk cannot be tried"):
         sought(tmp_path, made["nothing"], options=GapOptions(workers=1, effects=("rudder_walk",)))

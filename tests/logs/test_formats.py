@@ -13,6 +13,7 @@ import pytest
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.voyage import Voyage, make_voyage
 from tests.conftest import DATA
+from tests.marks import first_fast
 
 FORMATS = {
     "voyage.nmea": "pynmea2",
@@ -137,17 +138,18 @@ def test_orders_of_thrusters_lie_on_the_truth(logs, name) -> None:
         ("voyage.ulg", "voyage.bin", 1.01e-7),  # the board's integers of 1e-7 deg, cut off
     ],
 )
-@pytest.mark.parametrize("vessel", VESSELS)
+@first_fast("vessel", VESSELS)
 def test_positions_of_two_formats_agree_to_the_last_digit(logs, vessel, first, second, digit_deg) -> None:
     for name in (first, second):
         pytest.importorskip(FORMATS[name])
     if vessel == "usv_22" and second == "voyage.nmea":
         pytest.skip("the craft's receiver sends NMEA at another rate than the bag has")
     _, _, t_zero = truth_of(vessel)
+    both_logs = [read_log(logs / vessel / name).streams for name in (first, second)]
     for axis in ("latitude", "longitude"):
         pair = []
-        for name in (first, second):
-            stream = next(s for s in read_log(logs / vessel / name).streams if s.quantity == axis)
+        for streams in both_logs:
+            stream = next(s for s in streams if s.quantity == axis)
             good = np.isfinite(stream.values)
             at = np.round((stream.time_s[good] - t_zero) * 100).astype(int)
             pair.append(dict(zip(at.tolist(), stream.values[good].tolist(), strict=True)))

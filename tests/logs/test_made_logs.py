@@ -18,6 +18,7 @@ from tank2sim.logs.reference import local_metres
 from tank2sim.logs.table import read_table_log
 from tank2sim.records.spelt_units import split_unit
 from tests.logs.made_logs import T0, candump_lines, frame, nmea_lines, rmc, sentence, voyage
+from tests.marks import first_fast
 
 
 def stream_of(found, quantity):
@@ -312,7 +313,7 @@ def test_a_log_of_nmea_2000_holds_what_was_written(tmp_path) -> None:
     assert [stretch.kind.value for stretch in log(path).found if stretch.kind.excites] == ["zigzag", "turn"]
 
 
-@pytest.mark.parametrize("form", ["canboat", "actisense", "gateway"])
+@first_fast("form", ["canboat", "actisense", "gateway"])
 def test_a_log_of_nmea_2000_is_the_same_in_every_form(tmp_path, form) -> None:
     pytest.importorskip("nmea2000")
     begin = 86400 - T0 % 86400 - 300  # midnight falls into the log
@@ -399,6 +400,7 @@ def test_position_heading_and_rudder_alone_suffice(tmp_path) -> None:
     assert {"delta_rad", "psi_rad", "x_m", "y_m"} <= set(result.cuts[0].trial.signals)
 
 
+@pytest.mark.slow
 def test_a_log_of_a_day_at_2_hz_is_read_in_seconds(tmp_path) -> None:
     table = pd.concat([frame()] * 90, ignore_index=True)
     table["utc"] = [str(T0 + 0.5 * k) for k in range(len(table))]

@@ -15,6 +15,7 @@ from tank2sim.logs.pulses import pulses_of
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.streams import LogStream
 from tests.logs.made_logs import ORIGIN, T0, frame, stamp, voyage
+from tests.marks import first_fast
 
 STEP = 0.2
 
@@ -178,7 +179,7 @@ class TestPx4:
         assert np.isnan(found_shares[~turning]).all()
 
 
-@pytest.mark.parametrize("known", [True, False])
+@first_fast("known", [True, False])
 def test_a_telemetry_log_gives_its_sides_with_and_without_parameters(tmp_path, known) -> None:
     mavlink = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
     made, path = craft(), tmp_path / "craft.tlog"

@@ -36,6 +36,7 @@ class TestDataflash:
         with pytest.raises(InputError, match="no fix"):
             read_log(dataflash(tmp_path / "none.log", statuses=(1,)))
 
+    @pytest.mark.slow
     def test_two_speed_controllers_are_a_guess_and_one_is_the_shaft(self, tmp_path) -> None:
         for escs, expected in ((1, [("rpm", "format")]), (2, [("rpm_port", ""), ("rpm_starboard", "")])):
             found = read_log(dataflash(tmp_path / f"{escs}.log", escs=escs))

@@ -281,6 +281,7 @@ def test_a_finding_becomes_one_entry_a_column():
     assert {"file", "column", "what", "likely_truth"} <= set(entries[0])
 
 
+@pytest.mark.slow
 def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
     """On each record of HSVA and MARIN, and nothing else is called a fault."""
     files = sorted(data.glob("data/kvlcc2_*/*.dat"))
@@ -298,6 +299,7 @@ def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
         assert np.corrcoef(right.signals["v_mps"][turning], right.signals["r_radps"][turning])[0, 1] < -0.8
 
 
+@pytest.mark.slow
 def test_the_esso_osaka_is_right_as_it_is(data):
     files = sorted(data.glob("data/esso_osaka/*/*.csv"))
     assert files, "the folder holds no record"
@@ -305,6 +307,7 @@ def test_the_esso_osaka_is_right_as_it_is(data):
         assert [one for one in audit_trial(read_trial_file(file)) if one.kind == "fault"] == [], file
 
 
+@pytest.mark.slow
 def test_hidden_effects_of_the_gap_cases_are_measured_and_a_clean_one_is_clean(data):
     expected = {1: ("speed_mps", 0.5288), 5: ("bias_degps", 0.02792), 8: ("speed_mps", 0.4699)}
     for case in range(1, 9):
@@ -510,6 +513,7 @@ def test_velocities_through_the_water_named_over_ground_are_not_to_be_used():
     assert finding.open and finding.columns == ("u_ground_mps", "v_ground_mps")
 
 
+@pytest.mark.slow
 def test_no_pattern_of_empty_cells_and_times_breaks_the_audit():
     """Seeded: columns at lower rates, in bursts, at one end or in a few rows; times with jumps, repeats and strays."""
     rng = np.random.default_rng(20)

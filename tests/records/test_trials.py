@@ -169,6 +169,7 @@ def test_wind_of_the_esso_osaka_is_where_it_comes_from(data):
     assert np.corrcoef(s["delta_rad"][ahead], s["r_radps"][ahead])[0, 1] > 0.9
 
 
+@pytest.mark.slow
 def test_every_real_record_is_read(data):
     files = [*data.glob("data/kvlcc2_*/*.dat"), *data.glob("data/esso_osaka/*/*.csv")]
     assert files, "the folders hold no record"

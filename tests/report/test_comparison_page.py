@@ -45,6 +45,7 @@ def test_the_chart_of_errors_has_a_point_for_each_difference(found) -> None:
     assert len(points) == len(found.in_errors(1))
 
 
+@pytest.mark.slow
 def test_the_report_of_the_json_is_this_page(found) -> None:
     reported = json.loads(json_text(found.as_json()))
     assert render_page(result_page(reported, "c.json")) == render_page(compare_page(plain_json(found.as_json())))

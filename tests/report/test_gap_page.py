@@ -18,6 +18,7 @@ from tank2sim.report.kit.before_after import in_noise
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import Verdict, render_page
 from tests.gap import made_up
+from tests.marks import first_fast
 
 
 def charts_of(gap):
@@ -45,7 +46,7 @@ def tables_of(page):
     return {table.caption: table for section in page.sections for table in section.tables}
 
 
-@pytest.mark.parametrize("verdict", made_up.EVERY)
+@first_fast("verdict", made_up.EVERY)
 def test_every_verdict_has_a_whole_page(verdict) -> None:
     gap = made_up.EVERY[verdict]()
     drawn = charts_of(gap)
@@ -241,6 +242,7 @@ def carried() -> Gap:
     return replace(made_up.missing(), passed=(trial("turn35"), trial("zigzag")))
 
 
+@pytest.mark.slow
 def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None:
     gap = carried()
     drawn = charts_of(gap)

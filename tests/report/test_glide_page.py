@@ -41,6 +41,7 @@ def lines(chart, layer=0):
     return specification["datasets"][source["name"]]
 
 
+@pytest.mark.slow
 def test_the_page_has_the_figures_and_every_chart(found) -> None:
     page = glide_page(plain_json(found.as_json()))
     assert page.figures[0].value == pytest.approx(23.385, abs=5e-4)

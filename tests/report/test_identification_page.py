@@ -109,6 +109,7 @@ def test_speed_and_drift_are_those_of_the_measured_track(trials) -> None:
     assert np.abs(drift).max() > 0.1
 
 
+@pytest.mark.slow
 def test_histories_are_in_degrees_and_thinned(found, trials) -> None:
     _, _, charts = found
     chart = charts["histories_held_out"]
@@ -170,6 +171,7 @@ def test_maps_next_to_each_other_share_one_legend(found) -> None:
     assert len(legends) == 4 and all(one == legends[0] for one in legends)
 
 
+@pytest.mark.slow
 def test_overshoots_keep_the_digits_that_their_errors_need(found) -> None:
     keys = ("trial", "figure", "measured", "before", "predicted", "interval_95")
     rows = [
@@ -232,6 +234,7 @@ def test_the_page_tells_the_errors_of_what_was_held_out(found) -> None:
     assert chart_specification(section.charts[0].chart) == tracks
 
 
+@pytest.mark.slow
 def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
     monkeypatch.setattr(identification_page_module, "MOST_TRIALS", 2)
     monkeypatch.setattr(identification_page_module, "_PER_SHEET", 1)

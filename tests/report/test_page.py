@@ -73,6 +73,7 @@ def test_the_page_is_the_same_whenever_it_is_made(html):
     assert render_page(example_page()) == html
 
 
+@pytest.mark.slow
 def test_the_page_is_the_same_in_every_process(html):
     code = (
         "import hashlib\n"

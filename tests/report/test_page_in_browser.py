@@ -42,6 +42,7 @@ setTimeout(() => {
 </script>"""
 
 
+@pytest.mark.essential
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path, scheme):
@@ -66,6 +67,7 @@ def wheel_over(chart, folder, *flags):
     return json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 420])
 def test_a_track_keeps_equal_scales_when_it_is_zoomed_and_when_the_window_is_narrow(tmp_path, width):
     track = TrackData(label="run", x_m=[0, 300, 500], y_m=[0, 50, 900])
@@ -77,6 +79,7 @@ def test_a_track_keeps_equal_scales_when_it_is_zoomed_and_when_the_window_is_nar
     assert zoomed["x"] < 0.9 * before["x"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["history", "bode"])
 def test_stacked_charts_are_zoomed_along_their_common_axis(charts, tmp_path, name):
     before, wheel, zoomed = wheel_over(charts[name], tmp_path)
@@ -111,6 +114,7 @@ measure();
 </script>"""
 
 
+@pytest.mark.slow
 def test_charts_fit_a_window_of_400_px_at_the_size_of_their_letters(charts, tmp_path):
     shown = [Illustration(chart=charts[name]) for name in ("track", "history", "bode")]
     inner = render_page(Page(title="Narrow", sections=[PageSection(heading="Charts", charts=shown)]))
@@ -143,6 +147,7 @@ measure();
 </script>"""
 
 
+@pytest.mark.slow
 def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_charts_are_drawn(charts, tmp_path):
     half = Illustration(chart=charts["track"], half=True)
     panel = alt.Chart(alt.Data(values=[{"a": 1}])).mark_point().encode(x="a:Q", y="a:Q").properties(width=300)

@@ -40,7 +40,8 @@ MANOEUVRES = [
     (Zigzag(TWENTY, TEN, opposite=-TEN), 300.05),
 ]
 CASES = [(name, *case) for name in ("mariner", "kvlcc2") for case in MANOEUVRES]
-CASES += [("kvlcc2", Stop(), None), ("esso-osaka-ship", Stop(0.0), None), ("esso-osaka-ship", Stop(), None)]
+CASES += [("kvlcc2", Stop(), None), ("esso-osaka-ship", Stop(0.0), None)]
+CASES += [pytest.param("esso-osaka-ship", Stop(), None, marks=pytest.mark.slow)]
 
 
 def ships(card: ManoeuvringCard, model: Model, count: int) -> tuple[list[dict[str, float]], Array]:
@@ -140,6 +141,7 @@ def test_no_bit_depends_on_the_number_of_lanes_or_on_neighbours(mariner_card, ma
             np.testing.assert_array_equal(values, results[0].figures[figure][part], err_msg=figure)
 
 
+@pytest.mark.slow
 def test_a_stop_leaves_the_cards_range_as_a_single_run_does_and_depends_on_no_neighbour() -> None:
     card = read_card("kvlcc2")
     assert isinstance(card, ManoeuvringCard)

@@ -293,6 +293,7 @@ def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path
         assert math.degrees(what.manoeuvre.rudder) == pytest.approx(rudder, abs=0.2)
 
 
+@pytest.mark.slow
 def test_the_controllers_of_two_basins_are_distinguished(data: Path) -> None:
     """HSVA's zigzags by their names; lags of one controller agree with each other over all runs, s at full scale."""
     card = read_card("kvlcc2-captive")

@@ -25,6 +25,7 @@ from tank2sim.bundled import bundled_cards
 from tank2sim.cards.coefficient_table import read_coefficients
 from tank2sim.cards.form import RigidBody
 from tank2sim.errors import InputError
+from tests.marks import first_fast
 
 S175 = """name,value
 length_m,175
@@ -63,7 +64,7 @@ EVERY = 5
 """Of the ways to print a table so many-th one is tried where not all are: a prime to the counts of each choice."""
 
 
-@pytest.mark.parametrize("name", ["s175_container", "mariner", "esso_osaka_model", "tanker_1972"])
+@first_fast("name", ["s175_container", "mariner", "esso_osaka_model", "tanker_1972"])
 def test_the_true_reading_of_a_scrambled_table_is_the_first(name: str, tmp_path: Path) -> None:
     source = HERE / f"{name}.csv"
     for wanted in list(combinations(Table(source)))[::EVERY]:
@@ -126,6 +127,7 @@ def test_names_as_print_has_them_are_understood(tmp_path: Path) -> None:
     assert table.derivatives["Yvdot"] == -0.00705 and table.body["mass"] == 0.00792
 
 
+@pytest.mark.slow
 def test_a_card_without_its_conventions_is_a_table_and_what_it_states_is_taken(tmp_path: Path) -> None:
     found = t2s.convention(mariner_without(tmp_path, "rudder_sign", "yaw_rate_terms"))
     assert {entry.reading.scaling for entry in found.readings} == {"prime"}
@@ -135,6 +137,7 @@ def test_a_card_without_its_conventions_is_a_table_and_what_it_states_is_taken(t
     assert any("steering_gear" in notice for notice in found.notices)
 
 
+@pytest.mark.slow
 def test_the_card_of_the_first_reading_is_the_published_ship(tmp_path: Path) -> None:
     found = t2s.convention(mariner_without(tmp_path, "rudder_sign", "yaw_rate_terms", "scaling"))
     expected, made = (ship.stability().to_dict()["stability_criterion"] for ship in (t2s.load("mariner"), found.ship))
@@ -143,6 +146,7 @@ def test_the_card_of_the_first_reading_is_the_published_ship(tmp_path: Path) -> 
     assert turns[1] == pytest.approx(turns[0], rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_speed_of_the_scaling_shows_in_the_terms_by_speed(tmp_path: Path) -> None:
     """The Mariner's Yvu = Yv, Ydu = 2 Yd are those of u v and u^2 delta scaled with u0; those of a fit are not."""
     found = t2s.convention(mariner_without(tmp_path, "speed_scale", "scaling"))

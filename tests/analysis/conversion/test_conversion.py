@@ -19,6 +19,7 @@ from tank2sim.cards import parse_card, read_card
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tests.marks import first_fast
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
 ALIKE = TEXT.replace("gamma_R_minus = 0.395", "gamma_R_minus = 0.640").replace("C_2_minus = 1.1", "C_2_minus = 1.6")
@@ -62,7 +63,7 @@ def test_moving_the_origin_follows_the_formulas() -> None:
     assert new["Xu"] == old["Xu"]
 
 
-@pytest.mark.parametrize("name", ["mariner", "kvlcc2-captive"])
+@first_fast("name", ["mariner", "kvlcc2-captive"])
 def test_a_ship_is_as_stable_about_any_origin(name: str) -> None:
     """Eigenvalues of straight motion do not know the origin; with "total" and with "hydrodynamic" cards."""
     moved = t2s.convert(name, origin_m=-4.0)
@@ -120,6 +121,7 @@ def parse_toml(text: str) -> dict[str, dict[str, float]]:
     return tomllib.loads(text)
 
 
+@pytest.mark.slow
 def test_an_mmg_card_in_other_scalings_is_the_same_ship() -> None:
     for scaling in ("prime", "dimensional", "bis"):
         made = t2s.convert("kvlcc2-l7-mmg", to="mmg", scaling=scaling).converted
@@ -191,6 +193,7 @@ def test_errors_are_carried_through_the_fit_as_the_linear_map_has_them() -> None
         assert found == pytest.approx(expected, rel=5e-3), (first, second)
 
 
+@pytest.mark.slow
 def test_a_polynomial_of_a_card_with_errors_has_its_covariance_next_to_it(tmp_path: Path) -> None:
     text = f"{TEXT}\n[uncertainty]\nYv = 0.012\nNv = 0.006\nNr = 0.002\neps = 0.05\n"
     made = t2s.convert(mmg_ship(text))
@@ -204,6 +207,7 @@ def test_a_polynomial_of_a_card_with_errors_has_its_covariance_next_to_it(tmp_pa
     assert widths[1] == pytest.approx(widths[0], rel=0.25)
 
 
+@pytest.mark.slow
 def test_the_polynomial_follows_standard_manoeuvres_and_says_how_well() -> None:
     made = t2s.convert("kvlcc2-l7-mmg")
     found = {(entry["manoeuvre"], entry["figure"]): entry for entry in made.to_dict()["figures"]}  # type: ignore[attr-defined]
@@ -218,6 +222,7 @@ def test_the_polynomial_follows_standard_manoeuvres_and_says_how_well() -> None:
     assert made.made.card is not None and made.made.card.model.kind == "abkowitz"
 
 
+@pytest.mark.slow
 def test_a_ship_alike_to_both_sides_gets_a_polynomial_that_is_so_too() -> None:
     made = t2s.convert(mmg_ship(ALIKE))
     assert made.made.card is not None
@@ -227,6 +232,7 @@ def test_a_ship_alike_to_both_sides_gets_a_polynomial_that_is_so_too() -> None:
     assert port == pytest.approx(starboard, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_revolutions_have_the_effect_that_the_propeller_gives_them() -> None:
     card, ship = t2s.convert("kvlcc2-l7-mmg").made.card, t2s.load("kvlcc2-l7-mmg")
     assert card is not None and card.propulsion is not None and ship.card.propulsion is not None  # type: ignore[union-attr]

@@ -62,6 +62,7 @@ def test_members_are_the_ship_with_other_numbers_simulated_one_by_one(mariner_ca
             )
 
 
+@pytest.mark.slow
 def test_a_figure_linear_in_the_numbers_has_the_spread_of_the_covariance(tmp_path, mariner_card) -> None:
     # Steady speed on a straight course has none; C' = Yv (Nr - m x_G) - Nv (Yr - m) is linear in Yv and Nv.
     errors = {"Yv": 2e-4, "Nv": 1e-4}
@@ -140,6 +141,7 @@ def test_members_take_their_numbers_together_from_the_samples_of_a_card(tmp_path
     assert len({member["derivatives.Nv"] for member in members}) == 200
 
 
+@pytest.mark.slow
 def test_members_without_a_mass_matrix_and_runaways_are_counted(mariner_card: ManoeuvringCard) -> None:
     card = changed(mariner_card, Yvdot=0.02)
     bands = manoeuvre_bands(card, Turn(TWENTY), (200.0, 200.0), EnsembleRequest(40, 1))
@@ -171,6 +173,7 @@ def test_the_chance_of_meeting_a_limit_at_the_median_is_a_half(mariner_card, mar
     assert one.band is not None and one.band.low < criteria[0].found < one.band.high
 
 
+@pytest.mark.slow
 def test_slow_motions_alone_give_no_probability_of_stability(mariner_card) -> None:
     roll = "\n[[effects]]\nname = 'roll_coupling'\n[effects.parameters]\nYphi = 0.001\nNphi = 0.02\n"
     found = stability_bands(parse_card(mariner_card.text + roll, "roll.toml"), [], EnsembleRequest(2, 0))
@@ -185,6 +188,7 @@ def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_car
             assert found.figures[one.name][0] == pytest.approx(one.found, rel=1e-4), one.name
 
 
+@pytest.mark.slow
 def test_members_beyond_the_card_are_those_whose_own_trials_left_its_range(mariner_card) -> None:
     card = revised(mariner_card, {}, {"model.valid_speed_mps": [6.19, 9.3]})
     assert isinstance(card, ManoeuvringCard)

@@ -36,7 +36,7 @@ def grid_of(card: ManoeuvringCard) -> Grid:
     return Grid.of(model, steering_responses(model, straight_course(model), stability(model).nomoto)[0])
 
 
-@pytest.fixture(scope="module", params=["mariner", "kvlcc2-captive"])
+@pytest.fixture(scope="module", params=["mariner", pytest.param("kvlcc2-captive", marks=pytest.mark.slow)])
 def found(request: pytest.FixtureRequest):
     card = read_card(request.param)
     assert isinstance(card, ManoeuvringCard)
@@ -45,6 +45,7 @@ def found(request: pytest.FixtureRequest):
     return card, draws, grid, steering_bands(ShipText.of(card), draws, MEMBERS, (None, grid))
 
 
+@pytest.mark.slow
 def test_bands_are_the_quantiles_of_the_members_own_responses(found) -> None:
     card, draws, grid, bands = found
     model, magnitude, phase, step = build(card), [], [], []

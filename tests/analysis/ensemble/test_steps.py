@@ -30,6 +30,7 @@ def question(card: ManoeuvringCard, manoeuvre: Manoeuvre = TURN, duration_s: flo
     return OfManoeuvre(ShipText.of(card), manoeuvre, duration_s, np.linspace(0.0, 300.0, 4))
 
 
+@pytest.mark.slow
 def test_the_longest_step_with_the_same_figures_is_taken(mariner_card, monkeypatch) -> None:
     draws, _ = draws_of(mariner_card, 1)
     assert fastest_pace(question(mariner_card), draws) == Pace(STEP_FACTORS[0], single=True)
@@ -40,6 +41,7 @@ def test_the_longest_step_with_the_same_figures_is_taken(mariner_card, monkeypat
     assert fastest_pace(question(mariner_card), draws) == USUAL_PACE
 
 
+@pytest.mark.slow
 def test_a_step_at_the_edge_of_the_stable_ones_is_not_taken(monkeypatch) -> None:
     card = read_card("kvlcc2")
     assert isinstance(card, ManoeuvringCard)
@@ -50,6 +52,7 @@ def test_a_step_at_the_edge_of_the_stable_ones_is_not_taken(monkeypatch) -> None
     assert fastest_pace(question(card), draws).step_factor == 5
 
 
+@pytest.mark.slow
 def test_turns_of_which_most_show_no_steady_part_keep_the_usual_step() -> None:
     card = read_card("kvlcc2")
     assert isinstance(card, ManoeuvringCard)
@@ -67,6 +70,7 @@ def test_a_figure_that_is_a_number_with_one_step_alone_is_not_the_same() -> None
     assert not same_figures(usual, figures(500.0, 500.0), 1.0) and not same_figures(figures(500.0, 500.0), usual, 1.0)
 
 
+@pytest.mark.slow
 def test_members_have_the_same_figures_in_whatever_batches(mariner_card, monkeypatch) -> None:
     monkeypatch.setattr(ensembles, "KEPT", 20)
     draws, _ = draws_of(mariner_card, 1)
@@ -83,6 +87,7 @@ def test_members_have_the_same_figures_in_whatever_batches(mariner_card, monkeyp
     assert (whole.figures["advance_m"][20:] != own.figures["advance_m"][20:]).all()
 
 
+@pytest.mark.slow
 def test_the_steps_of_the_members_are_reported(mariner_card, monkeypatch) -> None:
     own = build(mariner_card).step_s
     few = manoeuvre_bands(mariner_card, TURN, (None, 400.0), EnsembleRequest(30, 1))

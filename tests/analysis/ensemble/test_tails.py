@@ -76,6 +76,7 @@ def test_failing_ships_are_where_the_figure_rises() -> None:
     assert [found.failing_ships[f"x{k}"] for k in range(3)] == pytest.approx(expected[:3], abs=0.15)
 
 
+@pytest.mark.slow
 def test_a_figure_that_is_not_linear_is_seen_and_its_tail_is_that_of_its_inverse() -> None:
     own = draws()
     sigma = deviation(own)
@@ -106,6 +107,7 @@ def test_members_that_show_nothing_count_as_failing() -> None:
     assert found.not_shown == found.failing > 500 and found.beyond_card == 0
 
 
+@pytest.mark.slow
 def test_members_that_cannot_be_used_count_as_neither() -> None:
     own = draws()
     broken = Made(broken=2.0)  # a standard error of x2
@@ -121,6 +123,7 @@ def test_members_that_cannot_be_used_count_as_neither() -> None:
     assert kept.unusable_probability == pytest.approx(norm.sf(1.0), rel=0.5)
 
 
+@pytest.mark.slow
 def test_members_beyond_a_bound_are_no_ships() -> None:
     own = draws(lowest=-0.4)
     found = tails(Made(), own, ensemble(Made(), own, 2000), {"a": 4 * deviation(own)})[0]["a"]

@@ -24,6 +24,7 @@ def errors():
     return swing_errors(PROBE, Integrator(MODEL), (200.0, 800.0))
 
 
+@pytest.mark.slow
 def test_what_inertia_does_falls_with_the_period_and_the_added_mass_stays_in_turns(errors) -> None:
     pitch, buoyancy, roll = (one.share for one in errors)
     for one in (pitch, buoyancy):

@@ -48,6 +48,7 @@ def test_the_prior_has_the_dimensions_and_the_published_estimates() -> None:
     assert not card.covariance
 
 
+@pytest.mark.slow
 def test_figures_of_members_are_those_of_single_runs() -> None:
     card = prior_card(TANKER, "tanker")
     draws, _ = draws_of(card, 2)
@@ -131,6 +132,7 @@ def test_figures_of_an_option_are_read_with_their_errors() -> None:
             parse_figures("turn35", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "named"),
     [

@@ -36,6 +36,7 @@ def test_the_largest_moment_is_that_of_the_weaker_way_of_both_propellers(otter: 
     assert starboard == pytest.approx(0.395 * (most - least), rel=1e-9) and port == pytest.approx(-starboard)
 
 
+@pytest.mark.slow
 def test_a_change_of_course_to_starboard_settles_and_keeps_its_speed(otter: t2s.Ship) -> None:
     found = otter.autopilot(course_change_deg=45.0)
     run = found.runs["course"]

@@ -37,6 +37,7 @@ def kvlcc2() -> Model:
     return build(read_card("kvlcc2-captive"))
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(K=st.floats(0.01, 1.0), T=st.floats(5.0, 500.0), unstable=st.booleans())
 def test_the_poles_of_a_pd_are_where_they_were_placed(mariner: Model, K: float, T: float, unstable: bool) -> None:
@@ -89,6 +90,7 @@ def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str)
     assert 0 < margins.gain_margin_down < 0.5  # with too little gain she goes her own way
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
 @pytest.mark.parametrize("name", ["mariner", "kvlcc2-captive"])
 def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: str) -> None:

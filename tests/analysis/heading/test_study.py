@@ -39,6 +39,7 @@ def test_a_ship_that_is_unstable_in_yaw_alone_has_no_growing_effect(card) -> Non
     assert growing_effects(build(card)) == ()
 
 
+@pytest.mark.slow
 def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
     card = linear_card(read_card("mariner"))
     ship = build(card)

@@ -69,6 +69,7 @@ def test_tracks_are_alike_in_every_direction(loop: HeadingLoop) -> None:
     np.testing.assert_allclose(one.error_m, other.error_m, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_current_across_leaves_an_error_that_the_integral_takes_away(loop: HeadingLoop) -> None:
     straight = np.array([[0.0, 0.0], [16000.0, 0.0]])
     current = {"current.speed": 0.5, "current.direction": math.pi / 2}

@@ -63,6 +63,7 @@ def test_top_speed_and_spin_have_the_influence_of_their_closed_forms() -> None:
     assert exact["mass"] == pytest.approx([0, 0], abs=0.01)
 
 
+@pytest.mark.slow
 def test_slopes_of_a_turn_are_its_central_differences() -> None:
     texts = ("advance_m@difference:-200", "steady_diameter_m@difference:-200", "steady_rate_degps@difference:-200")
     study = study_of(read_card("otter"), *texts)

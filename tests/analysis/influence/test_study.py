@@ -126,6 +126,7 @@ def test_slopes_through_the_events_of_manoeuvres_are_those_of_differences(simula
     assert exact[smooth] == pytest.approx(wanted[smooth], rel=1e-4, abs=1e-3 if name == "steering.max_rate" else 1e-5)
 
 
+@pytest.mark.slow
 def test_slopes_do_not_depend_on_where_a_kink_falls_between_the_steps(monkeypatch) -> None:
     """The second overshoot after two reversals of a rudder with a rate limit: half the step gives the same slopes."""
     from dataclasses import replace

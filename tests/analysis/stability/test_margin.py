@@ -58,6 +58,7 @@ def test_sensitivities_are_those_of_finite_differences_of_the_whole_analysis(nam
         assert slope == pytest.approx(difference, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_ship_with_the_neutral_value_is_neutral() -> None:
     found = stability_margin(build(read_card("kvlcc2-captive")))
     assert found.criterion < 0

@@ -40,6 +40,7 @@ def test_the_speeds_of_a_ship_with_a_deep_hump_are_the_roots_of_its_surge_force(
     assert [one.speed_mps for one in found] == pytest.approx([root for root, _ in roots], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_ship_with_two_speeds_goes_at_the_one_it_comes_to() -> None:
     straight = mariner_text(**{name: f"{name} = 0.0" for name in ("Y0", "Y0u", "Y0uu", "N0", "N0u", "N0uu")})
     integrator = Integrator(ship({**HUMP, "engine_lag": {"time_constant_s": 10.0}}, straight))
@@ -57,6 +58,7 @@ def test_stability_marks_a_ship_with_two_speeds_in_its_first_line() -> None:
     assert [one["stable"] for one in result.content()["steady_speeds"]] == [True, False, True]  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_no_bundled_ship_has_two_speeds() -> None:
     cards = [card for card in map(read_card, bundled_cards()) if isinstance(card, ManoeuvringCard)]
     assert len(cards) >= 10

@@ -24,6 +24,7 @@ def test_the_mariner_is_stable_with_the_criterion_computed_by_hand() -> None:
     assert found.stable and all(value.real < 0 for value in found.eigenvalues)
 
 
+@pytest.mark.slow
 def test_reading_the_printed_yaw_terms_as_bare_derivatives_makes_the_stable_mariner_unstable() -> None:
     """The trap: Y_r, N_r, X_vr, X_rr as printed already contain the inertia terms."""
     trapped = stability(build(read_card("mariner", {"model.yaw_rate_terms": "hydrodynamic"})))
@@ -137,6 +138,7 @@ def test_margins_are_what_is_left_to_the_limit(mariner) -> None:
     assert stopping.margin is None and "propulsion" in stopping.remark
 
 
+@pytest.mark.slow
 def test_the_stopping_criterion_is_the_track_reach_of_a_crash_stop() -> None:
     model = build(read_card("esso-osaka-estimated"))
     found = imo_criteria(model)
@@ -167,6 +169,7 @@ def test_a_ship_whose_modes_both_grow_is_not_called_stable() -> None:
     assert not found.stable
 
 
+@pytest.mark.slow
 def test_the_imo_criteria_are_those_of_calm_water(mariner) -> None:
     effect = [{"name": "current", "parameters": {"speed_mps": 0.8, "direction_deg": 40.0}}]
     assert imo_criteria(build(read_card("mariner", {"effects": effect}))) == imo_criteria(mariner)

@@ -121,6 +121,7 @@ def test_a_symmetric_ship_turns_alike_to_both_sides() -> None:
         assert port == pytest.approx(sorted(rate for rate, _ in found.turns_at(rudder)), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_straight_course_of_the_diagram_is_stable_where_the_criterion_says_so(mariner) -> None:
     for model in (mariner, build(read_card("kvlcc2-captive"))):
         found = steady_turning(model)

@@ -111,6 +111,7 @@ def test_a_linear_ship_meets_two_points_in_proportion_and_no_others(mariner_card
         tune_to_two_points(model, levers, WantedTurn(0.2, 0.9 * slope * 0.2), WantedTurn(0.1, slope * 0.1))
 
 
+@pytest.mark.slow
 def test_points_that_no_factors_meet_are_refused_in_one_line() -> None:
     model, levers = _ship("mariner")
     with pytest.raises(InputError, match=r"no hull factor and rudder factor from 0.2 to 5 meet both"):

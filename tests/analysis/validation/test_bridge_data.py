@@ -34,6 +34,7 @@ def bridge(card):
     return bridge_of(card, {"Full sea speed": 84.0, "Half ahead": 75.0})
 
 
+@pytest.mark.slow
 def test_circles_lie_on_their_sides_and_show_the_figures(bridge) -> None:
     starboard, port = bridge.deep
     assert starboard.starboard_m.max() > 900 and port.starboard_m.min() < -900
@@ -80,6 +81,7 @@ def test_the_gear_tells_hard_over_to_hard_over_and_asymmetry_the_neutral_rudder(
     assert bridge.neutral_deg == pytest.approx(-1.1, abs=0.1)  # to port
 
 
+@pytest.mark.slow
 def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
     bare = bridge_of(mariner_card)
     assert bare.telegraph == () and bare.stops == () and bare.stops_from == ()

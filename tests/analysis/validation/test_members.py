@@ -102,6 +102,7 @@ def test_the_standard_error_of_a_figure_is_of_the_whole_covariance(joint: Manoeu
     assert "covariance next to the card (3 numbers, others as if independent)" in found.of_errors
 
 
+@pytest.mark.slow
 def test_influence_and_ensemble_of_a_card_with_a_covariance_say_the_same(joint: ManoeuvringCard) -> None:
     from tank2sim.analysis.ensemble.questions import OfFigures, ShipText
 

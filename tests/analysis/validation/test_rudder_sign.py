@@ -12,6 +12,7 @@ from tank2sim.bundled import bundled_cards
 from tank2sim.cli import main
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ship", "other"), [("mariner", "kvlcc2-captive"), ("kvlcc2-captive", "mariner")])
 def test_compare_and_influence_show_the_rudder_derivatives_of_the_card(ship, other, tmp_path, monkeypatch) -> None:
     stated = tomllib.loads(bundled_cards()[ship].read_text())["derivatives"]

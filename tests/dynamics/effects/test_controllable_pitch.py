@@ -72,6 +72,7 @@ def test_a_polynomial_gains_the_difference_of_the_thrusts_and_nothing_at_its_des
     np.testing.assert_array_equal(added_forces("controllable_pitch", PITCH, designed), 0.0)
 
 
+@pytest.mark.slow
 def test_a_negative_pitch_stops_the_ship_with_the_propeller_turning_ahead() -> None:
     model = ship({"controllable_pitch": PITCH})
     running = Running(Integrator(model), {"propeller.speed": N0, "propeller.pitch": -0.8}, {})

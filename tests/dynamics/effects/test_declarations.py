@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -104,11 +105,16 @@ def test_no_built_in_effect_is_at_fault(effect: Effect) -> None:
     assert sensor_fault_of(effect) == ""
 
 
-def names_quoted(source: str, path: str) -> Iterator[tuple[int, str]]:
-    """Line and text of each string that is the name of an effect, or of the model's variable for its parameter."""
+@cache
+def names_of_effects() -> set[str]:
     variables = {name for effect in EFFECTS.values() for name in effect.model_names().values()}
     inputs = {parameter.input_name for effect in EFFECTS.values() for parameter in effect.parameters}
-    known = set(EFFECTS.builtin) | (variables - inputs)
+    return set(EFFECTS.builtin) | (variables - inputs)
+
+
+def names_quoted(source: str, path: str) -> Iterator[tuple[int, str]]:
+    """Line and text of each string that is the name of an effect, or of the model's variable for its parameter."""
+    known = names_of_effects()
     for node in ast.walk(ast.parse(source, path)):
         if isinstance(node, ast.Constant) and node.value in known:
             yield node.lineno, node.value

@@ -171,6 +171,7 @@ def test_effects_say_what_they_miss_in_a_card() -> None:
         ship({"cubic_yaw_damping": TYPICAL["cubic_yaw_damping"]}, mariner_text(kind='kind = "linear"'))
 
 
+@pytest.mark.slow
 def test_the_linear_model_takes_the_effects_that_it_can() -> None:
     linear = mariner_text(kind='kind = "linear"')
     refused = []

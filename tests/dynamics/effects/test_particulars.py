@@ -21,6 +21,7 @@ BEAM, DRAUGHT = L / 7, L / 17.5
 BLOCK = 0.5 * MASS * L**2 / (BEAM * DRAUGHT)
 
 
+@pytest.mark.slow
 def test_every_effect_that_needs_no_engine_is_on_a_minimal_card() -> None:
     for name in EFFECTS:
         if name not in (

@@ -198,6 +198,7 @@ def test_a_ship_meets_head_waves_oftener_and_following_ones_more_seldom() -> Non
         assert np.abs(series[2] + series[0]) < 0.03 * size < 0.3 * np.abs(series[0] - series[2])
 
 
+@pytest.mark.slow
 def test_seas_of_one_seed_are_alike_and_those_of_another_are_not() -> None:
     model = sea_ship(table(FLAT))
     first, again, other = (

@@ -264,6 +264,7 @@ def test_steady_turns_are_found_to_both_sides_of_the_kink(ship: t2s.Ship) -> Non
     assert turning.growth_per_s[turning.straight - 1] > 0 > turning.growth_per_s[turning.straight + 1]
 
 
+@pytest.mark.slow
 def test_criterion_of_straight_line_stability_is_that_of_the_linear_equivalent(ship: t2s.Ship) -> None:
     """C' of the KVLCC2 on the side of gamma_R_minus: -0.0031 in Prime II."""
     assert ship.stability().to_dict()["margins"]["C_prime"] * (7 / 0.46) ** 2 == pytest.approx(-0.0031, abs=5e-5)

@@ -73,6 +73,7 @@ STILL = ("engine_lag", "propeller_walk", "roll_coupling", "flow_memory", "rudder
 """Effects that do nothing at that instant: revolutions as ordered and ahead, no heel yet, no change of drift yet."""
 
 
+@pytest.mark.slow
 def test_the_fmu_is_the_model(tmp_path: Path) -> None:
     made = t2s.load("kvlcc2-l7-mmg").to_fmu(tmp_path / "mmg.fmu", fmi=2)
     assert made is not None
@@ -105,6 +106,7 @@ def written(ship: t2s.Ship, folder: Path) -> list[Path]:
     return paths
 
 
+@pytest.mark.slow
 def test_coefficients_of_hull_and_rudder_are_found_in_trials(tmp_path: Path) -> None:
     paths = written(ship_of(TEXT), tmp_path)
     free = {"Yv": 0.06, "Yr": 0.02, "Nv": 0.03, "Nr": 0.01, "eps": 0.1, "gamma_R_plus": 0.15}
@@ -162,12 +164,14 @@ def test_a_missing_effect_is_found_on_an_mmg_card(tmp_path: Path) -> None:
     assert effect["name"] == "linear_yaw_damping"
 
 
+@pytest.mark.slow
 def test_reports_describe_the_method_and_keep_bare_hull_and_polynomial_apart(tmp_path: Path) -> None:
     paths = written(ship_of(TEXT), tmp_path)
     page = t2s.validate("kvlcc2-l7-mmg", paths[:1], members=0).page()
     assert "MMG standard method" in page
 
 
+@pytest.mark.slow
 def test_the_two_languages_are_compared_by_their_linear_terms_with_the_rudder(tmp_path: Path) -> None:
     """Of the method they are Yv + Yd gamma_R U/u_R, Yr - m_x' + ..., of a fit near them; mean of both sides."""
     t2s.convert("kvlcc2-l7-mmg").save(tmp_path / "polynomial.toml")
@@ -185,6 +189,7 @@ def test_the_two_languages_are_compared_by_their_linear_terms_with_the_rudder(tm
     assert "Xvr" not in found and "Yvvr" not in found
 
 
+@pytest.mark.slow
 def test_hull_and_rudder_are_scaled_to_turn_through_two_points(tmp_path: Path) -> None:
     wanted = ship_of(TEXT.replace("f_alpha = 2.747", "f_alpha = 2.6")).stability().study.turning
     points = []

@@ -11,6 +11,7 @@ from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.identification.captive.uncertainty_budget import uncertainty_budget
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
+from tests.marks import first_fast
 
 
 def turned(folder, angle_deg, seed=7, stated="", **changes):
@@ -23,7 +24,7 @@ def turned(folder, angle_deg, seed=7, stated="", **changes):
     return reduce_campaign(replace(campaign, runs=runs)), written
 
 
-@pytest.mark.parametrize("angle_deg", [0.4, -0.4])
+@first_fast("angle_deg", [0.4, -0.4])
 def test_a_model_that_is_turned_shows_its_angle_in_both_forces(tmp_path, angle_deg):
     found, _ = turned(tmp_path, angle_deg)
     estimate = found.alignment
@@ -39,6 +40,7 @@ def test_a_model_that_is_turned_shows_its_angle_in_both_forces(tmp_path, angle_d
     assert rows["Y0"].combined == pytest.approx(found.derivatives["Y0"].standard_error)
 
 
+@pytest.mark.slow
 def test_a_stated_alignment_takes_the_place_of_the_one_shown(tmp_path):
     found, _ = turned(tmp_path, 0.4, stated="[uncertainty]\nalignment_deg = 0.5\n")
     assert "alignment" not in found.derivatives["Y0"].type_b
@@ -47,6 +49,7 @@ def test_a_stated_alignment_takes_the_place_of_the_one_shown(tmp_path):
     assert not any("turned by" in sentence for sentence in reduction_findings(found))
 
 
+@pytest.mark.slow
 def test_an_aligned_model_shows_none_and_its_error_is_honest(tmp_path):
     ratios = []
     for seed in range(20, 24):
@@ -57,6 +60,7 @@ def test_an_aligned_model_shows_none_and_its_error_is_honest(tmp_path):
     assert 0.17 < np.std(ratios) < 1.7  # as 98 % of the spreads of 4 normal errors of size 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [7, 8, 9])
 def test_a_single_screw_is_not_taken_for_a_turned_model(tmp_path, seed):
     found, _ = turned(tmp_path, 0.0, seed, asymmetry=True)

@@ -13,6 +13,7 @@ from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
+from tests.marks import first_fast
 
 ACCELERATIONS = ("Yvdot", "Yrdot", "Nvdot", "Nrdot")
 DAMPING = ("Yv", "Nv", "Yr", "Nr")
@@ -28,7 +29,7 @@ def errors_over(found, written, names):
     return [(derivatives[name].value - written.derivatives[name]) / derivatives[name].standard_error for name in names]
 
 
-@pytest.mark.parametrize("delay", [-0.05, 0.01, 0.1])
+@first_fast("delay", [-0.05, 0.01, 0.1])
 def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
     found, written = reduced_with_truth(Campaign(seed=21, rate_hz=10.0, force_delay_s=delay), tmp_path)
     (error,) = found.systematic
@@ -45,6 +46,7 @@ def test_a_delay_is_estimated_within_its_error_and_taken_out(tmp_path, delay):
     assert "CORRECTED" in reduction_findings(found)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [21, pytest.param(22, marks=pytest.mark.slow)])
 def test_a_low_pass_filter_of_the_gauges_is_found_as_its_group_delay(tmp_path, seed):
     """A Butterworth filter of the second order and 2 Hz delays slow signals by sqrt(2)/(2 pi 2 Hz) = 0.1125 s."""
@@ -63,6 +65,7 @@ def test_a_low_pass_filter_of_the_gauges_is_found_as_its_group_delay(tmp_path, s
     assert np.max(np.abs(errors_over(found, written, (*ACCELERATIONS, *DAMPING)))) < 3.0
 
 
+@pytest.mark.slow
 def test_without_a_delay_none_is_corrected_and_its_uncertainty_is_in_the_derivatives(tmp_path):
     found, _ = reduced_with_truth(Campaign(seed=21, rate_hz=10.0), tmp_path)
     assert not found.systematic
@@ -73,6 +76,7 @@ def test_without_a_delay_none_is_corrected_and_its_uncertainty_is_in_the_derivat
         assert derivative.standard_error == pytest.approx(np.sqrt(squares), rel=1e-12), name
 
 
+@pytest.mark.slow
 def test_a_stated_uncertainty_of_the_delay_takes_the_place_of_the_estimated_one(tmp_path):
     written = write(Campaign(seed=21, rate_hz=10.0), tmp_path)
     written.path.write_text(written.path.read_text().replace("[test]", "[uncertainty]\nforce_delay_s = 0.0\n[test]"))
@@ -105,6 +109,7 @@ def with_memory(campaign, written, kinds, share, time_s):
     return replace(campaign, runs=tuple(changed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kinds", "share", "time_s", "seed"),
     [
@@ -131,6 +136,7 @@ def test_oscillations_at_one_frequency_show_no_delay_and_say_what_it_would_do(tm
     assert "10 ms would change Yvdot by" in sentence
 
 
+@pytest.mark.slow
 def test_a_delay_that_sway_alone_shows_is_reported_and_not_corrected(tmp_path):
     """Memory of the flow in sway would look the same."""
     written = write(Campaign(seed=21, rate_hz=10.0, force_delay_s=0.03), tmp_path)

@@ -23,6 +23,7 @@ from tank2sim.identification.captive.type_b import type_b_shifts
 from tank2sim.records.campaigns import read_campaign
 from tests.conftest import ROOT
 from tests.identification.captive.generator import Campaign, write
+from tests.marks import first_fast
 
 QUIET = Campaign(seed=4, noise=0.0, zero_error=0.0, vibration=False, rate_hz=10.0)
 
@@ -44,7 +45,7 @@ def hmri(data):
     return reduce_campaign(read_campaign(data / "data" / "kvlcc2_captive_hmri" / "campaign.toml"))
 
 
-@pytest.mark.parametrize("convention", ["on_model", "on_gauge", "hydrodynamic"])
+@first_fast("convention", ["on_model", "on_gauge", "hydrodynamic"])
 def test_without_noise_every_derivative_is_found_in_every_convention(tmp_path, convention):
     found, written = reduced(replace(QUIET, force_convention=convention, asymmetry=True), tmp_path)
     truth = {name: value for name, value in written.derivatives.items() if value}
@@ -53,6 +54,7 @@ def test_without_noise_every_derivative_is_found_in_every_convention(tmp_path, c
         assert derivative.value == pytest.approx(truth[name], rel=2e-4), name
 
 
+@pytest.mark.slow
 def test_speed_and_rates_that_are_resolved_into_ship_axes(tmp_path):
     axial = ("[test]", '[test]\ninertia_speed = "axial"')
     found, written = reduced(replace(QUIET, surge="resolved"), tmp_path, change=axial)
@@ -60,7 +62,7 @@ def test_speed_and_rates_that_are_resolved_into_ship_axes(tmp_path):
         assert found.derivatives[name].value == pytest.approx(written.derivatives[name], rel=3e-4), name
 
 
-@pytest.mark.parametrize("number", [11, 12])
+@first_fast("number", [11, 12])
 def test_the_campaigns_with_known_truth_are_met_within_three_standard_errors(data, number):
     folder = data / "data"
     truth = json.loads((folder / f"pmm_synthetic_{number}-truth.json").read_text())
@@ -79,6 +81,7 @@ def test_the_campaigns_with_known_truth_are_met_within_three_standard_errors(dat
     assert card.yaw_inertia == pytest.approx(truth["yaw_inertia"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_standard_errors_hold_the_zero_errors_of_the_runs(data):
     """Ordinary least squares over the samples would state the error of Yd several times too small."""
     found = reduce_campaign(read_campaign(data / "data" / "pmm_synthetic_12" / "campaign.toml"))
@@ -137,6 +140,7 @@ def reasons(reduction):
     return {choice.name: choice.reason for f in reduction.forces.values() for choice in f.selection.choices}
 
 
+@pytest.mark.slow
 def test_terms_of_small_angles_are_left_out_with_the_reason_unless_asked_for(tmp_path):
     found, _ = reduced(Campaign(seed=4, size="linear", rate_hz=10.0), tmp_path)
     left_out = {name for name, reason in reasons(found).items() if reason == "not determined"}
@@ -154,6 +158,7 @@ def test_a_term_that_does_not_differ_from_zero_is_kept_with_its_error(noisy):
     assert {"Yddd", "Nddd", "Yvvv", "Nvvv", "Yrrr", "Nrrr", "Yvdd", "Nvdd"} <= excited
 
 
+@pytest.mark.slow
 def test_which_terms_are_kept_does_not_depend_on_the_noise(noisy, tmp_path):
     """At three times the noise Nddd is at 2.3 standard errors or less in some campaigns; the tests are the same."""
     for seed in (4, 5, 6):
@@ -161,6 +166,7 @@ def test_which_terms_are_kept_does_not_depend_on_the_noise(noisy, tmp_path):
         assert set(loud.derivatives) == set(noisy.derivatives)
 
 
+@pytest.mark.slow
 def test_asymmetry_of_a_single_screw_is_found(tmp_path):
     found, written = reduced(Campaign(seed=4, rate_hz=10.0, asymmetry=True), tmp_path)
     for name in ("Y0", "N0"):
@@ -189,6 +195,7 @@ def test_symmetry_is_tested_when_asked_for(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_fast_oscillations_are_flagged_and_left_out_unless_asked_for(tmp_path):
     campaign = replace(QUIET, frequency_parameters=(0.04, 0.08, 0.12))
     found, written = reduced(campaign, tmp_path)
@@ -201,6 +208,7 @@ def test_fast_oscillations_are_flagged_and_left_out_unless_asked_for(tmp_path):
     assert len(kept.runs) == len(written.runs)
 
 
+@pytest.mark.slow
 def test_a_trend_with_frequency_is_found_and_the_value_is_that_at_zero_frequency(tmp_path):
     written = write(replace(QUIET, noise=1.0, zero_error=1.0), tmp_path)
     campaign = read_campaign(written.path)
@@ -251,6 +259,7 @@ def test_repeated_runs_tell_what_one_is_worth(noisy):
     assert found.deviation["Y"] * float(campaign.scales.force) >= 1.0
 
 
+@pytest.mark.slow
 def test_type_b_errors_are_carried_through(tmp_path):
     stated = "[test]", "[uncertainty]\ncalibration_relative = 0.01\nalignment_deg = 0.1\nmass_relative = 0.001\n[test]"
     found, _ = reduced(QUIET, tmp_path, change=stated)
@@ -370,6 +379,7 @@ def test_harmonics_are_reported_without_dimension(noisy, name):
         assert 0.1 * white < mean["standard_error"] < 10 * white
 
 
+@pytest.mark.slow
 def test_the_scatter_within_tests_is_that_of_the_noise_in_any_order_of_the_runs(tmp_path):
     """All drift runs are static or with rudder: a linear term of each of the two kinds is one column too many."""
     script = ROOT / "docs" / "examples" / "make_campaign.py"

@@ -91,6 +91,7 @@ def test_a_yaw_rate_in_degrees_read_as_radians_is_refused(tmp_path):
         reduced(path)
 
 
+@pytest.mark.slow
 def test_a_yaw_rate_of_the_other_sign_is_in_the_first_lines(tmp_path):
     path = write_arm(tmp_path, TRUTH)
     rows = list(csv.DictReader((tmp_path / "runs.csv").open()))
@@ -102,6 +103,7 @@ def test_a_yaw_rate_of_the_other_sign_is_in_the_first_lines(tmp_path):
     assert not any("Nr" in line for line in t2s.reduce(write_arm(tmp_path, TRUTH)).headline)
 
 
+@pytest.mark.slow
 def test_tests_at_a_heel_give_the_terms_of_the_heel_and_leave_the_others(tmp_path):
     result = t2s.reduce(write_arm(tmp_path, TRUTH | HEEL, noise=1e-4))
     for name, value in (TRUTH | HEEL).items():

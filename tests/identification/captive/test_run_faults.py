@@ -13,6 +13,7 @@ from tank2sim.identification.captive.reduction import ReductionOptions, reduce_c
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import NOISE_SHARE, Campaign, write
+from tests.marks import first_fast
 
 CASES = {
     "saturated": ("sway_02", "gauge Y: is constant at its .* saturated"),
@@ -59,6 +60,7 @@ def test_a_fault_is_reported_with_the_name_of_its_run(tmp_path, fault, name, mes
     assert "--keep-going" in str(error.value)
 
 
+@pytest.mark.slow
 def test_the_rest_is_reduced_when_asked_to_go_on(tmp_path):
     faults = {name: fault for fault, (name, _) in CASES.items()}
     written = write(Campaign(seed=2, rate_hz=10.0, faults=faults), tmp_path)
@@ -106,8 +108,8 @@ def changed(campaign, name, **columns):
     return replace(campaign, runs=tuple(runs))
 
 
-@pytest.mark.parametrize(
-    ("name", "column", "change", "message"),
+@first_fast(
+    "name, column, change, message",
     [
         ("sway_01", "Y_N", lambda run: 0 * run.Y_N, "gauge Y: reads 0 while the model oscillates .* dead"),
         pytest.param(
@@ -142,7 +144,7 @@ def test_one_bad_run_among_sound_ones_is_reported_and_left_out(sound, without, n
     assert {n: d.value for n, d in rest.derivatives.items()} == {n: d.value for n, d in alone.derivatives.items()}
 
 
-@pytest.mark.parametrize(
+@first_fast(
     "seed",
     [
         *(30, 31),
@@ -163,6 +165,7 @@ def test_no_run_of_a_sound_campaign_is_at_fault(tmp_path, seed):
     assert not reduce_campaign(read_campaign(path)).faults
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times_noise", [1.0, 2.0, 4.0])
 def test_coarse_gauges_are_not_saturated_or_dead(tmp_path, times_noise):
     written = write(Campaign(seed=5), tmp_path)

@@ -33,6 +33,7 @@ def dense(equations, noise: float, zeros: np.ndarray) -> float:
     return float(np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(normal)[1] + squares)
 
 
+@pytest.mark.slow
 def test_the_likelihood_is_that_of_the_dense_covariance(equations):
     random = np.random.default_rng(0)
     usual = float(np.median([root[0, 0] for root in equations.roots])) ** 2

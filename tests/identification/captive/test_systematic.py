@@ -11,6 +11,7 @@ from tank2sim.identification.captive.findings import implausible, reduction_find
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
+from tests.marks import first_fast
 
 SOUND = Campaign(seed=7, rate_hz=10.0)
 
@@ -36,7 +37,7 @@ def ratios(reduction, written, names):
     return {name: (found[name].value - written.derivatives[name]) / found[name].standard_error for name in names}
 
 
-@pytest.mark.parametrize(("delay", "convention"), [(0.03, "on_model"), (0.15, "on_gauge"), (-0.05, "on_model")])
+@first_fast("delay, convention", [(0.03, "on_model"), (0.15, "on_gauge"), (-0.05, "on_model")])
 def test_a_delay_of_the_forces_is_estimated_and_reported_first(tmp_path, delay, convention):
     campaign = replace(SOUND, force_delay_s=delay, force_convention=convention)
     found, written = reduced(campaign, tmp_path)
@@ -51,6 +52,7 @@ def test_a_delay_of_the_forces_is_estimated_and_reported_first(tmp_path, delay, 
     assert 0 < found.derivatives["Yrdot"].type_b["force_delay"] < found.derivatives["Yrdot"].type_a
 
 
+@pytest.mark.slow
 def test_the_key_of_the_campaign_takes_the_delay_out(tmp_path, sound):
     campaign = replace(SOUND, force_delay_s=0.03)
     found, written = reduced(campaign, tmp_path, ("[test]", "[test]\nforce_delay_s = 0.03"))
@@ -70,6 +72,7 @@ def campaign_mass(reduction):
     return reduction.campaign.model.mass_kg / float(reduction.campaign.scales.mass)
 
 
+@pytest.mark.slow
 def test_a_force_that_depends_on_the_frequency_is_no_delay(tmp_path):
     """A memory of the flow acts on sway alone: it is a trend, as before."""
     written = write(SOUND, tmp_path)
@@ -94,8 +97,8 @@ def test_a_campaign_of_one_frequency_says_that_it_cannot_show_a_delay(tmp_path, 
     assert not any("whether the forces lag the motion" in sentence for sentence in reduction_findings(sound[0]))
 
 
-@pytest.mark.parametrize(
-    ("kind", "force"),
+@first_fast(
+    "kind, force",
     [
         *(("static_drift", "Y"), ("pure_sway", "N"), ("pure_yaw", "Y"), ("yaw_with_drift", "N")),
         *(pytest.param(*one, marks=pytest.mark.slow) for one in (("static_drift", "N"), ("pure_sway", "Y"))),
@@ -117,6 +120,7 @@ def test_a_gauge_that_errs_in_one_kind_of_run_is_named(sound, kind, force):
     assert max(map(abs, wrong.values())) < 3.0, wrong
 
 
+@pytest.mark.slow
 def test_two_kinds_of_run_that_contradict_each_other_are_both_named(sound):
     """Rudder angles were tested with and without drift alone: either may err."""
     campaign = sound[0].campaign
@@ -133,6 +137,7 @@ def test_kinds_of_run_that_no_other_can_check_are_named(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_gains_that_differ_from_run_to_run_are_in_the_standard_errors(tmp_path, sound):
     found, _ = reduced(replace(SOUND, gain_error=0.005), tmp_path)
     for force in "YN":
@@ -141,7 +146,7 @@ def test_gains_that_differ_from_run_to_run_are_in_the_standard_errors(tmp_path, 
     assert found.derivatives["Yvdot"].standard_error > 2 * sound[0].derivatives["Yvdot"].standard_error
 
 
-@pytest.mark.parametrize(
+@first_fast(
     "seed",
     [
         *(30, 31),
@@ -162,6 +167,7 @@ def test_sound_campaigns_show_no_systematic_error(tmp_path, seed):
     assert implausible(found) == ()
 
 
+@pytest.mark.slow
 def test_measured_campaigns_show_no_systematic_error(data):
     for name in ("pmm_synthetic_11", "pmm_synthetic_12", "kvlcc2_captive_hmri"):
         assert implausible(reduce_campaign(read_campaign(data / "data" / name / "campaign.toml"))) == (), name
@@ -205,7 +211,7 @@ def test_a_mass_of_1_kg_is_refused_without_beam_and_draught_too(tmp_path):
     assert error.value.place == "model.mass_kg"
 
 
-@pytest.mark.parametrize("seed", range(2))
+@first_fast("seed", range(2))
 def test_half_the_mass_is_reported_first(tmp_path, seed):
     written = write(Campaign(seed=seed, size="linear", rate_hz=5.0), tmp_path)
     for mass in (written.ship.mass_kg, 0.5 * written.ship.mass_kg):
@@ -218,6 +224,7 @@ def test_half_the_mass_is_reported_first(tmp_path, seed):
     assert any("added mass" in sentence for sentence in messages)
 
 
+@pytest.mark.slow
 def test_a_resistance_that_pushes_the_model_ahead_is_refused(sound):
     campaign = sound[0].campaign
     turned = replace(campaign, runs=tuple(replace(run, X_N=-run.X_N) for run in campaign.runs))

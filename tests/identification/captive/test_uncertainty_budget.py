@@ -103,6 +103,7 @@ def test_each_stated_error_is_at_its_source(stated):
     assert rows["Yd"].parts["speed"] == pytest.approx(0.002 * abs(rows["Yd"].value), rel=0.05)
 
 
+@pytest.mark.slow
 def test_more_noise_is_in_the_random_part_and_more_zero_error_in_repeatability(tmp_path, sound):
     _, quiet = sound
     _, loud = budget_of(replace(SOUND, noise=5.0), tmp_path / "loud")

@@ -52,6 +52,7 @@ def test_without_noise_the_coefficients_are_those_of_the_tank(tmp_path) -> None:
 
 
 # The bounds of few campaigns are wider, as chance makes them.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seeds", "least", "most"), [(6, 0.87, 1.0), pytest.param(SEEDS, 0.90, 0.98, marks=pytest.mark.slow)]
 )
@@ -166,6 +167,7 @@ def test_a_campaign_that_lacks_what_the_method_needs_is_refused(tmp_path, old, n
         t2s.reduce_to_mmg(path)
 
 
+@pytest.mark.slow
 def test_a_coefficient_at_the_limit_of_the_search_marks_the_result(tmp_path) -> None:
     fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
     assert fit.at_limit == () and MmgReductionResult(fit).marks == ()
@@ -216,6 +218,7 @@ def test_columns_of_another_sign_or_unit_are_refused_by_their_names(tmp_path, co
     assert fault.value.source == str(path)
 
 
+@pytest.mark.slow
 def test_points_of_the_open_water_curve_have_a_row_and_mark_a_result_that_they_doubt(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
     sound = t2s.reduce_to_mmg(path)
@@ -261,6 +264,7 @@ def test_a_hull_whose_derivatives_no_ship_has_marks_the_result(tmp_path) -> None
         assert any(f" {name} is" in mark for mark in marks), name
 
 
+@pytest.mark.slow
 def test_the_polynomial_warns_of_a_yaw_rate_in_another_unit(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
     assert not t2s.reduce(path).headline
@@ -281,6 +285,7 @@ def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(
     assert found.derivatives["Nr"].value == pytest.approx(slope, rel=0.15)
 
 
+@pytest.mark.slow
 def test_the_command_writes_card_page_and_json(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
     options = ("--model", "mmg", "-o", "ship.toml", "--page", "p.html", "--json", "r.json")
@@ -303,6 +308,7 @@ def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> No
     assert found["Nv"].value == pytest.approx(-0.137, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on_model", [False, True])
 def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path, on_model) -> None:
     path = write_campaign(tmp_path, KVLCC2, seed=4)
@@ -370,6 +376,7 @@ def test_parts_of_the_uncertainty_add_up_and_each_has_its_own_effect(tmp_path) -
     assert any("scatter alone" in notice for notice in plain.notices)
 
 
+@pytest.mark.slow
 def test_torque_gives_the_relative_rotative_efficiency_and_leaves_the_ship_as_it_is(tmp_path) -> None:
     truth = of_the_estimate(tmp_path)
     found = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-5, torque=True)).coefficients
@@ -406,7 +413,7 @@ def test_standard_errors_with_torque_cover_the_truth_as_often_as_they_say(tmp_pa
     [
         ("K_Q_factor = 0.1", "", "open_water.K_Q: is .*K_Q_factor"),
         ('K_Q = "10K_Q"', "", "open_water.K_Q: is missing"),
-        ('torque = "Q"', 'torque = "T"', "Q: the MMG method leaves"),
+        pytest.param('torque = "Q"', 'torque = "T"', "Q: the MMG method leaves", marks=pytest.mark.slow),
     ],
 )
 def test_torque_in_another_unit_sign_or_without_its_curve_is_refused(tmp_path, old, new, words) -> None:
@@ -425,6 +432,7 @@ def test_a_torque_of_the_other_sign_is_refused(tmp_path) -> None:
         t2s.reduce_to_mmg(path)
 
 
+@pytest.mark.slow
 def test_blockage_of_the_tank_is_named_until_it_is_stated(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
     tank = "[tank]\nlength_m = 200.0\nbreadth_m = 10.0\ndepth_m = 5.0\n"
@@ -474,6 +482,7 @@ def test_two_propellers_without_what_the_method_needs_are_refused(tmp_path, old,
         t2s.reduce_to_mmg(path)
 
 
+@pytest.mark.slow
 def test_sides_that_are_exchanged_do_not_pass_for_the_ship(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2, y=0.05)
     right = t2s.reduce_to_mmg(path)

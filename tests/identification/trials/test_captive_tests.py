@@ -44,6 +44,7 @@ def solved(tests, model, start):
     return dict(zip(start, np.array(list(start.values())) + step, strict=True))
 
 
+@pytest.mark.slow
 def test_the_derivatives_that_made_the_forces_come_back_at_another_scale(posed):
     _, truth, card, model, tests, free = posed
     found = solved(tests, model, {name: 0.5 * card.derivatives[name.partition(".")[2]] for name in free})

@@ -102,6 +102,7 @@ def test_standard_errors_hold_under_sensor_noise():
     assert 0.7 < np.sqrt(np.mean(np.square(off))) < 1.4
 
 
+@pytest.mark.slow
 def test_standard_errors_hold_under_gentle_coloured_forces():
     """Two percent of the rudder's force; stronger ones move the ship with themselves, and pull Nv, Nr, Nd down."""
     off = []
@@ -187,6 +188,7 @@ def test_progress_may_stop_it(noisy):
         equation_error(problem(noisy), progress=stop)
 
 
+@pytest.mark.slow
 def test_seven_runs_take_a_second_or_two():
     asked = problem([trial(zigzag(20), duration=100.0)])
     equation_error(asked)  # compiles

@@ -60,6 +60,7 @@ def test_filter_and_smoother_are_those_of_dense_gaussian_algebra():
     np.testing.assert_allclose(errors.ravel(), spread, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
     problem = pushed[0][0]
     run = problem.runs[0]
@@ -90,18 +91,22 @@ def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
         np.testing.assert_allclose(J[0, ..., place], slope, atol=1e-5 * np.abs(slope).max())
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_intervals_contain_the_truth_as_often_as_they_say(pushed):
     scaled = np.array([(found.values - VALUES) / found.standard_errors for _, _, found in pushed])
     assert 0.85 <= np.mean(np.abs(scaled) < 1.96) <= 1.0
     assert 0.6 < np.sqrt(np.mean(scaled**2)) < 1.3  # neither far too narrow nor far too wide
 
 
+@pytest.mark.slow
 def test_estimates_are_far_better_than_the_prior(pushed):
     away = np.array([(found.values - VALUES) / abs(VALUES) for _, _, found in pushed])
     assert np.all(np.abs(away.mean(axis=0)) < 0.12)  # the prior's mean is 25 % off
     assert np.all(np.abs(away[:, list(TRUTH).index("Nd")]) < 0.08)
 
 
+@pytest.mark.slow
 def test_information_is_what_the_trials_alone_say_whatever_the_prior(pushed):
     problem, _, wide = pushed[0]
     alone = np.sqrt(np.diag(np.linalg.inv(wide.information)))
@@ -110,6 +115,8 @@ def test_information_is_what_the_trials_alone_say_whatever_the_prior(pushed):
     np.testing.assert_allclose(np.diag(tight.information), np.diag(wide.information), rtol=0.1)
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_noise_levels_are_found(pushed):
     process = np.array([[one.deviation for one in found.process_noise.values()] for *_, found in pushed])
     times = np.array([[one.time_s for one in found.process_noise.values()] for *_, found in pushed])
@@ -120,6 +127,8 @@ def test_noise_levels_are_found(pushed):
     np.testing.assert_allclose(times.mean(axis=0), TIME, rtol=0.3)
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_smoothed_accelerations_are_those_that_pushed_the_ship(pushed):
     _, forces, found = pushed[0]
     for true, one in zip(forces, found.smoothed, strict=True):
@@ -129,6 +138,8 @@ def test_smoothed_accelerations_are_those_that_pushed_the_ship(pushed):
         assert np.all(np.abs(np.sqrt(np.mean(scaled**2, axis=0)) - 1) < 0.35)
 
 
+@pytest.mark.essential
+@pytest.mark.slow
 def test_innovations_are_white(pushed):
     for one in pushed[0][2].smoothed:
         np.testing.assert_allclose(np.std(one.innovations, axis=0), 1.0, atol=0.2)
@@ -146,6 +157,7 @@ def test_without_process_noise_it_is_output_error():
         assert found.process_noise[name].deviation < 0.05 * push
 
 
+@pytest.mark.slow
 def test_what_was_not_measured_is_skipped(pushed):
     problem, _, whole = pushed[1]
     runs = []
@@ -162,6 +174,7 @@ def test_what_was_not_measured_is_skipped(pushed):
     assert np.isfinite(found.smoothed[0].states).all()
 
 
+@pytest.mark.slow
 def test_a_run_says_the_same_next_to_a_longer_one(pushed):
     problem = pushed[0][0]
     long, short = problem.runs[0], problem.runs[1].part(0, 60)
@@ -172,6 +185,7 @@ def test_a_run_says_the_same_next_to_a_longer_one(pushed):
     assert together.cost == pytest.approx(sum(one.cost for one in apart), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_white_process_noise_has_no_time_constant(pushed):
     found = kalman(pushed[0][0], settings=KalmanSettings(white=True))
     assert [one.time_s for one in found.process_noise.values()] == [0.0, 0.0, 0.0]
@@ -179,6 +193,7 @@ def test_white_process_noise_has_no_time_constant(pushed):
     assert np.all(np.abs(found.values - VALUES) < 4 * found.standard_errors)
 
 
+@pytest.mark.slow
 def test_the_drift_of_a_sensor_is_found():
     problem, _ = pushed_problem(5)
     rng, size, time_s = np.random.default_rng(5), 0.02, 20.0
@@ -199,6 +214,7 @@ def test_the_drift_of_a_sensor_is_found():
     assert np.all(np.abs(found.values - VALUES) < 3.5 * found.standard_errors)
 
 
+@pytest.mark.slow
 def test_each_iteration_is_better_and_is_reported(pushed):
     reported = []
     problem: Problem = pushed[0][0]
@@ -208,6 +224,7 @@ def test_each_iteration_is_better_and_is_reported(pushed):
     np.testing.assert_allclose((found.values - pushed[0][2].values) / found.standard_errors, 0, atol=0.2)
 
 
+@pytest.mark.slow
 def test_it_can_be_stopped(pushed):
     def stop(*_):
         raise KeyboardInterrupt

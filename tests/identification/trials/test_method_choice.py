@@ -49,6 +49,7 @@ def chosen(card: ManoeuvringCard, group, **options):
     return identify_trials(card, given, options=IdentificationOptions(members=0, structure="card", **options))
 
 
+@pytest.mark.slow
 def test_trials_of_a_basin_stay_with_output_error_and_the_result_says_why(card) -> None:
     result = chosen(card, trials(gusty=True))
     assert result.estimate.method == "output_error" and result.current is None

@@ -112,6 +112,7 @@ def test_a_portable_problem_is_the_same_problem(asked):
     pickle.loads(pickle.dumps((ESTIMATOR, yaw_rate_error)))
 
 
+@pytest.mark.slow
 def test_the_yaw_rate_is_followed_by_the_true_ship_and_less_by_another(asked):
     truth = np.array([-0.014, -0.0032, -0.0022, 0.0015])
     estimate = replace(ESTIMATOR(asked), values=truth)

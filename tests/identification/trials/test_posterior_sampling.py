@@ -126,6 +126,7 @@ def test_the_seed_fixes_the_samples(quiet, few) -> None:
     assert not np.array_equal(few.values, sample_posterior(*quiet, draws=10, seed=8).values)
 
 
+@pytest.mark.slow
 def test_few_draws_are_marked(few) -> None:
     assert not few.converged
     assert few.effective.min() < 400 or few.r_hat.max() > LARGEST_R_HAT

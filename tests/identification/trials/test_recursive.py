@@ -50,6 +50,7 @@ def test_path_begins_near_the_prior_and_narrows(problem, found):
     assert np.mean(np.abs(scaled) < 1.96) > 0.8  # at all times, not only at the end
 
 
+@pytest.mark.slow
 def test_what_the_trials_do_not_show_does_not_settle():
     rng = np.random.default_rng(8)
     small = tuple(trial(rng, orders(200, 0.03, 80.0), 0.1 * PUSH, NOISE)[0] for _ in range(3))
@@ -59,6 +60,7 @@ def test_what_the_trials_do_not_show_does_not_settle():
     assert settled["Nd"] < 0.75 * 603
 
 
+@pytest.mark.slow
 def test_forgetting_widens_and_follows_the_last_run(problem, found):
     forgetful = recursive(problem, settings=RecursiveSettings(forgetting=0.8))
     assert np.all(forgetful.standard_errors > found.standard_errors)
@@ -76,6 +78,7 @@ def test_a_slower_gain_forgets_the_beginning():
     assert 1 / total == pytest.approx(30**-0.7)
 
 
+@pytest.mark.slow
 def test_progress_is_reported_and_can_stop(problem):
     reported = []
     recursive(

@@ -39,6 +39,7 @@ from tests.identification.trials.made_up_ship import (
     turn,
     zigzag,
 )
+from tests.marks import first_fast
 
 EXACT = np.array([TRUTH[name] for name in ESTIMATED])
 UNITS = 0.5 * DENSITY * LENGTH**2 * SPEED**2 * np.array([1, 1, LENGTH])
@@ -53,7 +54,7 @@ def known(error: float = 0.0, names=("Nd",)) -> Estimate:
     return Estimate("made_up", free, values, covariance, np.eye(len(names)))
 
 
-@pytest.mark.parametrize("correlation_s", [4.0, 15.0])
+@first_fast("correlation_s", [4.0, 15.0])
 def test_forces_of_trials_are_found(correlation_s):
     deviations = np.array([2e-5, 8e-5, 2e-5])
     trials = [
@@ -152,6 +153,7 @@ def test_a_ship_that_always_runs_away_is_reported():
         bands(SHIP, wild, Turn(0.35), settings=PredictionSettings(members=2))
 
 
+@pytest.mark.slow
 def test_bootstrap_scatters_as_the_standard_errors_say():
     card = parse_card(CARD, "made_up.toml")
     trials = [trial(zigzag(20), name="zigzag", seed=1, duration=200.0), trial(turn(-30), seed=2, duration=200.0)]

@@ -32,6 +32,7 @@ def off_card(model: str = "") -> ManoeuvringCard:
     return card
 
 
+@pytest.mark.slow
 def test_a_turn_slower_than_the_trials_fitted_ends_where_the_ship_does() -> None:
     """The made-up ship's equations are its polynomial at all speeds."""
     fitted = trial(zigzag(15, 45.0), name="fitted", duration=220.0, step=0.5, noise=0.0)
@@ -54,6 +55,7 @@ def test_a_turn_slower_than_the_trials_fitted_ends_where_the_ship_does() -> None
     assert parse_card(card.text, "again.toml").model == card.model
 
 
+@pytest.mark.slow
 def test_the_range_is_written_in_the_units_of_the_card() -> None:
     """Whatever its comments speak of."""
     turned = trial(turn(30), name="turned", duration=220.0, step=0.5, noise=0.0)

@@ -136,6 +136,7 @@ def test_a_card_with_a_byte_order_mark_is_restructured_like_any_other(kvlcc2: Ma
     assert found.derivatives == plain.derivatives and found.effects == plain.effects
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ship", "start", "expected"), [("mariner", "mariner", "card"), ("kvlcc2", "kvlcc2-captive", "cross_flow")]
 )
@@ -150,6 +151,7 @@ def test_evidence_takes_the_terms_that_made_the_trials(ship: str, start: str, ex
     assert structure == expected and bool(notices) == (expected == "cross_flow")
 
 
+@pytest.mark.slow
 def test_structures_that_noise_hides_are_marked_unless_a_hard_turn_is_held_out(tmp_path: Path) -> None:
     """In a zigzag with much noise the hull might be either, and the two turn differently with hard rudder."""
     card = read_card("mariner")

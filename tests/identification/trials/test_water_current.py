@@ -54,6 +54,7 @@ def card() -> ManoeuvringCard:
     return read
 
 
+@pytest.mark.slow
 def test_current_and_coefficients_are_found_without_a_speed_through_the_water(trials, card) -> None:
     posed = problem(trials, free=FREE, seen=SEEN)
     truth = np.array([TRUTH[name] for name in FREE])
@@ -79,6 +80,7 @@ def test_elimination_leaves_the_information_of_a_marginal_normal(trials, card) -
     assert joint.free[-2:] == CURRENT_PARAMETERS
 
 
+@pytest.mark.slow
 def test_a_straight_run_does_not_determine_it(card) -> None:
     straight = [drifted(trial(lambda t: 0.0, name="straight", duration=200.0))]
     posed = problem(straight, free=("Xu", "X0"), seen=SEEN)

@@ -299,6 +299,7 @@ def test_seldom_rows_bias_neither_method_and_their_errors_cover_the_truth(water,
         assert errors[:, 1].max() < 0.1 * 0.0504
 
 
+@pytest.mark.slow
 def test_errors_of_the_rate_are_not_taken_for_motion(water):
     # Plain least squares, without the programme for instruments, come out 2 % low here.
     found = [identify_yaw([sampled(water, 4, seed, pulses=1000)]) for seed in range(8)]
@@ -359,6 +360,7 @@ def test_the_missing_part_of_the_programme_is_named(folder, columns):
     assert not read.stated and any("does not state rise_s of" in note for note in read.notes)
 
 
+@pytest.mark.slow
 def test_errors_of_j_and_of_k_t_count_once(water, folder):
     air = read_yaw_record(written(folder / "dry.csv", AIR, medium="air", torque_constant_NmpA=None))
     options = YawOptions(torque_constant_NmpA=0.051, torque_constant_error=0.1)
