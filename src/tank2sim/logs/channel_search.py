@@ -10,7 +10,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.logs.channels import SURE_FROM, USED_FROM, ChannelSet, LogChannel
-from tank2sim.logs.clock import usual_step
+from tank2sim.logs.clock import usual_step, utc_text
 from tank2sim.logs.content import (
     AGREES,
     DIFFERS,
@@ -28,9 +28,10 @@ from tank2sim.logs.content import (
 )
 from tank2sim.logs.delays import rate_delay
 from tank2sim.logs.pulses import PulseScale, pulses_of
-from tank2sim.logs.quantities import QUANTITIES, names_another, plain_words, sign_of_name
+from tank2sim.logs.quantities import QUANTITIES, names_another, names_thrust, plain_words, sign_of_name
 from tank2sim.logs.reference import (
     HEADING_WINDOW_S,
+    LEAST_SPEED_MPS,
     POSITION_WINDOW_S,
     ReferenceMotion,
     differenced,
@@ -77,6 +78,10 @@ _HOLDS, _MOVES = 0.5, 0.2
 _DOUBTED = 0.85
 """Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
 
+_ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
+"""Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
+Project choice: beyond what a current or a coasting propeller does."""
+
 _MUCH_LESS = 0.7
 """Ratio of deviations from which the lesser one decides (project choice)."""
 
@@ -109,6 +114,7 @@ def find_channels(streams: Iterable[LogStream]) -> ChannelSet:
     search.steering()
     search.thrusters()
     search.others()
+    search.lost_signs()
     return search.result()
 
 
@@ -620,9 +626,9 @@ class _Search:
             stream
             for stream in self.streams
             if not stream.quantity
-            and stream.unit == "1"
+            and (stream.unit == "1" or (not stream.unit and names_thrust(stream.name)))
             and np.ptp(stream.values) > 0.1
-            and np.nanmax(stream.values) < 2
+            and np.nanmax(np.abs(stream.values)) < 2
         ]
         if len(orders) != 2:
             return
@@ -694,6 +700,25 @@ class _Search:
             why = f"{channel.why}; full order is {rpm:.4g} rpm by the measured revolutions"
             confidence = max(channel.confidence, 0.9)
             self.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
+
+    def lost_signs(self) -> None:
+        """Report revolutions that stay ahead while the vessel goes astern: many engines count without a sign."""
+        heading = self._best("heading")
+        if heading is None or heading.confidence < SURE_FROM:
+            return
+        at, motion = self.motion.time_s, self.motion
+        angle = self._heading_at(at)
+        ahead = motion.v_north_mps * np.cos(angle) + motion.v_east_mps * np.sin(angle)
+        fast = _ASTERN_SHARE * float(np.percentile(motion.speed_mps, 95)) if len(at) else 0.0
+        for stream in self.named("rpm", "rpm_port", "rpm_starboard"):
+            values = interpolated(at, stream.time_s, stream.values, 10.0)
+            turning = values > _ASTERN_SHARE * float(np.percentile(stream.values, 95))
+            astern = (ahead < -max(fast, LEAST_SPEED_MPS)) & turning & (stream.values.min() >= 0)
+            if astern.sum() * usual_step(at) > _ASTERN_S:
+                text = (
+                    f"stays ahead while the vessel goes astern ({utc_text(at[np.argmax(astern)])}): its sign is lost, "
+                )
+                self.fault(stream, f"{text}or the pitch is astern; leave out the trials that go astern")
 
     # The result -------------------------------------------------------------------------------------------------
 

@@ -35,6 +35,13 @@ _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 """Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
 
+_DAYS = ((36_526.0, 51_544.0, 25_569.0), (730_486.0, 745_504.0, 719_529.0))
+"""Days of the years 2000 to 2040, and the day of 1970-01-01: of spreadsheets since 1899-12-30, of MATLAB (datenum)."""
+
+_LONGEST_IN_DAYS = 31.0
+"""Longest log whose times are taken for days. Project choice: seconds of so large a number count from a beginning, and
+then differ by more."""
+
 _HEAD_BYTES = 1 << 16
 """Bytes by which separator, decimal sign and units are judged. Project choice: some hundred rows."""
 
@@ -145,10 +152,9 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
             values = column.to_numpy(dtype=float)
-            size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
-            for least, largest, factor in _EPOCHS:
-                if least <= size <= largest:
-                    return values * factor, True, {name, *dates}
+            seconds = _epoch_seconds(name, values, findings)
+            if seconds is not None:
+                return seconds, True, {name, *dates}
             continue
         first = _first_cell(column)
         offset = _zone_s(name, findings)
@@ -162,8 +168,12 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
             return _seconds(_dates(path, name, column), offset), True, {name}
         if dates and re.match(r"\d{1,2}:\d\d", first):
             days = _seconds(_dates(path, dates[0], frame[dates[0]]), offset)
-            clock = pd.to_timedelta(_clock_text(column), errors="coerce").dt.total_seconds().to_numpy(dtype=float)
-            return days + clock, True, {name, dates[0]}
+            return days + _clock(column), True, {name, dates[0]}
+    for name in [*named, *clocks]:
+        if re.match(r"\d{1,2}:\d\d", _first_cell(frame[name])):
+            text = f"{name} has times of day without a date: the trials have no date"
+            findings.append(LogFinding("note", text, name))
+            return _over_midnight(_clock(frame[name])), False, {name}
     for name in named or list(frame.columns[:1]):
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
@@ -175,6 +185,18 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
                 return values * _relative_scale(name, values), False, {name}
     remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
     raise InputError(path, "header", "there is no column of time", remedy)
+
+
+def _epoch_seconds(name: str, values: Array, findings: list[LogFinding]) -> Array | None:
+    """Seconds (rows,) since 1970 of numbers that count s, ms, us or ns since then, or days; None if they do not."""
+    size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
+    for least, largest, factor in _EPOCHS:
+        if least <= size <= largest:
+            return values * factor
+    for least, largest, day in _DAYS:
+        if least <= size <= largest and np.nanmax(values) - np.nanmin(values) < _LONGEST_IN_DAYS:
+            return (values - day) * 86400 - _zone_s(name, findings)
+    return None
 
 
 def _as_numbers(column: pd.Series[Any]) -> pd.Series[Any]:
@@ -211,9 +233,22 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()).strip()
 
 
-def _clock_text(column: pd.Series[Any]) -> pd.Series[Any]:
-    text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
-    return text.where(text.str.count(":") > 1, text + ":00")
+def _clock(column: pd.Series[Any]) -> Array:
+    """Seconds (rows,) of times of day, of which some may end with AM or PM."""
+    import pandas as pd
+
+    text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
+    text = text.where(text.str.count(":") > 1, text + ":00")
+    return pd.to_timedelta(text, errors="coerce").dt.total_seconds().to_numpy(dtype=float)
+
+
+def _over_midnight(clock: Array) -> Array:
+    """Times of day, s, that go on over midnight."""
+    known = np.isfinite(clock)
+    days = np.cumsum(np.diff(clock[known], prepend=clock[known][:1]) < -43200)
+    out = np.array(clock)
+    out[known] += 86400 * days
+    return out
 
 
 def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:

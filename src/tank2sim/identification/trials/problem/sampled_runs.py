@@ -26,6 +26,11 @@ OBSERVED_SIGNALS = {
 MOST_INSTANTS_A_ROW = 100
 """Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
 seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
+
+_SLOWER = 1.5
+"""Step of a signal, as a multiple of that of the grid, from which it is slower than it (project choice: below, most
+instants have a sample of their own)."""
+
 LONGEST_GAP = 3
 """Gaps of up to this many samples are bridged; longer ones count as unmeasured (project choice)."""
 
@@ -209,16 +214,26 @@ def _means(time: Array, values: Array, grid: Array, step: float, *, held: bool) 
 
 
 def _averaged(time: Array, values: Array, grid: Array, stride: int) -> Array:
-    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps."""
+    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps.
+
+    A signal that has fewer samples than the grid has instants is known at those alone that are nearest to its samples:
+    between them it would be the same measurement again.
+    """
     known = np.flatnonzero(~np.isnan(values))
     if len(known) < 2:
         return np.full(len(grid), np.nan)
     sampling = float(np.median(np.diff(time)))
+    own = max(sampling, float(np.median(np.diff(time[known]))))
     places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
     fine = (grid[:, None] + places).ravel()
     interpolated = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
     gap = time[known[after]] - time[known[after - 1]]
-    interpolated[gap > (LONGEST_GAP + 1.5) * sampling] = np.nan  # three missing: four steps from known to known
+    interpolated[gap > (LONGEST_GAP + 1.5) * own] = np.nan  # three missing: four steps from known to known
     mean: Array = interpolated.reshape(len(grid), stride).mean(axis=1)
+    if own > _SLOWER * stride * sampling:
+        nearest = np.rint((time[known] - grid[0]) / (stride * sampling)).astype(int)
+        rare = np.ones(len(grid), dtype=bool)
+        rare[nearest[(nearest >= 0) & (nearest < len(grid))]] = False
+        mean[rare] = np.nan
     return mean
