@@ -148,3 +148,12 @@ def test_local_positions_are_known_by_their_names(tmp_path, north, east) -> None
 @pytest.mark.parametrize(("first", "second"), [("x", "y"), ("pos_x", "pos_y"), ("n", "e")])
 def test_positions_of_unknown_axes_are_not_taken(first, second) -> None:
     assert quantity_of_name(first) not in ("x", "y") and quantity_of_name(second) not in ("x", "y")
+
+
+@pytest.mark.parametrize("true", [False, True])
+def test_a_magnetic_heading_alone_is_said_to_give_none(tmp_path, true) -> None:
+    path = tmp_path / "compass.csv"
+    changed = table().assign(compass=(table().heading_deg + 25.0) % 360)
+    (changed if true else changed.drop(columns="heading_deg")).to_csv(path, index=False)
+    faults = [finding.stream for finding in log(path).voyage.findings if finding.kind == "fault"]
+    assert ("compass" in faults) is not true
