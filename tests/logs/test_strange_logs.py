@@ -157,3 +157,15 @@ def test_a_magnetic_heading_alone_is_said_to_give_none(tmp_path, true) -> None:
     (changed if true else changed.drop(columns="heading_deg")).to_csv(path, index=False)
     faults = [finding.stream for finding in log(path).voyage.findings if finding.kind == "fault"]
     assert ("compass" in faults) is not true
+
+
+def test_a_table_of_a_row_a_sample_is_taken_apart_by_its_names(tmp_path) -> None:
+    made = table().assign(timestamp=T0 + voyage().time).drop(columns="utc")
+    rows = made.melt("timestamp", var_name="signal").sort_values("timestamp", kind="stable")
+    path = tmp_path / "long.csv"
+    rows.to_csv(path, index=False)
+    named = {stream.name: stream for stream in read_log(path).streams}
+    assert named.keys() == set(made.columns) - {"timestamp"}
+    np.testing.assert_allclose(named["heading_deg"].values, made.heading_deg)
+    np.testing.assert_allclose(named["heading_deg"].time_s, made.timestamp)
+    assert (named["rudder_deg"].quantity, named["rudder_deg"].unit) == ("rudder_angle", "deg")

@@ -42,6 +42,9 @@ _LONGEST_IN_DAYS = 31.0
 """Longest log whose times are taken for days. Project choice: seconds of so large a number count from a beginning, and
 then differ by more."""
 
+_ROWS_OF_A_SIGNAL = 10
+"""Least rows of a name in a column that is taken for one of names of signals. Project choice: remarks are rarer."""
+
 _HEAD_BYTES = 1 << 16
 """Bytes by which separator, decimal sign and units are judged. Project choice: some hundred rows."""
 
@@ -102,7 +105,7 @@ def read_table_log(path: Path) -> VesselLog:
         first = _first_cell(frame[name])
         remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
         raise InputError(path, f"column {name}", f"holds no time that can be read, as {first[:40]!r}", remedy)
-    streams = [
+    streams = _by_signal(frame.drop(columns=list(used)), time) or [
         _stream(name, unit, time, values)
         for name, unit in zip(layout.names, layout.units, strict=True)
         if name not in used and (values := _numbers(frame[name], layout.comma)) is not None
@@ -112,6 +115,24 @@ def read_table_log(path: Path) -> VesselLog:
     counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
     counts["without_time"] = int(np.isnan(time).sum())
     return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
+
+
+def _by_signal(frame: pd.DataFrame, time: Array) -> list[LogStream]:
+    """Streams of a table whose rows are each a sample of the signal that they name; none of any other table.
+
+    Such a table has a column of names, each in :data:`_ROWS_OF_A_SIGNAL` rows or more, and one of numbers.
+    """
+    import pandas as pd
+
+    numeric = [name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name])]
+    texts = [name for name in frame.columns if name not in numeric]
+    if len(numeric) != 1 or len(texts) != 1 or frame[texts[0]].isna().any():
+        return []
+    rows_of = {str(name): rows for name, rows in frame.groupby(texts[0], sort=False).indices.items()}
+    if len(rows_of) < 2 or min(map(len, rows_of.values())) < _ROWS_OF_A_SIGNAL:
+        return []
+    values = frame[numeric[0]].to_numpy(dtype=float)
+    return [_stream(name, "", time[rows], values[rows]) for name, rows in rows_of.items()]
 
 
 def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
