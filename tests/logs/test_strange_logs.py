@@ -169,3 +169,17 @@ def test_a_table_of_a_row_a_sample_is_taken_apart_by_its_names(tmp_path) -> None
     np.testing.assert_allclose(named["heading_deg"].values, made.heading_deg)
     np.testing.assert_allclose(named["heading_deg"].time_s, made.timestamp)
     assert (named["rudder_deg"].quantity, named["rudder_deg"].unit) == ("rudder_angle", "deg")
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_positions_without_a_name_are_those_that_the_heading_follows(tmp_path, exchanged) -> None:
+    made = table()
+    places = [made.latitude, made.longitude][:: -1 if exchanged else 1]
+    columns = [pd.Series((T0 + voyage().time) * 1000, name=0), *places, made.heading_deg, made.rudder_deg]
+    path = tmp_path / "bare.csv"
+    pd.concat(columns, axis=1).astype({0: "int64"}).to_csv(path, index=False, header=False)
+    channels = {c.quantity: c for c in log(path).voyage.channels.channels if c.use}
+    first, second = ("column 3", "column 2") if exchanged else ("column 2", "column 3")
+    assert (channels["latitude"].stream, channels["longitude"].stream) == (first, second)
+    assert channels["latitude"].confidence < 0.9
+    assert channels["heading"].stream == "column 4"

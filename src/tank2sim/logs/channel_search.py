@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -70,6 +71,13 @@ ALONE_LESS = 0.1
 _PAIRED = 0.5
 """Share of the samples of a latitude that have a longitude at the same time, from which they are a pair (project
 choice)."""
+
+_LONGEST_VOYAGE_DEG = 5.0
+"""Change of latitude or longitude in a log, deg, up to which a stream without a name may be one. Project choice: 300
+nautical miles of latitude, a day of sailing."""
+
+_MOST_TRIED = 8
+"""Streams without a name of which positions are tried (project choice: 56 pairs)."""
 
 _HOLDS, _MOVES = 0.5, 0.2
 """Share of samples equal to the one before of a stream that holds its values, as an order does, and of one that moves
@@ -198,6 +206,8 @@ class _Search:
                     others.remove(second)
                     pairs.append(pair)
         tracks = []
+        if not pairs and (unnamed := self._unnamed_position()) is not None:
+            pairs.append(unnamed)
         for first, second in pairs:
             track = self._track(first, second)
             if track is None:
@@ -214,7 +224,7 @@ class _Search:
         wrong = self._wrong_axes(track)
         for north_stream, east_stream, _ in tracks:
             for stream in (north_stream, east_stream):
-                confidence = _BASE["format"] if stream.stated_by == "format" else 0.9
+                confidence = {"format": _BASE["format"], "name": 0.9, "": _BASE["name"]}[stream.stated_by]
                 confidence -= 0.0 if stream in (first, second) else 0.02
                 why = f"its track {wrong[0]}" if wrong else "a track of a plausible speed"
                 unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
@@ -223,6 +233,38 @@ class _Search:
         if wrong:
             self.fault(first, f"with {second.name}, its track {wrong[0]}, by headings and courses")
             self.motion = wrong[1]
+
+    def _unnamed_position(self) -> tuple[LogStream, LogStream] | None:
+        """The only two streams without a name whose track, as latitude and longitude, a heading or a course follows."""
+        slow = [
+            stream
+            for stream in self.streams
+            if not stream.quantity
+            and stream.unit in ("", "deg")
+            and len(stream.values) >= FEW_SAMPLES
+            and 0 < np.ptp(stream.values) < _LONGEST_VOYAGE_DEG
+            and np.abs(stream.values).max() <= 180
+        ]
+        angles = [s for s in self.streams if s.quantity in ("heading", "cog") or (not s.quantity and self._circular(s))]
+        found = []
+        for first, second in itertools.permutations(slow[:_MOST_TRIED], 2):
+            pair = _paired(replace(first, quantity="latitude"), replace(second, quantity="longitude"))
+            track = self._track(*pair) if len(pair[0].values) > _PAIRED * len(first.values) else None
+            if track is None:
+                continue
+            followed = [
+                direction_evidence(*self._angle(angle), track)
+                for angle in angles[:_MOST_TRIED]
+                if angle not in (first, second)
+            ]
+            if any((evidence.agreement or 0.0) > AGREES and evidence.sign > 0 for evidence in followed):
+                found.append((first, second, pair))
+        if len(found) != 1:
+            return None
+        first, second, pair = found[0]
+        for stream, other in zip((first, second), pair, strict=True):
+            self.streams[self.streams.index(stream)] = replace(stream, quantity=other.quantity)
+        return pair
 
     def _track(self, first: LogStream, second: LogStream) -> ReferenceMotion | None:
         time, a, b = first.time_s, first.values, second.values
