@@ -260,7 +260,8 @@ def _clock(column: pd.Series[Any]) -> Array:
 
     text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
     text = text.where(text.str.count(":") > 1, text + ":00")
-    return pd.to_timedelta(text, errors="coerce").dt.total_seconds().to_numpy(dtype=float)
+    seconds: Array = pd.to_timedelta(text, errors="coerce").dt.total_seconds().to_numpy(dtype=float)
+    return seconds
 
 
 def _over_midnight(clock: Array) -> Array:

@@ -166,10 +166,10 @@ def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
     if share < _SPARSE:
         fewer = max(5, int(share * window) // 2 * 2 + 1)
         if known.sum() > fewer:
-            smooth_known, *deviations = _smoothed(column[known], fewer)
+            smooth_known, before, after = _smoothed(column[known], fewer)
             spread = np.full(len(column), np.nan)
             spread[known] = smooth_known
-            return _filled(spread), *deviations
+            return _filled(spread), before, after
     whole = _filled(column)
     smooth: Array = savgol_filter(whole, window, 3)
     gain = float(
