@@ -136,3 +136,14 @@ def test_a_changed_card_keeps_the_covariance_of_what_is_the_same(tmp_path: Path,
         found = carried(card, changed)
         assert found is not None and found.names == NAMES
     assert carried(parse_card(not_referring(card.text), card.source), card.text) is None
+
+
+def test_samples_may_be_some_of_those_that_the_covariance_is_of(tmp_path: Path, mariner_card: ManoeuvringCard) -> None:
+    drawn = np.random.default_rng(3).multivariate_normal([-0.011, -0.003], MATRIX, 2000)
+    matrix = np.cov(drawn.T)
+    errors = np.sqrt(np.diag(matrix))
+    text = mariner_card.text + f"\n[uncertainty]\nYv = {errors[0]:.6g}\nNv = {errors[1]:.6g}\n"
+    kept = drawn[:500]
+    assert np.any(np.abs(kept.std(axis=0, ddof=1) / errors - 1) > 0.006)
+    found = read_covariance(card_with(tmp_path, Covariance(NAMES, matrix, kept), text))
+    assert found is not None and len(found.samples) == 500

@@ -162,3 +162,35 @@ def truth_manoeuvres(data: Path, vessel: str, name: str) -> tuple[list[dict], Pa
         pytest.importorskip(library[path.suffix])
     known = json.loads((folder / f"{vessel}-truth.json").read_text(encoding="utf-8"))
     return known["manoeuvres"], path
+
+
+CRAFT_STEP = 0.2
+"""Time between samples of the craft, s."""
+
+
+def craft() -> dict[str, np.ndarray]:
+    """Ten minutes of a craft that the difference of its orders (shares) turns, a first-order lag behind."""
+    rng = np.random.default_rng(3)
+    count = 3000
+    time = CRAFT_STEP * np.arange(count)
+    legs = np.repeat(rng.uniform(-0.2, 0.9, (count // 50, 2)), 50, axis=0)
+    port, starboard = np.where(np.abs(legs) < 0.1, 0.0, legs).T
+    rate, speed, psi = np.zeros(count), np.zeros(count), np.full(count, 0.5)
+    for k in range(1, count):
+        rate[k] = rate[k - 1] + CRAFT_STEP * (0.4 * (port[k - 1] - starboard[k - 1]) - rate[k - 1]) / 2.0
+        speed[k] = speed[k - 1] + CRAFT_STEP * (1.2 * (port[k - 1] + starboard[k - 1]) - speed[k - 1]) / 4.0
+        psi[k] = psi[k - 1] + CRAFT_STEP * rate[k]
+    x, y = np.cumsum(CRAFT_STEP * speed * np.cos(psi)), np.cumsum(CRAFT_STEP * speed * np.sin(psi))
+    return {"time": time, "port": port, "starboard": starboard, "rate": rate, "psi": psi, "x": x, "y": y}
+
+
+def motion(made: dict[str, np.ndarray]) -> pd.DataFrame:
+    metres = 111_194.9
+    return pd.DataFrame(
+        {
+            "utc": [stamp(t) for t in made["time"]],
+            "latitude": ORIGIN[0] + made["x"] / metres,
+            "longitude": ORIGIN[1] + made["y"] / metres / np.cos(np.radians(ORIGIN[0])),
+            "heading_deg": np.degrees(made["psi"]) % 360,
+        }
+    )

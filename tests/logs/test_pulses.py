@@ -6,7 +6,6 @@ import struct
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tank2sim.api.log import log
@@ -14,38 +13,8 @@ from tank2sim.logs import px4
 from tank2sim.logs.pulses import pulses_of
 from tank2sim.logs.reading import read_log
 from tank2sim.logs.streams import LogStream
-from tests.logs.made_logs import ORIGIN, T0, frame, stamp, voyage
+from tests.logs.made_logs import T0, craft, frame, motion, voyage
 from tests.marks import first_fast
-
-STEP = 0.2
-
-
-def craft() -> dict[str, np.ndarray]:
-    """Ten minutes of a craft that the difference of its orders (shares) turns, a first-order lag behind."""
-    rng = np.random.default_rng(3)
-    count = 3000
-    time = STEP * np.arange(count)
-    legs = np.repeat(rng.uniform(-0.2, 0.9, (count // 50, 2)), 50, axis=0)
-    port, starboard = np.where(np.abs(legs) < 0.1, 0.0, legs).T
-    rate, speed, psi = np.zeros(count), np.zeros(count), np.full(count, 0.5)
-    for k in range(1, count):
-        rate[k] = rate[k - 1] + STEP * (0.4 * (port[k - 1] - starboard[k - 1]) - rate[k - 1]) / 2.0
-        speed[k] = speed[k - 1] + STEP * (1.2 * (port[k - 1] + starboard[k - 1]) - speed[k - 1]) / 4.0
-        psi[k] = psi[k - 1] + STEP * rate[k]
-    x, y = np.cumsum(STEP * speed * np.cos(psi)), np.cumsum(STEP * speed * np.sin(psi))
-    return {"time": time, "port": port, "starboard": starboard, "rate": rate, "psi": psi, "x": x, "y": y}
-
-
-def motion(made: dict[str, np.ndarray]) -> pd.DataFrame:
-    metres = 111_194.9
-    return pd.DataFrame(
-        {
-            "utc": [stamp(t) for t in made["time"]],
-            "latitude": ORIGIN[0] + made["x"] / metres,
-            "longitude": ORIGIN[1] + made["y"] / metres / np.cos(np.radians(ORIGIN[0])),
-            "heading_deg": np.degrees(made["psi"]) % 360,
-        }
-    )
 
 
 @pytest.mark.parametrize(
@@ -218,6 +187,6 @@ def test_a_dataflash_log_without_parameters_keeps_its_rudder(tmp_path) -> None:
 
 def test_a_rudder_that_lay_hard_over_for_long_rests_in_the_middle() -> None:
     pulses = np.concatenate([np.full(60, 1127.0), np.linspace(1127, 1900, 40)])
-    scale = pulses_of(LogStream("ch1", STEP * np.arange(100), pulses))[1]
+    scale = pulses_of(LogStream("ch1", 0.2 * np.arange(100), pulses))[1]
     assert scale.rest_us == 1127  # as of a controller that turns one way
     assert scale.two_way.share(np.array([1500.0, 1900.0])).tolist() == [0.0, 1.0]

@@ -32,6 +32,11 @@ _ROUNDING = 0.006
 NEGATIVE = 1e-8
 """Share of the largest eigenvalue of the correlations by which rounding may make one negative (project choice)."""
 
+_SCATTER = 4.0
+"""Standard errors of a standard deviation of n samples, 1/sqrt(2 (n - 1)) of it for a normal distribution (Kendall and
+Stuart 1977, 10.5), by which samples may vary otherwise than the covariance, which may be of more of them (project
+choice)."""
+
 HOLDS = 1.0
 """Standard errors by which a number may be moved (tuned) and still be the one that the covariance is of: tuning by the
 most uncertain moves nearly all numbers a little, and without the covariance they would seem known far worse (project
@@ -173,7 +178,7 @@ def _form(path: Path) -> tuple[list[str], object, object]:
 
 
 def _samples(path: Path, matrix: Array, rows: object) -> Array:
-    """Samples (n, k) whose variances are those of the covariance."""
+    """Samples (n, k) whose variances are those of the covariance, up to their own scatter."""
     try:
         samples = np.array(rows, dtype=float)
     except (TypeError, ValueError):
@@ -182,7 +187,8 @@ def _samples(path: Path, matrix: Array, rows: object) -> Array:
     if samples.ndim != 2 or samples.shape[1] != len(matrix) or len(samples) < 2 or not np.isfinite(samples).all():
         raise InputError(path, "samples", f"is not a table of rows of {len(matrix)} finite numbers", remedy)
     errors = np.sqrt(np.diag(matrix))
-    if np.any(np.abs(samples.std(axis=0, ddof=1) - errors) > _ROUNDING * errors):
+    slack = _ROUNDING + _SCATTER / math.sqrt(2 * (len(samples) - 1))
+    if np.any(np.abs(samples.std(axis=0, ddof=1) - errors) > slack * errors):
         raise InputError(path, "samples", "vary by other standard deviations than the covariance", remedy)
     return samples
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.logs.channels import SURE_FROM, USED_FROM, ChannelSet, LogChannel
-from tank2sim.logs.clock import usual_step
+from tank2sim.logs.clock import usual_step, utc_text
 from tank2sim.logs.content import (
     AGREES,
     DIFFERS,
@@ -28,9 +29,10 @@ from tank2sim.logs.content import (
 )
 from tank2sim.logs.delays import rate_delay
 from tank2sim.logs.pulses import PulseScale, pulses_of
-from tank2sim.logs.quantities import QUANTITIES, names_another, plain_words, sign_of_name
+from tank2sim.logs.quantities import QUANTITIES, names_another, names_thrust, plain_words, sign_of_name
 from tank2sim.logs.reference import (
     HEADING_WINDOW_S,
+    LEAST_SPEED_MPS,
     POSITION_WINDOW_S,
     ReferenceMotion,
     differenced,
@@ -70,12 +72,23 @@ _PAIRED = 0.5
 """Share of the samples of a latitude that have a longitude at the same time, from which they are a pair (project
 choice)."""
 
+_LONGEST_VOYAGE_DEG = 5.0
+"""Change of latitude or longitude in a log, deg, up to which a stream without a name may be one. Project choice: 300
+nautical miles of latitude, a day of sailing."""
+
+_MOST_TRIED = 8
+"""Streams without a name of which positions are tried (project choice: 56 pairs)."""
+
 _HOLDS, _MOVES = 0.5, 0.2
 """Share of samples equal to the one before of a stream that holds its values, as an order does, and of one that moves
 (project choice)."""
 
 _DOUBTED = 0.85
 """Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
+
+_ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
+"""Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
+Project choice: beyond what a current or a coasting propeller does."""
 
 _MUCH_LESS = 0.7
 """Ratio of deviations from which the lesser one decides (project choice)."""
@@ -109,6 +122,7 @@ def find_channels(streams: Iterable[LogStream]) -> ChannelSet:
     search.steering()
     search.thrusters()
     search.others()
+    search.lost_signs()
     return search.result()
 
 
@@ -192,6 +206,8 @@ class _Search:
                     others.remove(second)
                     pairs.append(pair)
         tracks = []
+        if not pairs and (unnamed := self._unnamed_position()) is not None:
+            pairs.append(unnamed)
         for first, second in pairs:
             track = self._track(first, second)
             if track is None:
@@ -208,7 +224,7 @@ class _Search:
         wrong = self._wrong_axes(track)
         for north_stream, east_stream, _ in tracks:
             for stream in (north_stream, east_stream):
-                confidence = _BASE["format"] if stream.stated_by == "format" else 0.9
+                confidence = {"format": _BASE["format"], "name": 0.9, "": _BASE["name"]}[stream.stated_by]
                 confidence -= 0.0 if stream in (first, second) else 0.02
                 why = f"its track {wrong[0]}" if wrong else "a track of a plausible speed"
                 unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
@@ -217,6 +233,38 @@ class _Search:
         if wrong:
             self.fault(first, f"with {second.name}, its track {wrong[0]}, by headings and courses")
             self.motion = wrong[1]
+
+    def _unnamed_position(self) -> tuple[LogStream, LogStream] | None:
+        """The only two streams without a name whose track, as latitude and longitude, a heading or a course follows."""
+        slow = [
+            stream
+            for stream in self.streams
+            if not stream.quantity
+            and stream.unit in ("", "deg")
+            and len(stream.values) >= FEW_SAMPLES
+            and 0 < np.ptp(stream.values) < _LONGEST_VOYAGE_DEG
+            and np.abs(stream.values).max() <= 180
+        ]
+        angles = [s for s in self.streams if s.quantity in ("heading", "cog") or (not s.quantity and self._circular(s))]
+        found = []
+        for first, second in itertools.permutations(slow[:_MOST_TRIED], 2):
+            pair = _paired(replace(first, quantity="latitude"), replace(second, quantity="longitude"))
+            track = self._track(*pair) if len(pair[0].values) > _PAIRED * len(first.values) else None
+            if track is None:
+                continue
+            followed = [
+                direction_evidence(*self._angle(angle), track)
+                for angle in angles[:_MOST_TRIED]
+                if angle not in (first, second)
+            ]
+            if any((evidence.agreement or 0.0) > AGREES and evidence.sign > 0 for evidence in followed):
+                found.append((first, second, pair))
+        if len(found) != 1:
+            return None
+        first, second, pair = found[0]
+        for stream, other in zip((first, second), pair, strict=True):
+            self.streams[self.streams.index(stream)] = replace(stream, quantity=other.quantity)
+        return pair
 
     def _track(self, first: LogStream, second: LogStream) -> ReferenceMotion | None:
         time, a, b = first.time_s, first.values, second.values
@@ -620,9 +668,9 @@ class _Search:
             stream
             for stream in self.streams
             if not stream.quantity
-            and stream.unit == "1"
+            and (stream.unit == "1" or (not stream.unit and names_thrust(stream.name)))
             and np.ptp(stream.values) > 0.1
-            and np.nanmax(stream.values) < 2
+            and np.nanmax(np.abs(stream.values)) < 2
         ]
         if len(orders) != 2:
             return
@@ -694,6 +742,25 @@ class _Search:
             why = f"{channel.why}; full order is {rpm:.4g} rpm by the measured revolutions"
             confidence = max(channel.confidence, 0.9)
             self.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
+
+    def lost_signs(self) -> None:
+        """Report revolutions that stay ahead while the vessel goes astern: many engines count without a sign."""
+        heading = self._best("heading")
+        if heading is None or heading.confidence < SURE_FROM:
+            return
+        at, motion = self.motion.time_s, self.motion
+        angle = self._heading_at(at)
+        ahead = motion.v_north_mps * np.cos(angle) + motion.v_east_mps * np.sin(angle)
+        fast = _ASTERN_SHARE * float(np.percentile(motion.speed_mps, 95)) if len(at) else 0.0
+        for stream in self.named("rpm", "rpm_port", "rpm_starboard"):
+            values = interpolated(at, stream.time_s, stream.values, 10.0)
+            turning = values > _ASTERN_SHARE * float(np.percentile(stream.values, 95))
+            astern = (ahead < -max(fast, LEAST_SPEED_MPS)) & turning & (stream.values.min() >= 0)
+            if astern.sum() * usual_step(at) > _ASTERN_S:
+                text = (
+                    f"stays ahead while the vessel goes astern ({utc_text(at[np.argmax(astern)])}): its sign is lost, "
+                )
+                self.fault(stream, f"{text}or the pitch is astern; leave out the trials that go astern")
 
     # The result -------------------------------------------------------------------------------------------------
 

@@ -31,6 +31,10 @@ craft leave it above, an exchanged channel is below 0.5."""
 DIFFERS = 0.5
 """Correlation or share below which content contradicts a name. Project choice: halfway to nothing."""
 
+_SIDEWAYS = 0.35
+"""Sideways speed (rms) as a share of the speed below which a heading is one. Project choice: half of the 0.71 of an
+angle that has nothing to do with the motion; small craft in turns reach 0.3."""
+
 UNIT_SLACK = 0.2
 """Relative difference of a scale from that of a unit that is taken for it. Project choice: units are factors of 1.85
 and more apart, scales of sensors are off by some per cent."""
@@ -122,11 +126,29 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     offset = float(wrapped_angle(np.array([middle]))[0])
     if best == (1, 0) or not turned:
         text = f"follows the course of the positions in {100 * as_it_is:.0f} % of the time"
+        if turned and DIFFERS <= as_it_is < AGREES:
+            north, east = (part[motion.moving][good] for part in (motion.v_north_mps, motion.v_east_mps))
+            if (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
+                as_it_is = AGREES
+                text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
         spread = float(np.median(np.abs(difference - np.median(difference))))
         return ContentEvidence(as_it_is, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
     mirrored = "mirrored and " if sign < 0 else ""
     words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
     return ContentEvidence(as_it_is, sign, offset_rad=offset, text=words)
+
+
+def _sideways_share(heading: Array, north: Array, east: Array) -> float:
+    """Sideways speed (rms) as a share of the speed through the water, in the steady current that makes it least.
+
+    Craft that go astern or slowly in a current have another course than heading, and still move along their keel:
+    -n sin(psi) + e cos(psi) is small for the velocity (n, e) less the current.
+    """
+    sideways = np.column_stack([-np.sin(heading), np.cos(heading)])
+    across = np.sum(sideways * np.column_stack([north, east]), axis=1)
+    current = np.linalg.lstsq(sideways, across, rcond=None)[0]
+    speed = np.hypot(north - current[0], east - current[1])
+    return float(np.sqrt(np.mean((across - sideways @ current) ** 2) / np.mean(speed**2)))
 
 
 def rate_evidence(

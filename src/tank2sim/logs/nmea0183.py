@@ -245,6 +245,7 @@ class _Reader:
         findings: list[LogFinding] = []
         lines, times = self._clock(findings)
         streams: list[LogStream] = []
+        self._single_shaft(findings)
         for (kind, _), group in self._instruments(findings):
             for name, series in group.items():
                 unit, quantity = self.stated[name, ""]
@@ -263,6 +264,19 @@ class _Reader:
             text = f"{spoilt} of {self.counts['lines']} lines are corrupted (wrong checksum or cut) and left out"
             findings.append(LogFinding("note", text, evidence={"share": spoilt / self.counts["lines"]}))
         return VesselLog(self.path, "NMEA 0183", tuple(streams), counts, tuple(findings))
+
+    def _single_shaft(self, findings: list[LogFinding]) -> None:
+        """Take the one number that shafts and engines have for the only shaft, for many recorders call it 1."""
+        sources = sorted(name for name, _ in self.stated if name.startswith("RPM."))
+        numbers = {name[len("RPM.S") :] for name in sources}
+        if len(numbers) != 1 or numbers == {"0"}:
+            return
+        shaft = max(sources)  # that of the shaft (S), if that of the engine (E) is there, too
+        for name in sources:
+            self.stated[name, ""] = ("rpm", "rpm" if name == shaft else "")
+        side = "starboard" if int(*numbers) % 2 else "port"
+        text = f"{shaft} is the only shaft and is taken for that of a single propeller, not of a {side} one"
+        findings.append(LogFinding("note", text, shaft))
 
     def _ticks(self, number: np.ndarray) -> Array:
         """Times of sentences that carry them, with falls of the clock taken out."""

@@ -125,6 +125,9 @@ _TRANSVERSE = r"\b(transverse|trans|lateral|sway|quer\w*)\b"
 
 _PATTERNS: tuple[tuple[str, str, str], ...] = (
     # quantity, words that must be there, words that must not
+    # An x or y alone may be of any axes, mirrored ones among them: only names that say north and east are taken.
+    ("x", r"^(x|pos|position)? ?(n|north|northing)( position| pos)?( m)?$", r"^n$"),
+    ("y", r"^(y|pos|position)? ?(e|east|easting)( position| pos)?( m)?$", r"^e$"),
     (
         "latitude",
         r"\b(lat|latitude|breite|breitengrad|latitud|latitudine|breedte|breedtegraad|bredde|breddegrad)\b",
@@ -252,6 +255,18 @@ _ANOTHER = re.compile(
 def names_another(name: str) -> bool:
     """Whether the words of a name say that it is none of the quantities: a temperature, a voltage, a depth."""
     return bool(_ANOTHER.search(plain_words(name)))
+
+
+def names_thrust(name: str) -> bool:
+    """Whether the words of a name say that it is of thrusters or motors, of whatever side: ``/usv/thrusters[0]``.
+
+    Examples
+    --------
+    >>> names_thrust("/usv/thrusters.data[1]"), names_thrust("/battery.current")
+    (True, False)
+    """
+    words = re.sub(r"(?<=[a-z])(?=\d)", " ", plain_words(name))
+    return bool(re.search(_THRUST, words)) and not re.search(rf"{_REVOLUTIONS}|{_RUDDER}|{_NOT_SPEED}", words)
 
 
 def sign_of_name(name: str) -> int:

@@ -35,6 +35,16 @@ _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 """Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
 
+_DAYS = ((36_526.0, 51_544.0, 25_569.0), (730_486.0, 745_504.0, 719_529.0))
+"""Days of the years 2000 to 2040, and the day of 1970-01-01: of spreadsheets since 1899-12-30, of MATLAB (datenum)."""
+
+_LONGEST_IN_DAYS = 31.0
+"""Longest log whose times are taken for days. Project choice: seconds of so large a number count from a beginning, and
+then differ by more."""
+
+_ROWS_OF_A_SIGNAL = 10
+"""Least rows of a name in a column that is taken for one of names of signals. Project choice: remarks are rarer."""
+
 _HEAD_BYTES = 1 << 16
 """Bytes by which separator, decimal sign and units are judged. Project choice: some hundred rows."""
 
@@ -95,7 +105,7 @@ def read_table_log(path: Path) -> VesselLog:
         first = _first_cell(frame[name])
         remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
         raise InputError(path, f"column {name}", f"holds no time that can be read, as {first[:40]!r}", remedy)
-    streams = [
+    streams = _by_signal(frame.drop(columns=list(used)), time) or [
         _stream(name, unit, time, values)
         for name, unit in zip(layout.names, layout.units, strict=True)
         if name not in used and (values := _numbers(frame[name], layout.comma)) is not None
@@ -105,6 +115,24 @@ def read_table_log(path: Path) -> VesselLog:
     counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
     counts["without_time"] = int(np.isnan(time).sum())
     return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
+
+
+def _by_signal(frame: pd.DataFrame, time: Array) -> list[LogStream]:
+    """Streams of a table whose rows are each a sample of the signal that they name; none of any other table.
+
+    Such a table has a column of names, each in :data:`_ROWS_OF_A_SIGNAL` rows or more, and one of numbers.
+    """
+    import pandas as pd
+
+    numeric = [name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name])]
+    texts = [name for name in frame.columns if name not in numeric]
+    if len(numeric) != 1 or len(texts) != 1 or frame[texts[0]].isna().any():
+        return []
+    rows_of = {str(name): rows for name, rows in frame.groupby(texts[0], sort=False).indices.items()}
+    if len(rows_of) < 2 or min(map(len, rows_of.values())) < _ROWS_OF_A_SIGNAL:
+        return []
+    values = frame[numeric[0]].to_numpy(dtype=float)
+    return [_stream(name, "", time[rows], values[rows]) for name, rows in rows_of.items()]
 
 
 def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
@@ -145,10 +173,9 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
             values = column.to_numpy(dtype=float)
-            size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
-            for least, largest, factor in _EPOCHS:
-                if least <= size <= largest:
-                    return values * factor, True, {name, *dates}
+            seconds = _epoch_seconds(name, values, findings)
+            if seconds is not None:
+                return seconds, True, {name, *dates}
             continue
         first = _first_cell(column)
         offset = _zone_s(name, findings)
@@ -162,8 +189,12 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
             return _seconds(_dates(path, name, column), offset), True, {name}
         if dates and re.match(r"\d{1,2}:\d\d", first):
             days = _seconds(_dates(path, dates[0], frame[dates[0]]), offset)
-            clock = pd.to_timedelta(_clock_text(column), errors="coerce").dt.total_seconds().to_numpy(dtype=float)
-            return days + clock, True, {name, dates[0]}
+            return days + _clock(column), True, {name, dates[0]}
+    for name in [*named, *clocks]:
+        if re.match(r"\d{1,2}:\d\d", _first_cell(frame[name])):
+            text = f"{name} has times of day without a date: the trials have no date"
+            findings.append(LogFinding("note", text, name))
+            return _over_midnight(_clock(frame[name])), False, {name}
     for name in named or list(frame.columns[:1]):
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
@@ -175,6 +206,18 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
                 return values * _relative_scale(name, values), False, {name}
     remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
     raise InputError(path, "header", "there is no column of time", remedy)
+
+
+def _epoch_seconds(name: str, values: Array, findings: list[LogFinding]) -> Array | None:
+    """Seconds (rows,) since 1970 of numbers that count s, ms, us or ns since then, or days; None if they do not."""
+    size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
+    for least, largest, factor in _EPOCHS:
+        if least <= size <= largest:
+            return values * factor
+    for least, largest, day in _DAYS:
+        if least <= size <= largest and np.nanmax(values) - np.nanmin(values) < _LONGEST_IN_DAYS:
+            return (values - day) * 86400 - _zone_s(name, findings)
+    return None
 
 
 def _as_numbers(column: pd.Series[Any]) -> pd.Series[Any]:
@@ -211,9 +254,23 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()).strip()
 
 
-def _clock_text(column: pd.Series[Any]) -> pd.Series[Any]:
-    text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
-    return text.where(text.str.count(":") > 1, text + ":00")
+def _clock(column: pd.Series[Any]) -> Array:
+    """Seconds (rows,) of times of day, of which some may end with AM or PM."""
+    import pandas as pd
+
+    text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
+    text = text.where(text.str.count(":") > 1, text + ":00")
+    seconds: Array = pd.to_timedelta(text, errors="coerce").dt.total_seconds().to_numpy(dtype=float)
+    return seconds
+
+
+def _over_midnight(clock: Array) -> Array:
+    """Times of day, s, that go on over midnight."""
+    known = np.isfinite(clock)
+    days = np.cumsum(np.diff(clock[known], prepend=clock[known][:1]) < -43200)
+    out = np.array(clock)
+    out[known] += 86400 * days
+    return out
 
 
 def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:

@@ -217,6 +217,12 @@ def _to_confirm(found: ChannelSet) -> list[LogFinding]:
         if candidates and not any(channel.use for channel in candidates) and candidates[0].confidence >= 0.5:
             text = f"{QUANTITIES[quantity].words} may be {candidates[0].stream} ({candidates[0].why}), and is not used"
             findings.append(LogFinding("fault", text, candidates[0].stream))
+    used = {channel.quantity: channel.stream for channel in found.channels if channel.use}
+    if "magnetic_heading" in used and "heading" not in used:
+        name = used["magnetic_heading"]
+        text = f"{name} is a magnetic heading, and there is no true one: the trials have no heading; make it one in "
+        text += 'channels.toml (quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
+        findings.append(LogFinding("fault", text, name))
     return findings
 
 

@@ -108,3 +108,35 @@ def test_a_part_begins_at_its_own_time():
     np.testing.assert_allclose(part.times, run.times[10:60])
     np.testing.assert_array_equal(part.measured, run.measured[10:60])
     np.testing.assert_array_equal(part.inputs, run.inputs[10:60])
+
+
+def test_a_signal_slower_than_the_rows_is_known_at_its_own_samples(by_angle):
+    """A receiver of 1 Hz in rows of 5 Hz: kept, and not made into five measurements each."""
+    t = np.arange(0, 60, 0.2)
+    slow = np.where(np.arange(len(t)) % 5 == 3, 2.0 * t, np.nan)
+    slow[100:160] = np.nan
+    run = prepare(by_angle, record(t, delta_rad=np.zeros_like(t), x_m=slow, r_radps=t), ("motion.x",), step_s=0.4)
+    column = run.column("motion.x")
+    known = np.isfinite(column)
+    np.testing.assert_allclose(column[known], 2 * run.times[known])
+    assert 42 <= known.sum() <= 48
+    assert not known[(run.times > 20) & (run.times < 31)].any()
+
+
+def test_a_signal_as_fast_as_the_steps_is_known_at_each(by_angle):
+    t = np.arange(0, 60, 0.2)
+    slow = np.where(np.arange(len(t)) % 5 == 3, 2.0 * t, np.nan)
+    run = prepare(by_angle, record(t, delta_rad=np.zeros_like(t), x_m=slow), ("motion.x",), step_s=1.0)
+    assert np.isfinite(run.column("motion.x")[1:-1]).all()
+
+
+def test_rows_slower_than_the_steps_asked_for_are_taken_apart(by_angle):
+    """A small craft logged at 1 Hz: the model needs shorter steps, and is measured at the rows alone."""
+    t = np.arange(0, 60, 1.0)
+    run = prepare(by_angle, record(t, delta_rad=0.01 * t, r_radps=3 * t), ("motion.r",), step_s=0.2)
+    assert run.step_s == pytest.approx(0.2)
+    column = run.column("motion.r")
+    known = np.isfinite(column)
+    np.testing.assert_allclose(run.times[known], t[: known.sum()], atol=1e-9)
+    np.testing.assert_allclose(column[known], 3 * run.times[known])
+    np.testing.assert_allclose(command(by_angle, run)[:-1], 0.01 * (run.times[:-1] + 0.1))

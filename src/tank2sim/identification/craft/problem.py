@@ -69,8 +69,8 @@ DISTURBANCES = ("current.north", "current.east", "disturbance.north", "disturban
 """States of the model that do not change in a trial: m/s, m/s, N, N, rad/s."""
 
 OBSERVED_STEP_S = 0.2
-"""Step of the fit, s, or that of the record if it is longer: five in the shortest time constant of a craft of 2 m
-(project choice)."""
+"""Step of the fit, s: five in the shortest time constant of a craft of 2 m (project choice). Of rows that are further
+apart it is a whole part, and the motion is measured at the rows alone."""
 
 
 def craft_fit_model(card: CraftCard, driven_by: str = "revolutions", *, turned: bool = False) -> Model:

@@ -18,7 +18,7 @@ from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.identification.trials.problem.sampled_runs import LONGEST_GAP, SampledRun
 from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
 
 VELOCITIES = ("motion.u", "motion.v", "motion.r")
@@ -29,6 +29,10 @@ MEASURED_STATES = (*VELOCITIES, *POSITION)
 SMALL_NOISE = 1e-4
 """A signal whose noise has less than this share of its variance is not smoothed: the noise pulls coefficients towards
 zero by that share (Fuller 1987, Measurement Error Models), and smoothing might do more harm."""
+
+_SPARSE = 0.5
+"""Share of known samples below which a signal is smoothed by its samples alone: straight lines between them would hide
+their noise (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,14 +140,36 @@ def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Arra
 
 
 def _slope(column: Array, window: int, step: float) -> Array:
-    """Time derivative of a smoothed signal (Savitzky and Golay 1964), nan near gaps."""
+    """Time derivative of a smoothed signal (Savitzky and Golay 1964), nan in gaps of more than its own step."""
     slope: Array = savgol_filter(_filled(column), window, 3, deriv=1, delta=step)
-    slope[np.isnan(column)] = np.nan
+    slope[_in_gaps(column)] = np.nan
     return slope
+
+
+def _in_gaps(column: Array) -> np.ndarray:
+    """Where a signal is unknown for longer than it usually is between its samples (n,)."""
+    known = np.flatnonzero(~np.isnan(column))
+    steps = np.diff(known)
+    wide = steps > LONGEST_GAP * max(float(np.median(steps)), 1.0) if len(known) > 1 else np.zeros(0, dtype=bool)
+    outside = np.isnan(column)
+    if len(known) > 1 and np.median(steps) > 1:
+        outside[known[0] : known[-1]] = False
+        for begin, end in zip(known[:-1][wide], known[1:][wide], strict=True):
+            outside[begin + 1 : end] = True
+    return outside
 
 
 def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
     """A signal without gaps and noise; standard deviation of its noise before and after."""
+    known = ~np.isnan(column)
+    share = float(known.mean())
+    if share < _SPARSE:
+        fewer = max(5, int(share * window) // 2 * 2 + 1)
+        if known.sum() > fewer:
+            smooth_known, before, after = _smoothed(column[known], fewer)
+            spread = np.full(len(column), np.nan)
+            spread[known] = smooth_known
+            return _filled(spread), before, after
     whole = _filled(column)
     smooth: Array = savgol_filter(whole, window, 3)
     gain = float(

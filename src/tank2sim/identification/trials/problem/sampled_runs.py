@@ -26,6 +26,11 @@ OBSERVED_SIGNALS = {
 MOST_INSTANTS_A_ROW = 100
 """Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
 seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
+
+_SLOWER = 1.5
+"""Step of a signal, as a multiple of that of the grid, from which it is slower than it (project choice: below, most
+instants have a sample of their own)."""
+
 LONGEST_GAP = 3
 """Gaps of up to this many samples are bridged; longer ones count as unmeasured (project choice)."""
 
@@ -87,9 +92,9 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     """A trial on equal steps, for a model driven by the trial's rudder signal
     (:func:`.problem_from_card.driven_model`).
 
-    The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own). Signals are
-    averaged over a step, so that no measurement is lost. A rudder order holds until the next and enters with its
-    mean over the step; a measured angle is taken as straight between samples.
+    The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
+    of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
+    holds until the next and enters with its mean over the step; a measured angle is taken as straight between samples.
 
     Raises
     ------
@@ -98,7 +103,7 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     """
     sampling = float(np.median(np.diff(trial.time_s)))
     stride = max(1, int((step_s or 1.5 * model.step_s) / sampling))
-    step = stride * sampling
+    step = stride * sampling if step_s is None else stride * sampling / max(1, int(sampling / step_s + 1e-6))
     count = int((trial.time_s[-1] - trial.time_s[0]) / step + 1e-6)
     begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
     grid: Array = begin + step * np.arange(count, dtype=float)
@@ -118,7 +123,7 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     measured = np.full((count, len(seen)), np.nan)
     for place, name in enumerate(seen):
         if (signal := trial.signals.get(signals[name])) is not None:
-            measured[:, place] = _averaged(trial.time_s, signal, grid, stride)
+            measured[:, place] = _averaged(trial.time_s, signal, grid, step, stride)
     if np.isnan(measured).all():
         raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     return SampledRun(trial.name, begin, step, inputs, measured, tuple(seen), str(trial.path))
@@ -199,26 +204,40 @@ def _means(time: Array, values: Array, grid: Array, step: float, *, held: bool) 
     """Mean of a signal from each instant of the grid to the next, (n,)."""
     known = ~np.isnan(values)
     time, values = time[known], values[known]
+    edges = np.append(grid, grid[-1] + step)
+    if not held and len(time) < len(edges):  # straight lines go on within a row
+        fine = np.union1d(time, edges)
+        time, values = fine, np.interp(fine, time, values)
     lengths = np.diff(time)
     areas = lengths * (values[:-1] if held else 0.5 * (values[:-1] + values[1:]))
     whole = np.concatenate([[0.0], np.cumsum(areas)])
-    at = np.interp(np.append(grid, grid[-1] + step), time, whole)
+    at = np.interp(edges, time, whole)
     means: Array = np.diff(at) / step
     means[-1] = means[-2]
     return means
 
 
-def _averaged(time: Array, values: Array, grid: Array, stride: int) -> Array:
-    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps."""
+def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int) -> Array:
+    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps.
+
+    A signal that has fewer samples than the grid has instants is known at those alone that are nearest to its samples:
+    between them it would be the same measurement again.
+    """
     known = np.flatnonzero(~np.isnan(values))
     if len(known) < 2:
         return np.full(len(grid), np.nan)
     sampling = float(np.median(np.diff(time)))
+    own = max(sampling, float(np.median(np.diff(time[known]))))
     places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
     fine = (grid[:, None] + places).ravel()
     interpolated = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
     gap = time[known[after]] - time[known[after - 1]]
-    interpolated[gap > (LONGEST_GAP + 1.5) * sampling] = np.nan  # three missing: four steps from known to known
+    interpolated[gap > (LONGEST_GAP + 1.5) * own] = np.nan  # three missing: four steps from known to known
     mean: Array = interpolated.reshape(len(grid), stride).mean(axis=1)
+    if own > _SLOWER * step:
+        nearest = np.rint((time[known] - grid[0]) / step).astype(int)
+        rare = np.ones(len(grid), dtype=bool)
+        rare[nearest[(nearest >= 0) & (nearest < len(grid))]] = False
+        mean[rare] = np.nan
     return mean
