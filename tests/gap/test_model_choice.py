@@ -74,11 +74,12 @@ def test_what_is_hidden_in_the_toy_is_said(theta, verdict, effects) -> None:
 # -- scores typed by hand --------------------------------------------------------------------------------------------
 
 
-def fit(score: float, *indices: int, sure: float = 10.0) -> ExplanationFit:
+def fit(score: float, *indices: int, sure: float = 10.0, width: float = 0.8) -> ExplanationFit:
     """An explanation whose sizes are 1 and so many standard errors."""
     count = len(indices)
+    logs = np.append(LOGS[:-1], np.log(width))
     return ExplanationFit(
-        Toy((None,) * count, indices=indices), np.ones(count), np.eye(count) / sure**2, LOGS, score, np.zeros(2)
+        Toy((None,) * count, indices=indices), np.ones(count), np.eye(count) / sure**2, logs, score, np.zeros(2)
     )
 
 
@@ -134,6 +135,9 @@ def test_where_waves_were_found_scores_count_half_as_much() -> None:
         ([fit(0), fit(-5, 0, sure=1.0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
         ([fit(0), fit(-5, 0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
         ([fit(0), fit(-8, 0), fit(-12, 0, 1)], NO_EFFECT_MISSING, (), []),
+        # of as many effects the best alone is named: with one of them the card may be wrong by as much
+        ([fit(0), fit(-50, 0), fit(-92, 0, 2, sure=2.0), fit(-90, 0, 1)], MISSING, (YAW,), []),
+        ([fit(0), fit(-50, 0), fit(-88, 0, 2, sure=2.0), fit(-90, 0, 1)], MISSING, (YAW, SURGE), []),
         # so must a third, against the best with fewer
         ([fit(0), fit(-50, 0), fit(-70, 0, 1), fit(-80.1, 0, 1, 2)], MISSING, (YAW, SURGE, SWAY), []),
         ([fit(0), fit(-50, 0), fit(-70, 0, 1), fit(-79.9, 0, 1, 2)], MISSING, (YAW, SURGE), []),
@@ -188,6 +192,15 @@ def test_a_second_effect_of_the_same_kind_must_have_a_share_of_the_gain(pair, sh
         assert found.best.hypothesis.effects == (names if part > max(share * 2000, EVIDENCE_NEEDED) else names[:1]), (
             part
         )
+
+
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(("without", "of_both", "named"), [(2.0, 0.3, 2), (2.0, 0.9, 1), (0.9, 0.3, 1)])
+def test_no_share_is_asked_of_an_effect_without_which_the_card_would_be_wrong(
+    without: float, of_both: float, named: int
+) -> None:
+    one, both = fit(-2000 + EVIDENCE_NEEDED + 1, FORCE, width=without), fit(-2000, FORCE, DRAG, width=of_both)
+    assert len(of_scores(fit(0, width=2.5), one, both).best.hypothesis.effects) == named
 
 
 @pytest.mark.usefixtures("calm")

@@ -42,6 +42,10 @@ WORTH = 5.0
 """Proposals whose gain in the screen is further below 0 are not fitted; nor is more sought on top of a set that gained
 less with its last effect (project choice)."""
 
+NARROW = 0.3
+"""Width of the coefficients, in their standard errors, at which the screen is asked as well where the best explanation
+needs more than one (project choice): with all effects named, made-up ships have 0.1 to 0.6."""
+
 HOPELESS = 100.0
 """Proposals whose gain, or whose score in the first fit, is this far behind the best of their kind are not fitted
 (project choice)."""
@@ -164,7 +168,7 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
     proposed = [single for single in singles[:SINGLES] if single.gain > enough]
     proposed += [pair for pair in pairs[:PAIRS] if pair.gain > singles[0].gain]
     if len(best.hypothesis.effects) == 1 and most > 1:
-        proposed += _on_top_of(fitting, best, every)[:WITH_THE_BEST]
+        _fit_more(fitting, best, every)
     fitting.fit(_proposals(fitting, proposed, starts, least=1, limit=best.score + _FAR))
     if not fitting.has(2) or fitting.best(2).score > fitting.best(1).score - WORTH:
         return
@@ -223,16 +227,28 @@ def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
         best = fitting.best()
         if len(best.hypothesis.effects) < count:
             return
-        _fit_more(fitting, _on_top_of(fitting, best, every)[:WITH_THE_BEST], best)
+        _fit_more(fitting, best, every)
         larger = fitting.best()
         if larger.score > best.score - WORTH:
             return
         thetas = thetas_of(larger)
         smaller = [{name: theta for name, theta in thetas.items() if name != dropped} for dropped in thetas]
-        _fit_more(fitting, [Screened(parts, 0.0) for parts in smaller], larger)
+        _fit_near(fitting, [Screened(parts, 0.0) for parts in smaller], larger)
 
 
-def _fit_more(fitting: Fitting, screened: Sequence[Screened], best: ExplanationFit) -> None:
+def _fit_more(fitting: Fitting, best: ExplanationFit, every: Sequence[Variant]) -> None:
+    """The best with each of the effects that the screen proposes on top of it.
+
+    Where it needs coefficients that are off by more than their standard errors, the screen is asked again with narrow
+    ones: wide ones hide what acts as they do.
+    """
+    _fit_near(fitting, _on_top_of(fitting, best, every)[:WITH_THE_BEST], best)
+    if best.width > 1.0:
+        narrow = replace(best, logs=np.append(best.logs[:-1], np.log(NARROW)))
+        _fit_near(fitting, _on_top_of(fitting, narrow, every)[:WITH_THE_BEST], narrow)
+
+
+def _fit_near(fitting: Fitting, screened: Sequence[Screened], best: ExplanationFit) -> None:
     """Fit proposals from the noise of the best, with the winds and currents that differ there between trials."""
     starts, limit = [best.logs, fitting.likelihood.belief.logs], best.score + _FAR
     chosen = _proposals(fitting, screened, starts, limit=limit)

@@ -37,6 +37,10 @@ SAME_KIND_SHARE = {"actuator": 0.25, "force": 0.1}
 """Share of the whole gain that a second effect of the same kind must have (project choice): less is the
 formula error of the first, beyond :data:`.form_error.FORM`."""
 
+BELIEVABLE = 0.5
+"""Width of the card's coefficients, in their standard errors, below which an explanation makes them as good as the card
+states (project choice: made-up ships with all their effects have 0.1 to 0.5, with one left out 1.7 to 2.5)."""
+
 LIKELY = 0.5
 """An effect less probable than this is not named alone (project choice): all explanations with at least
 :data:`RIVAL` of its probability are then named."""
@@ -133,10 +137,10 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
     least = none.score  # of all that need fewer effects
     counts = [len(fit.hypothesis.effects) for fit in search.fits]
     for count in range(1, max(counts) + 1):
-        of_count = (fit for fit, number in zip(search.fits, counts, strict=True) if number == count)
+        of_count = [fit for fit, number in zip(search.fits, counts, strict=True) if number == count]
         larger = next(filter(is_significant, of_count), None)
-        if larger is None:
-            continue
+        if larger is None or (count > 1 and larger is not of_count[0]):
+            continue  # what fits better is within the uncertainty of the card
         share = _share(larger, best) if count > 1 else 0.0
         if larger.score < least - max(needed, share * (none.score - larger.score)):
             best = larger
@@ -171,7 +175,13 @@ def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> 
 
 def _share(larger: ExplanationFit, best: ExplanationFit) -> float:
     """Share of the whole gain that effects which the best explanation so far lacks must have, where they look like
-    others of the larger one."""
+    others of the larger one.
+
+    None is asked for where without them the coefficients of the card are off by more than their standard errors, and
+    with them by much less: what a formula leaves is small against its force, and does not need that.
+    """
+    if best.width > 1.0 and larger.width < BELIEVABLE:
+        return 0.0
     kinds = {name: EFFECTS[name].looks_like for name in larger.hypothesis.effects}
     alike = [
         kind
