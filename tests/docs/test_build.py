@@ -29,7 +29,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
-@pytest.mark.essential
 @pytest.mark.slow
 def test_the_manual_builds_without_a_warning(site: Path) -> None:
     assert (site / "index.html").is_file() and (site / "search.html").is_file()
