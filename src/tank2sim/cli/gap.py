@@ -16,6 +16,7 @@ from tank2sim.cli.progress import showing_stages
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
 from tank2sim.gap.fleet.ships import GAP, HOLDOUT, ship_alone
+from tank2sim.gap.workflow import MOST_EFFECTS
 
 
 @click.command("gap", cls=TakesSeveral, several=("--holdout", "--effects", "--without"))
@@ -40,7 +41,13 @@ from tank2sim.gap.fleet.ships import GAP, HOLDOUT, ship_alone
 @executor_option
 @click.option("--effects", multiple=True, metavar="NAME...", help="Look for these alone.")
 @click.option("--without", multiple=True, metavar="NAME...", help="Do not look for these.")
-@click.option("--max-effects", type=click.IntRange(1, 4), default=4, show_default=True, help="Effects named at most.")
+@click.option(
+    "--max-effects",
+    type=click.IntRange(1, MOST_EFFECTS),
+    default=MOST_EFFECTS,
+    show_default=True,
+    help="Effects named at most.",
+)
 @click.option(
     "--false-discovery",
     type=float,

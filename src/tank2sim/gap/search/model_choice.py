@@ -39,7 +39,8 @@ formula error of the first, beyond :data:`.form_error.FORM`."""
 
 BELIEVABLE = 0.5
 """Width of the card's coefficients, in their standard errors, below which an explanation makes them as good as the card
-states (project choice: made-up ships with all their effects have 0.1 to 0.5, with one left out 1.7 to 2.5)."""
+states (project choice: of 18 made-up ships most have 0.1 to 0.6 with all their effects, and 1.7 to 2.5 where
+coefficients take the place of one)."""
 
 LIKELY = 0.5
 """An effect less probable than this is not named alone (project choice): all explanations with at least
@@ -141,8 +142,7 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
         larger = next(filter(is_significant, of_count), None)
         if larger is None or (count > 1 and larger is not of_count[0]):
             continue  # what fits better is within the uncertainty of the card
-        share = _share(larger, best) if count > 1 else 0.0
-        if larger.score < least - max(needed, share * (none.score - larger.score)):
+        if larger.score < least - max(needed, _share(larger, best) * (none.score - larger.score)):
             best = larger
         least = min(least, larger.score)
     scores = np.array([fit.score for fit in search.fits]) / temper

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import savgol_coeffs, savgol_filter
 
@@ -146,17 +147,17 @@ def _slope(column: Array, window: int, step: float) -> Array:
     return slope
 
 
-def _in_gaps(column: Array) -> np.ndarray:
-    """Where a signal is unknown for longer than it usually is between its samples (n,)."""
-    known = np.flatnonzero(~np.isnan(column))
-    steps = np.diff(known)
-    wide = steps > LONGEST_GAP * max(float(np.median(steps)), 1.0) if len(known) > 1 else np.zeros(0, dtype=bool)
-    outside = np.isnan(column)
-    if len(known) > 1 and np.median(steps) > 1:
-        outside[known[0] : known[-1]] = False
-        for begin, end in zip(known[:-1][wide], known[1:][wide], strict=True):
-            outside[begin + 1 : end] = True
-    return outside
+def _in_gaps(column: Array) -> NDArray[np.bool_]:
+    """Mask (n,) of the rows without a sample that lie in gaps longer than the usual distance between samples."""
+    known, missing = np.flatnonzero(~np.isnan(column)), np.isnan(column)
+    usual = np.median(np.diff(known)) if len(known) > 1 else 1.0
+    if usual <= 1:
+        return missing
+    rows = np.arange(len(column))
+    after = np.clip(np.searchsorted(known, rows), 1, len(known) - 1)
+    distance = known[after] - known[after - 1]
+    in_gaps: NDArray[np.bool_] = missing & ((distance > LONGEST_GAP * usual) | (rows < known[0]) | (rows > known[-1]))
+    return in_gaps
 
 
 def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:

@@ -227,15 +227,15 @@ def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int)
     if len(known) < 2:
         return np.full(len(grid), np.nan)
     sampling = float(np.median(np.diff(time)))
-    own = max(sampling, float(np.median(np.diff(time[known]))))
+    signal_step = max(sampling, float(np.median(np.diff(time[known]))))
     places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
     fine = (grid[:, None] + places).ravel()
     interpolated = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
     gap = time[known[after]] - time[known[after - 1]]
-    interpolated[gap > (LONGEST_GAP + 1.5) * own] = np.nan  # three missing: four steps from known to known
+    interpolated[gap > (LONGEST_GAP + 1.5) * signal_step] = np.nan  # three missing: four steps from known to known
     mean: Array = interpolated.reshape(len(grid), stride).mean(axis=1)
-    if own > _SLOWER * step:
+    if signal_step > _SLOWER * step:
         nearest = np.rint((time[known] - grid[0]) / step).astype(int)
         rare = np.ones(len(grid), dtype=bool)
         rare[nearest[(nearest >= 0) & (nearest < len(grid))]] = False
