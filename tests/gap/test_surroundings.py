@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import tomlkit
-from gap_truth import Made, Setting, make, write
+from gap_truth import Made, Setting, make, sampled, write
 from identify_esso_osaka import spans
 
 from tank2sim.api.gap import GapResult
@@ -20,10 +20,12 @@ from tank2sim.gap.diagnosis.residuals import surroundings_by_trial
 from tank2sim.gap.inference.batch import batch_trials
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis, TrialSurroundings
+from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.outcome.surroundings import fit_common_surroundings, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import MISSING, Gap, Surroundings
+from tank2sim.gap.search.explanations import search
 from tank2sim.gap.workflow import GapOptions, _probabilities_by_simulation, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.trials import window, with_signals
@@ -132,6 +134,41 @@ def test_the_current_of_a_trial_is_found_from_its_replay(tmp_path: Path) -> None
     before = replay_by_card(card, fitted)
     for trial, still in zip(after, before, strict=True):
         assert trial.misfit("before") < 0.1 * still.misfit("before")
+
+
+@pytest.mark.slow
+def test_the_score_of_currents_by_trial_is_that_about_their_own_motion(tmp_path: Path) -> None:
+    # About the motion of what was best before (the card as it is), the score is wrong by a hundred.
+    write(sampled(sets()["current"], 2), tmp_path)
+    card = read_card(tmp_path / "ship.toml")
+    assert isinstance(card, ManoeuvringCard)
+    fitted = measured([tmp_path / f"{name}.csv" for name in TRIALS], card)
+    found = search(likelihood_from_card(card, fitted), names=["current"])
+    best = found.fits[0]
+    assert best.hypothesis.each == ("current",)
+    again = found.likelihood.about(best).at_best(best.hypothesis, best.theta, [best.logs], (15, 15))
+    assert again.score == pytest.approx(best.score, abs=10.0)
+
+
+@pytest.mark.slow
+def test_the_current_of_a_trial_is_found_together_with_its_heading(tmp_path: Path) -> None:
+    # One after the other, a heading that is 1 to 3 deg off hides in the current, and the other way round.
+    trials = ("slowdown", "random_steps")
+    (made,) = make([Setting(("current",), 42, by_trial=True, manoeuvres=trials, ship="model")])
+    write(made, tmp_path)
+    card = read_card(tmp_path / "ship.toml")
+    assert isinstance(card, ManoeuvringCard)
+    fitted = measured([tmp_path / f"{name}.csv" for name in trials], card)
+    of_model = {"motion.u": 0.003, "motion.v": 0.003, "motion.r": 1.3e-3, "motion.x": 0.02, "motion.y": 0.02}
+    with_current = add_effects_to_card(card, [("current", {}, {})])
+    found = fit_surroundings(with_current, fitted, ("current",), {**NOISE, **of_model})["current"]
+    for name in trials:
+        speed, direction = (made.parameters["current"][f"{key} in {name}"] for key in SIGNALS)
+        parts = speed * np.cos(np.deg2rad(direction)), speed * np.sin(np.deg2rad(direction))
+        at = found[name]
+        estimates = at.speed_mps * np.cos(at.direction_rad), at.speed_mps * np.sin(at.direction_rad)
+        assert estimates == pytest.approx(parts, abs=0.003)
+        assert at.speed_error_mps < 0.003
 
 
 @pytest.mark.slow

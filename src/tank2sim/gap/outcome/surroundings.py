@@ -6,12 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model, Quantity, State
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
 from tank2sim.gap.result import Surroundings
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -215,17 +217,17 @@ class _Trial:
     ):
         self.name, self._effects = trial.name, effects
         self.replayer = Replayer(card, driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
-        self._sigma = np.array([noise[name] for name in self.replayer.seen])
+        self.sigma = np.array([noise[name] for name in self.replayer.seen])
         self.typical = np.repeat([_typical_speed(card, name) for name in effects], 2)
         names = self.replayer.model.input_names
         self._places = [
             tuple(names.index(EFFECTS[name].model_names()[key]) for key in ("speed_mps", "direction_rad"))
             for name in effects
         ]
-        still = self._still = input_record(self.replayer, _with(trial, self._in_trial(np.zeros(len(self.typical)))))
+        still = self.still = input_record(self.replayer, _with(trial, self._in_trial(np.zeros(len(self.typical)))))
         self._known = ~np.isnan(still.readings)
         self._passage = card.ship.length_m / card.model.speed_mps / (still.step_s * still.every)
-        self._state = self.replayer.guess_initial_state(still, self._sigma, self.replayer.model.parameter_values())
+        self._state = self.replayer.guess_initial_state(still, self.sigma, self.replayer.model.parameter_values())
         self.compare(1.0)
 
     def compare(self, begin: float, end: float | None = None) -> None:
@@ -245,15 +247,15 @@ class _Trial:
         return {name: {self.name: at} for name, at in self.surroundings(parts).items()}
 
     def _record(self, parts: Array) -> InputRecord:
-        inputs = self._still.inputs.copy()
+        inputs = self.still.inputs.copy()
         for places, pair in zip(self._places, np.reshape(parts, (-1, 2)), strict=True):
             inputs[:, places] = np.hypot(*pair), np.arctan2(pair[1], pair[0])
-        return replace(self._still, inputs=inputs)
+        return replace(self.still, inputs=inputs)
 
     def away(self, parts: Array, p: Array) -> Array:
         """Simulated less measured (count,), noise units."""
         record = self._record(parts)
-        away = ((self.replayer.motion(record, self._state, p) - record.readings) / self._sigma)[self._compared]
+        away = ((self.replayer.motion(record, self._state, p) - record.readings) / self.sigma)[self._compared]
         bounded: Array = np.nan_to_num(away, nan=_FAR)
         return bounded
 
@@ -263,7 +265,7 @@ class _Trial:
 
     def begin(self, parts: Array, p: Array) -> None:
         """Find the initial state again, in these surroundings."""
-        self._state = self.replayer.fit_initial_state(self._record(parts), self._sigma, p, self._state)
+        self._state = self.replayer.fit_initial_state(self._record(parts), self.sigma, p, self._state)
 
     def parts(self, p: Array) -> Array:
         """The parts that fit the compared readings best, from a search over directions and speeds: first over the
@@ -315,19 +317,57 @@ class _Trial:
 def _of_trial(
     card: ManoeuvringCard, driven_by: str, given: Trial, effects: Sequence[str], noise: Mapping[str, float]
 ) -> dict[str, Surroundings]:
+    """Together with the initial state and the instants of the orders: a heading that is a little off moves the track
+    as a current across it does."""
     trial = _Trial(card, driven_by, given, effects, noise)
-    p = trial.replayer.model.parameter_values()
-    at = trial.parts(p)
-    for _ in range(_TURNS):
-        solved = trial.nearest(at, p)
-        moved, at = float(np.max(np.abs(solved.x - at) / trial.typical)), solved.x
-        trial.begin(at, p)
-        if moved < _SETTLED:
-            break
-    size = max(float(np.mean(np.append(trial.away(at, p), at / trial.typical) ** 2)), 1.0)
-    errors = np.sqrt(np.diag(np.linalg.inv(solved.jac.T @ solved.jac)) * size)
-    pairs = zip(effects, at.reshape(-1, 2), errors.reshape(-1, 2), strict=True)
+    model = _with_parts_as_states(trial.replayer.model, effects, trial.typical)
+    replayer = Replayer(card, driven_by, trial.replayer.seen, model)
+    p, record, sigma = model.parameter_values(), trial.still, trial.sigma
+    near = replayer.guess_initial_state(record, sigma, p)
+    near[-len(trial.typical) :] = trial.parts(trial.replayer.model.parameter_values())
+    record, start = replayer.fit_record(record, sigma, p, near)
+    parts, known = start[-len(trial.typical) :], ~np.isnan(record.readings)
+
+    def away(start: Array) -> Array:
+        residual: Array = ((replayer.motion(record, start, p) - record.readings) / sigma)[known]
+        return residual
+
+    reach = _STEP * np.array([state.nominal for state in model.states])
+    slopes = difference_slopes(away, start, away(start), reach)
+    information = slopes.T @ slopes
+    information[-len(parts) :, -len(parts) :] += np.diag(trial.typical**-2)
+    size = max(float(np.mean(away(start) ** 2)), 1.0)
+    errors = np.sqrt(size * np.diag(np.linalg.pinv(information)))[-len(parts) :]
+    pairs = zip(effects, parts.reshape(-1, 2), errors.reshape(-1, 2), strict=True)
     return {name: Surroundings.of_parts(part, error) for name, part, error in pairs}
+
+
+def _with_parts_as_states(model: Model, effects: Sequence[str], typical: Array) -> Model:
+    """The model with the parts (2 m,) along north and east of each of m winds or currents as its last states, which
+    never change and begin at 0, with their `typical` sizes; its inputs of them act on nothing."""
+    values: dict[str, ca.SX] = {}
+    for effect, speed in zip(effects, typical[::2], strict=True):
+        names = EFFECTS[effect].model_names()
+        key, speed_name = names["speed_mps"].rpartition(".")[0], names["speed_mps"]
+        rates = [
+            Quantity(name=f"{key}.{axis}_rate", unit="m/s2", description=f"Rate of {key}.{axis}", value=ca.SX(0))
+            for axis in ("north", "east")
+        ]
+        parts = [
+            State(
+                name=f"{key}.{axis}",
+                unit=model[speed_name].unit,
+                description=f"Part along {axis}",
+                nominal=float(speed),
+                derivative=rate.name,
+                start=0.0,
+            )
+            for axis, rate in zip(("north", "east"), rates, strict=True)
+        ]
+        north, east = (part.symbol for part in parts)
+        model = model.extend(*rates, *parts)
+        values |= {speed_name: ca.hypot(north, east), names["direction_rad"]: ca.atan2(east, north)}
+    return model.substitute_all(values)
 
 
 def _typical_speed(card: ManoeuvringCard, name: str) -> float:

@@ -139,11 +139,13 @@ class Replayer:
         ``angle`` or ``order``.
     seen : sequence of str
         The ny variables to compare, ``motion.*``.
+    model : Model, optional
+        In place of the card's: with more states, of which an initial value is to be found.
     """
 
-    def __init__(self, card: ManoeuvringCard, driven_by: str, seen: Sequence[str]):
+    def __init__(self, card: ManoeuvringCard, driven_by: str, seen: Sequence[str], model: Model | None = None):
         self.card, self.seen = card, tuple(seen)
-        self.model = driven_model(card, driven_by)
+        self.model = driven_model(card, driven_by) if model is None else model
         step, constants = step_and_constants(self.model)
         self._steps, self._constants = Chain(step), constants
         self._shown = shown_by(self.model, seen)
@@ -190,7 +192,9 @@ class Replayer:
     def _readings(self, record: InputRecord, states: Array, p: Array) -> Array:
         return self._shown(states[:: record.every], record.inputs[:: record.every], p)[0]
 
-    def fit_record(self, record: InputRecord, sigma: Array, p: Array) -> tuple[InputRecord, Array]:
+    def fit_record(
+        self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None
+    ) -> tuple[InputRecord, Array]:
         """The record with the instants at which its orders were given, and its initial state, that fit it best.
 
         An order that was sampled once or twice a second was given at an unknown instant between two readings. Where the
@@ -198,13 +202,13 @@ class Replayer:
         initial state, each beforehand uniform over its interval (with the variance of that, 1/12). Without such steps,
         and with a model that is further off, as :meth:`fit_initial_state`.
         """
-        start, misfit = self._least_squares_start(record, sigma, p, wrong=False)
+        start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
         rows = self._unsure_steps(record)
         if len(rows) and misfit < _FOLLOWED:
-            timed, begun, left = self._least_squares_instants(record, start, rows, sigma, p)
+            timed, begun, left = self._least_squares_instants(record, start, rows, sigma, p, near)
             if left < max(min(_NEAR, misfit), _EXPLAINED * misfit):
                 return timed, begun
-        return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, wrong=True)[0]
+        return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
 
     def delayed_by_instants(self, record: InputRecord, given: Array) -> InputRecord:
         """A coarse record whose order a fault of the card delays, with that delay in its instants.
@@ -238,7 +242,13 @@ class Replayer:
         return rows if len(rows) <= _MOST_STEPS else none
 
     def _least_squares_instants(
-        self, record: InputRecord, start: Array, rows: NDArray[np.intp], sigma: Array, p: Array
+        self,
+        record: InputRecord,
+        start: Array,
+        rows: NDArray[np.intp],
+        sigma: Array,
+        p: Array,
+        near: Array | None = None,
     ) -> tuple[InputRecord, Array, float]:
         """The record with the instants of the steps at `rows`, the initial state, and their misfit.
 
@@ -248,7 +258,7 @@ class Replayer:
         middle = record.middle
         guess, spread = _first_state(self, record, sigma, p)
         known, size = ~np.isnan(record.readings), len(start)
-        unknown = np.append(guess, np.full(len(rows), middle))
+        unknown = np.append(guess if near is None else near, np.full(len(rows), middle))
         reach = np.append(1e-4 * self._nominal, np.full(len(rows), _REACH))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:

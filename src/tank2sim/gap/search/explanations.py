@@ -50,6 +50,10 @@ HOPELESS = 100.0
 """Proposals whose gain, or whose score in the first fit, is this far behind the best of their kind are not fitted
 (project choice)."""
 
+MOVED = 50.0
+"""An explanation that is better by this than the one about whose motion all are linear is the next to be linear about
+(project choice): a score is then wrong by up to a fifth of this, the difference that decides."""
+
 _FAR = 300.0
 """The noise of an explanation this far behind the best, at the noise of the best, is not estimated, and it is not tried
 again (project choice)."""
@@ -131,23 +135,32 @@ def search(
     first = Screen(likelihood, none, every)
     proposed = [*first.singles()[:FIRST_SINGLES], *(first.pairs()[:FIRST_PAIRS] if most > 1 else ())]
     rough.fit(_proposals(rough, proposed, [none.logs, believed], least=2))
-    best = rough.best()
-    # Again about the motion of the best: its residual is small, and "none" is scored about the same motion.
-    about_best = likelihood.about(best)
-    if likelihood.belief.waves is not None:
-        about_best = about_best.with_waves(fit_waves(about_best, best))
-    fitting = Fitting(about_best, hypotheses, progress, executor)
-    again = [fit for fit in rough.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
-    fitting.fit(
-        [Proposal({}, [best.logs, none.logs, believed], ROUNDS_OF_NONE)]
-        + [refit(fit, [best.logs, fit.logs], ROUNDS) for fit in again]
-    )
-    _explore(fitting, every, believed, most)
-    _let_surroundings_differ(fitting, every, most)
-    _add_more(fitting, every, most)
+    fitting = _about_best(rough)
+    for stage in (_explore, _let_surroundings_differ, _add_more):
+        reached = fitting.best().score
+        stage(fitting, every, most)
+        if fitting.best().score < reached - MOVED:
+            fitting = _about_best(fitting)
     _polish(fitting)
     fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
     return Search(fitting.likelihood, tuple(fits), every)
+
+
+def _about_best(fitting: Fitting) -> Fitting:
+    """The explanations so far, fitted again about the motion of the best: its residual is small. "None" is scored about
+    the same motion."""
+    best, none = fitting.best(), fitting.found[()]
+    likelihood = fitting.likelihood.about(best)
+    if likelihood.belief.waves is not None:
+        likelihood = likelihood.with_waves(fit_waves(likelihood, best))
+    likelihood = likelihood.with_scale(likelihood.noise_scale(best))
+    about = Fitting(likelihood, fitting.hypotheses, fitting.progress, fitting.executor)
+    kept = [fit for fit in fitting.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
+    about.fit(
+        [Proposal({}, [best.logs, none.logs, likelihood.belief.logs], ROUNDS_OF_NONE)]
+        + [refit(fit, [best.logs, fit.logs], ROUNDS) for fit in kept]
+    )
+    return about
 
 
 def _variants(likelihood: Likelihood, hypotheses: HypothesisCache, name: str) -> tuple[Variant, ...]:
@@ -158,10 +171,10 @@ def _variants(likelihood: Likelihood, hypotheses: HypothesisCache, name: str) ->
         return ()
 
 
-def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, most: int) -> None:
+def _explore(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
     """Singles, pairs and swaps at the noise of the best so far."""
     best = fitting.best()
-    starts = [best.logs, believed]
+    starts = [best.logs, fitting.likelihood.belief.logs]
     second = Screen(fitting.likelihood, replace(fitting.best(0), logs=best.logs), every)
     singles, pairs = second.singles(), second.pairs() if most > 1 else ()
     enough = min(singles[0].gain - HOPELESS, COMPARABLE * singles[0].gain)
