@@ -50,7 +50,7 @@ HOPELESS = 100.0
 """Proposals whose gain, or whose score in the first fit, is this far behind the best of their kind are not fitted
 (project choice)."""
 
-MOVED = 50.0
+MUCH_BETTER = 50.0
 """An explanation that is better by this than the one about whose motion all are linear is the next to be linear about
 (project choice): a score is then wrong by up to a fifth of this, the difference that decides."""
 
@@ -139,7 +139,7 @@ def search(
     for stage in (_explore, _let_surroundings_differ, _add_more):
         reached = fitting.best().score
         stage(fitting, every, most)
-        if fitting.best().score < reached - MOVED:
+        if fitting.best().score < reached - MUCH_BETTER:
             fitting = _about_best(fitting)
     _polish(fitting)
     fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
