@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import craft_log
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import tank2sim as t2s
 from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
+from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import CoefficientVerdict, determination
 from tests.craft_trials import written
 
@@ -67,6 +70,16 @@ def test_orders_alone_give_thrust_curve_damping_and_lag(craft, tmp_path) -> None
     for name in ("Xu", "Xuabsu", "Nr", "Nrabsr"):
         assert abs(coefficients[name]["value"] - craft[name]) < 3 * coefficients[name]["standard_error"], name
     assert found.card.thrusters[1].time_constant_s == pytest.approx(coefficients["port.time_constant"]["value"])
+
+
+def test_a_fit_that_drives_the_craft_on_is_not_blamed_on_the_card(craft) -> None:
+    card = craft_log.first_card(craft, np.random.default_rng(5)).card
+    assert isinstance(card, CraftCard)
+    estimate = SimpleNamespace(values=np.array([40.0]), standard_errors=np.array([1.0]))
+    fit = SimpleNamespace(problem=SimpleNamespace(free=("derivatives.Xu",)), estimate=estimate)
+    with pytest.raises(InputError) as refused:
+        identified_craft(card, fit)
+    assert refused.value.place == "derivatives.Xu" and "these trials" in refused.value.problem
 
 
 @pytest.mark.parametrize(("rows", "place"), [("1.5", "order_port"), ("", "n_port_rpm")])

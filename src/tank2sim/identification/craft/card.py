@@ -8,6 +8,7 @@ from tank2sim.cards.card import CraftCard
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.cards.small_craft import craft_scale, craft_scales
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
+from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import CraftFit
 from tank2sim.identification.craft.order_response import OrderResponse
 from tank2sim.identification.craft.problem import twins
@@ -26,6 +27,11 @@ def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, Ord
     fit : CraftFit
     responses : mapping, optional
         Thruster to its response to orders: lag, and dead band where it is determined.
+
+    Raises
+    ------
+    InputError
+        The estimates are those of no craft: its damping would drive it on.
     """
     changes: dict[str, object] = {}
     for number, thruster in enumerate(card.thrusters):
@@ -60,6 +66,13 @@ def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, Ord
                 key = _KEYS[rest[1]]
                 changes[f"thrusters.{number}.{key}"] = max(0.0, float(value))
                 changes[f"thrusters.{number}.uncertainty.{key}"] = float(error)
-    found = parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source)
+    try:
+        found = parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source)
+    except InputError as error:
+        problem = f"fitted to these trials, it {error.problem}"
+        remedy = (
+            "the mass, the inertia, and places and largest revolutions of the thrusters are taken as exact: check them"
+        )
+        raise InputError(card.source, error.place, problem, remedy) from error
     assert isinstance(found, CraftCard)
     return found
