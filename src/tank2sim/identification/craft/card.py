@@ -71,7 +71,7 @@ def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, Ord
     except InputError as error:
         problem = f"fitted to these trials, it {error.problem}"
         remedy = (
-            "the mass, the inertia, and places and largest revolutions of the thrusters are taken as exact: check them"
+            "check the mass, the inertia, and places and largest revolutions of the thrusters: they are taken as exact"
         )
         raise InputError(card.source, error.place, problem, remedy) from error
     assert isinstance(found, CraftCard)
