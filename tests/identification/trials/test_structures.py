@@ -12,7 +12,8 @@ import tank2sim as t2s
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics import build
-from tank2sim.identification.trials.identify import IdentificationOptions, structure_by_evidence
+from tank2sim.identification.trials.assessment.structure_choice import structure_by_evidence
+from tank2sim.identification.trials.identify import IdentificationOptions
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import (
