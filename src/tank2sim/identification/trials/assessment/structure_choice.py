@@ -17,7 +17,13 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.identifiability import refuse_unseen
-from tank2sim.identification.trials.assessment.model_selection import Criteria, criteria
+from tank2sim.identification.trials.assessment.model_selection import (
+    Criteria,
+    criteria,
+    cross_validate,
+    simplest,
+    yaw_rate_error,
+)
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -59,14 +65,17 @@ def structure_by_evidence(
     """Name of the structure, and a notice: cross-flow drag, or the card's own terms if the trials prefer them strongly.
 
     Both are fitted by equation error. Terms of the card are preferred if their Bayesian information criterion is less
-    by more than :data:`STRONGLY` for each independent sample. Where the trials hardly distinguish the two, cross-flow
-    drag is the better guess beyond them: it is bounded by the physics of separated flow where a polynomial is not. If
-    the hard turns of the two differ, and none was held out to judge by, a notice is marked.
+    by more than :data:`STRONGLY` for each independent sample. Where that hardly distinguishes the two, each is fitted
+    without one trial at a time, and the card's terms are taken if they predict the trials left out better, by more than
+    one standard error of the difference (:func:`.simplest`). Else cross-flow drag is the better guess beyond the
+    trials: it is bounded by the physics of separated flow where a polynomial is not. If the hard turns of the two
+    differ, and none was held out to judge by, a notice is marked.
     """
     if card.model.kind != "abkowitz":
         return "card", ()
     found: list[Criteria] = []
     cards: list[ManoeuvringCard] = []
+    problems: list[Problem] = []
     try:
         for name in ("card", "cross_flow"):
             started = STRUCTURES[name].start(card)
@@ -75,18 +84,35 @@ def structure_by_evidence(
             estimate = equation_error(posed)
             found.append(criteria(posed, estimate, found[0].samples if found else None))
             cards.append(card_with_estimate(started, estimate))
+            problems.append(posed)
     except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
         return "card", ()
     own, drag = found
     difference = (own.bic - drag.bic) / own.samples
     if difference < -STRONGLY:
         return "card", ()
-    words = "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer"
+    undecided = abs(difference) < STRONGLY
+    taken = "card" if undecided and _predicts_better(*problems) else "cross_flow"
     criterion = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
-    chosen = f"{words} strongly {criterion}; --structure card keeps them"
+    chosen = (
+        "structure: the card's own third-order terms, which predict trials that were left out better than cross-flow "
+        f"drag {criterion}; --structure cross_flow takes that"
+        if taken == "card"
+        else "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer "
+        f"strongly {criterion}; --structure card keeps them"
+    )
     hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
-    undecided = abs(difference) < STRONGLY and hardest < NEARLY_HARD * HARD_RUDDER
-    return "cross_flow", (chosen, *(_turns_in_doubt(*cards) if undecided else ()))
+    in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER
+    return taken, (chosen, *(_turns_in_doubt(*cards, taken) if in_doubt else ()))
+
+
+def _predicts_better(own: Problem, drag: Problem) -> bool:
+    """Whether the card's own terms predict trials that were left out of the fit better than cross-flow drag does."""
+    if len(own.runs) < 2:
+        return False
+    problems = {"cross_flow": drag, "card": own}
+    found = {name: cross_validate(posed, equation_error, yaw_rate_error) for name, posed in problems.items()}
+    return simplest(found) == "card"
 
 
 def _largest_rudder(trial: Trial) -> float:
@@ -95,7 +121,7 @@ def _largest_rudder(trial: Trial) -> float:
     return max((float(np.nanmax(np.abs(values))) for values in known), default=0.0)
 
 
-def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard) -> Sequence[str]:
+def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[str]:
     """A marked sentence if the turns of two structures that the trials do not distinguish are different ones."""
     gear = drag.steering_gear
     rudder = min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
@@ -103,10 +129,11 @@ def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard) -> Sequence[str
     if not any(np.isfinite(sizes)) or abs(sizes[0] / sizes[1] - 1) < DIFFERENT_TURN:
         return ()
     texts = [f"{size:.2f} L" if np.isfinite(size) else "none" for size in sizes]
+    mine, other = (", taken", "") if taken == "card" else ("", ", taken")
     return (
         f"{CHECK} the trials hardly distinguish two structures of the hull, whose turns with "
-        f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag, taken) and "
-        f"{texts[0]} (the card's own terms): fit or hold out a turn with as much rudder",
+        f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag{other}) and "
+        f"{texts[0]} (the card's own terms{mine}): fit or hold out a turn with as much rudder",
     )
 
 
