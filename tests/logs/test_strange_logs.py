@@ -218,3 +218,14 @@ def test_the_columns_that_vary_and_are_not_understood_are_listed(tmp_path) -> No
     made.to_csv(path, index=False)
     notes = [f for f in log(path).voyage.findings if f.kind == "note" and "Kwartal" in f.text]
     assert [note.evidence["streams"] for note in notes] == [1]
+
+
+def test_a_temperature_that_lies_near_the_course_is_no_heading(tmp_path) -> None:
+    """A ship on 78 deg most of the time, and an engine at 78 degC."""
+    made = table().rename(columns={"heading_deg": "P3"})
+    made["Engine temperature"] = (
+        np.degrees(voyage().heading) + np.random.default_rng(3).normal(0, 20, len(made))
+    ) % 360
+    path = tmp_path / "voyage.csv"
+    made.to_csv(path, index=False)
+    assert used(log(path))["heading"] == "P3"

@@ -466,7 +466,10 @@ class _Search:
         nameless = [
             stream
             for stream in self.streams
-            if not stream.quantity and len(stream.values) >= FEW_SAMPLES and np.ptp(stream.values) > 0
+            if not stream.quantity
+            and len(stream.values) >= FEW_SAMPLES
+            and np.ptp(stream.values) > 0
+            and not names_another(stream.name)
         ]
         if self._best("heading") is None or self._best("cog") is None:
             self._unnamed_directions([stream for stream in nameless if self._circular(stream)])
@@ -488,7 +491,7 @@ class _Search:
             follows = component_evidence(time, values, self.motion.speed_mps, self.motion).agreement or 0.0
             agreement = min(evidence.agreement or 0.0, follows)
             unit = stream.unit or evidence.unit
-            if agreement > 0.9 and evidence.unit and values.min() >= 0 and not names_another(stream.name):
+            if agreement > 0.9 and evidence.unit and values.min() >= 0:
                 if not self._closer_than_water(time, values * QUANTITIES["sog"].units[unit]):
                     continue
                 text = f"by content alone: {evidence.text}"
@@ -598,7 +601,7 @@ class _Search:
         taken = {channel.stream for channel in self.found if channel.confidence >= USED_FROM}
         candidates = []
         for stream in self.streams:
-            if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0:
+            if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0 or names_another(stream.name):
                 continue
             time, values = self.thin(stream)
             evidence, lag = steering_evidence(time, values, *self.rate)
