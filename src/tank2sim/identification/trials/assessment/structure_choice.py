@@ -103,7 +103,7 @@ def structure_by_evidence(
     )
     hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
     in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER
-    return taken, (chosen, *(_turns_in_doubt(*cards, taken) if in_doubt else ()))
+    return taken, (chosen, *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
 
 
 def _predicts_better(own: Problem, drag: Problem) -> bool:
