@@ -258,9 +258,6 @@ NAMES: dict[str, dict[str, tuple[str, ...]]] = {
         "wind_rel_direction": ("WIND_REL_DIR",),
         "heel": ("ROLL_ANGLE", "HEEL"),
     },
-}
-UNKNOWN: dict[str, dict[str, tuple[str, ...]]] = {
-    # languages that the reader does not know: written once, after its words, and not looked at since
     "portuguese": {
         "time": ("timestamp",),
         "latitude": ("lat",),
@@ -303,8 +300,136 @@ UNKNOWN: dict[str, dict[str, tuple[str, ...]]] = {
         "wind_rel_direction": ("Skenbar vindriktning",),
         "heel": ("Krängning", "Rullning"),
     },
+    "polish": {
+        "time": ("Czas", "Czas UTC"),
+        "latitude": ("Szerokość geograficzna", "Szerokość"),
+        "longitude": ("Długość geograficzna", "Długość"),
+        "sog": ("Prędkość nad dnem", "Prędkość względem dna"),
+        "cog": ("Kurs nad dnem", "Kąt drogi nad dnem"),
+        "heading": ("Kurs rzeczywisty", "Kurs żyroskopowy"),
+        "yaw_rate": ("Prędkość kątowa", "Prędkość zwrotu"),
+        "u_water": ("Prędkość po wodzie", "Prędkość względem wody"),
+        "rudder_angle": ("Ster", "Kąt steru", "Wychylenie steru"),
+        "rudder_order": ("Zadany kąt steru", "Ster zadany"),
+        "rpm": ("Obroty", "Obroty śruby", "Obroty wału"),
+        "rpm_port": ("Obroty lewej śruby",),
+        "rpm_starboard": ("Obroty prawej śruby",),
+        "thrust_order_port": ("Silnik lewy",),
+        "thrust_order_starboard": ("Silnik prawy",),
+        "wind_rel_speed": ("Prędkość wiatru pozornego",),
+        "wind_rel_direction": ("Kierunek wiatru pozornego",),
+        "heel": ("Przechył",),
+    },
+    "danish": {
+        "time": ("Tid", "Tidspunkt"),
+        "latitude": ("Breddegrad", "Bredde"),
+        "longitude": ("Længdegrad", "Længde"),
+        "sog": ("Fart over grunden",),
+        "cog": ("Kurs over grunden",),
+        "heading": ("Styret kurs", "Gyrokurs"),
+        "yaw_rate": ("Drejehastighed",),
+        "u_water": ("Fart gennem vandet",),
+        "rudder_angle": ("Ror", "Rorvinkel", "Rorudslag"),
+        "rudder_order": ("Rorordre", "Beordret rorvinkel"),
+        "rpm": ("Omdrejninger", "Omdrejningstal"),
+        "rpm_port": ("Omdrejninger bagbord",),
+        "rpm_starboard": ("Omdrejninger styrbord",),
+        "thrust_order_port": ("Motor bagbord",),
+        "thrust_order_starboard": ("Motor styrbord",),
+        "wind_rel_speed": ("Relativ vindhastighed",),
+        "wind_rel_direction": ("Relativ vindretning",),
+        "heel": ("Krængning",),
+    },
+    "finnish": {
+        "time": ("Aika",),
+        "latitude": ("Leveysaste", "Leveyspiiri"),
+        "longitude": ("Pituusaste", "Pituuspiiri"),
+        "sog": ("Nopeus pohjan suhteen",),
+        "cog": ("Suunta pohjan suhteen", "Kulkusuunta"),
+        "heading": ("Keulasuunta", "Hyrräsuunta"),
+        "yaw_rate": ("Kääntymisnopeus", "Kulmanopeus"),
+        "u_water": ("Nopeus veden suhteen",),
+        "rudder_angle": ("Peräsin", "Peräsinkulma"),
+        "rudder_order": ("Peräsinkäsky", "Peräsin ohje"),
+        "rpm": ("Kierrosluku", "Potkurin kierrosluku"),
+        "rpm_port": ("Kierrosluku paapuuri",),
+        "rpm_starboard": ("Kierrosluku tyyrpuuri",),
+        "thrust_order_port": ("Moottori paapuuri",),
+        "thrust_order_starboard": ("Moottori tyyrpuuri",),
+        "wind_rel_speed": ("Suhteellinen tuulen nopeus",),
+        "wind_rel_direction": ("Suhteellinen tuulen suunta",),
+        "heel": ("Kallistus",),
+    },
+    "turkish": {
+        "time": ("Zaman", "Saat"),
+        "latitude": ("Enlem",),
+        "longitude": ("Boylam",),
+        "sog": ("Yere göre hız",),
+        "cog": ("Yere göre rota",),
+        "heading": ("Pruva", "Gerçek pruva"),
+        "yaw_rate": ("Dönüş hızı", "Dönme hızı"),
+        "u_water": ("Suya göre hız",),
+        "rudder_angle": ("Dümen", "Dümen açısı"),
+        "rudder_order": ("Dümen komutu", "Dümen emri"),
+        "rpm": ("Devir", "Pervane devri"),
+        "rpm_port": ("İskele devir",),
+        "rpm_starboard": ("Sancak devir",),
+        "thrust_order_port": ("İskele itici",),
+        "thrust_order_starboard": ("Sancak itici",),
+        "wind_rel_speed": ("Bağıl rüzgâr hızı",),
+        "wind_rel_direction": ("Bağıl rüzgâr yönü",),
+        "heel": ("Yalpa", "Meyil"),
+    },
 }
-COMMAS = ("german", "french", "spanish", "dutch", "italian", "norwegian")
+UNKNOWN: dict[str, dict[str, tuple[str, ...]]] = {
+    # languages that the reader does not know: written once, after its words, and not looked at since
+    "croatian": {
+        "time": ("timestamp",),
+        "latitude": ("lat",),
+        "longitude": ("lon",),
+        "sog": ("Brzina preko dna", "Brzina nad dnom"),
+        "cog": ("Kurs preko dna", "Putni kut"),
+        "heading": ("Pravi kurs", "Pramčanica", "Žirokurs"),
+        "yaw_rate": ("Brzina okretanja", "Kutna brzina"),
+        "u_water": ("Brzina kroz vodu",),
+        "v_water": ("Poprečna brzina kroz vodu",),
+        "rudder_angle": ("Kormilo", "Kut kormila", "Otklon kormila"),
+        "rudder_order": ("Zapovijed kormila", "Zadani kut kormila"),
+        "rpm": ("Okretaji", "Broj okretaja vijka"),
+        "rpm_port": ("Okretaji lijevo",),
+        "rpm_starboard": ("Okretaji desno",),
+        "thrust_order_port": ("Potisak lijevo",),
+        "thrust_order_starboard": ("Potisak desno",),
+        "wind_rel_speed": ("Prividna brzina vjetra",),
+        "wind_rel_direction": ("Prividni smjer vjetra",),
+        "heel": ("Nagib", "Valjanje"),
+    },
+    "estonian": {
+        "time": ("timestamp",),
+        "latitude": ("latitude",),
+        "longitude": ("longitude",),
+        "sog": ("Kiirus põhja suhtes",),
+        "cog": ("Teekond põhja suhtes", "Teenurk"),
+        "heading": ("Tõeline kurss", "Vööri suund", "Gürokurss"),
+        "yaw_rate": ("Pöördekiirus", "Nurkkiirus"),
+        "u_water": ("Kiirus vee suhtes", "Logi kiirus"),
+        "v_water": ("Põikkiirus vee suhtes",),
+        "rudder_angle": ("Rool", "Roolinurk"),
+        "rudder_order": ("Rooli käsk", "Antud roolinurk"),
+        "rpm": ("Pöörded", "Sõukruvi pöörded"),
+        "rpm_port": ("Pöörded vasak parras",),
+        "rpm_starboard": ("Pöörded parem parras",),
+        "thrust_order_port": ("Tõukejõud vasak",),
+        "thrust_order_starboard": ("Tõukejõud parem",),
+        "wind_rel_speed": ("Suhteline tuule kiirus",),
+        "wind_rel_direction": ("Suhteline tuule suund",),
+        "heel": ("Kreen", "Rullumine"),
+    },
+}
+COMMAS = (
+    *("german", "french", "spanish", "dutch", "italian", "norwegian"),
+    *("portuguese", "swedish", "polish", "danish", "finnish", "turkish"),
+)
 TO_PORT = {  # how a language says that port is positive
     "english": " (port +)", "german": " (Bb +)", "recorder": "_PORT_POS", "french": " (+ bâbord)",
     "spanish": " (babor +)", "dutch": " (BB +)", "italian": " (sinistra +)", "norwegian": " (babord +)",
@@ -615,7 +740,11 @@ class Table:
             )
         encoding = str(rng.choice(["utf-8", "utf-8-sig", "cp1252", "utf-16"], p=[0.5, 0.2, 0.25, 0.05]))
         end = "\r\n" if rng.random() < 0.4 else "\n"
-        self.out.path.write_bytes((end.join(lines) + end).encode(encoding))
+        text = end.join(lines) + end
+        try:
+            self.out.path.write_bytes(text.encode(encoding))
+        except UnicodeEncodeError:  # letters that Windows-1252 does not have
+            self.out.path.write_bytes(text.encode("utf-8"))
 
 
 def cells_of(values: np.ndarray, digits: int) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from operator import xor
 from pathlib import Path
@@ -93,6 +93,59 @@ def frame() -> pd.DataFrame:
             "shaft_rpm": 90.0 + rng.normal(0, 0.2, len(made.time)),
         }
     )
+
+
+Manoeuvres = Sequence[tuple[str, float, float]]
+"""("leg", seconds, 0), ("turn", rudder in deg, change of heading in deg), ("zigzag", rudder and heading, legs)."""
+
+
+def steered(
+    manoeuvres: Manoeuvres, restless_deg: float = 0.0, seed: int = 1
+) -> tuple[pd.DataFrame, list[tuple[str, float, float]]]:
+    """A table at 1 Hz of a ship that is steered so, and (kind, begin, end in s after T0) of its manoeuvres.
+
+    A restless helm adds corrections of so many degrees (rms) to its orders every 2 to 6 s.
+    """
+    rng = np.random.default_rng(seed)
+    step, gain, constant, speed = 0.1, 0.05, 12.0, 6.0
+    psi, rate, delta, t, correction, until = 0.7, 0.0, 0.0, 0.0, 0.0, 0.0
+    rows, spans = [], []
+    for kind, first, second in manoeuvres:
+        begin, base, order, reversals = t, psi, np.radians(first), 0
+        while True:
+            if kind == "leg":
+                done, order = t - begin > first, float(np.clip(-6 * rate, -0.1, 0.1))
+            elif kind == "turn":
+                done = abs(psi - base) > np.radians(second)
+            else:
+                if (psi - base) * np.sign(order) > np.radians(abs(first)):
+                    order, reversals = -order, reversals + 1
+                done = reversals == second
+            if done:
+                break
+            if restless_deg and t >= until:
+                correction, until = np.radians(restless_deg) * rng.normal(), t + rng.uniform(2, 6)
+            delta += float(np.clip(order + correction - delta, -np.radians(0.25), np.radians(0.25)))
+            rate += step * (gain * delta - rate) / constant
+            psi, t = psi + step * rate, t + step
+            rows.append((t, delta, rate, psi))
+        if kind != "leg":
+            spans.append((kind, begin, t))
+    time, rudder, rates, heading = np.array(rows[::10]).T
+    course = heading - 3 * rates
+    north, east = (np.cumsum(speed * part) for part in (np.cos(course), np.sin(course)))
+    metres, n = 111_194.9, len(time)
+    columns = {
+        "utc": [stamp(t) for t in time],
+        "latitude": ORIGIN[0] + north / metres,
+        "longitude": ORIGIN[1] + east / metres / np.cos(np.radians(ORIGIN[0])),
+        "sog_kn": speed / KNOT + rng.normal(0, 0.05, n),
+        "heading_deg": (np.degrees(heading) + rng.normal(0, 0.1, n)) % 360,
+        "rot_deg_min": np.degrees(rates) * 60 + rng.normal(0, 1.0, n),
+        "rudder_deg": np.degrees(rudder) + rng.normal(0, 0.1, n),
+        "shaft_rpm": 90.0 + rng.normal(0, 0.2, n),
+    }
+    return pd.DataFrame(columns), spans
 
 
 def stamp(time_s: float) -> str:

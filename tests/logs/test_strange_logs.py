@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from tank2sim.api.log import log
+from tank2sim.logs.channels import LogChannel
 from tank2sim.logs.content import AGREES, direction_evidence
 from tank2sim.logs.quantities import quantity_of_name
 from tank2sim.logs.reading import read_log
@@ -183,3 +185,47 @@ def test_positions_without_a_name_are_those_that_the_heading_follows(tmp_path, e
     assert (channels["latitude"].stream, channels["longitude"].stream) == (first, second)
     assert channels["latitude"].confidence < 0.9
     assert channels["heading"].stream == "column 4"
+
+
+def bare(folder: Path, columns: list[pd.Series]) -> dict[str, LogChannel]:
+    """Channels in use of a table without a row of names; the first column is UTC, ms since 1970."""
+    path = folder / "bare.csv"
+    time = pd.Series((T0 + voyage().time) * 1000, name=0)
+    pd.concat([time, *columns], axis=1).astype({0: "int64"}).to_csv(path, index=False, header=False)
+    return {channel.quantity: channel for channel in log(path).voyage.channels.channels if channel.use}
+
+
+def test_a_rudder_without_a_name_is_found_where_the_heading_alone_shows_the_turn(tmp_path) -> None:
+    made = table()
+    found = bare(tmp_path, [made.latitude, made.longitude, made.heading_deg, -made.rudder_deg, made.shaft_rpm])
+    assert (found["rudder_angle"].stream, found["rudder_angle"].sign) == ("column 5", -1)
+    assert found["rudder_angle"].confidence < 0.8  # to be confirmed: the heading may be the course
+
+
+def test_one_of_several_alike_rudders_without_a_name_is_used(tmp_path) -> None:
+    made = table()
+    rng = np.random.default_rng(3)
+    alike = [made.rudder_deg + rng.normal(0, 0.3, len(made)) for _ in range(3)]
+    found = bare(tmp_path, [made.latitude, made.longitude, made.heading_deg, made.rot_deg_min, *alike])
+    assert found["rudder_angle"].stream in ("column 6", "column 7", "column 8")
+
+
+def test_the_columns_that_vary_and_are_not_understood_are_listed(tmp_path) -> None:
+    made = table()
+    made["Kwartal"] = np.random.default_rng(3).normal(size=len(made))
+    made["constant"] = 4.0
+    path = tmp_path / "voyage.csv"
+    made.to_csv(path, index=False)
+    notes = [f for f in log(path).voyage.findings if f.kind == "note" and "Kwartal" in f.text]
+    assert [note.evidence["streams"] for note in notes] == [1]
+
+
+def test_a_temperature_that_lies_near_the_course_is_no_heading(tmp_path) -> None:
+    """A ship on 78 deg most of the time, and an engine at 78 degC."""
+    made = table().rename(columns={"heading_deg": "P3"})
+    made["Engine temperature"] = (
+        np.degrees(voyage().heading) + np.random.default_rng(3).normal(0, 20, len(made))
+    ) % 360
+    path = tmp_path / "voyage.csv"
+    made.to_csv(path, index=False)
+    assert used(log(path))["heading"] == "P3"

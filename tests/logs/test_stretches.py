@@ -12,7 +12,7 @@ import tank2sim as t2s
 from tank2sim.api.log import log
 from tank2sim.logs.clock import utc_text
 from tank2sim.records.reading import read_trial_file
-from tests.logs.made_logs import T0, frame, truth_manoeuvres, voyage
+from tests.logs.made_logs import T0, frame, steered, truth_manoeuvres, voyage
 
 SAME = {
     "zigzag": {"zigzag"},
@@ -49,6 +49,30 @@ def test_a_zigzag_and_a_turn_are_found_where_they_were(made) -> None:
     assert math.degrees(turn.rudder_rad) == pytest.approx(25, abs=0.5)
     legs = [stretch for stretch in made.found if stretch.kind.value == "steady"]
     assert len(legs) == 3 and all(stretch.yaw_rate_radps < 0.5 * zigzag.yaw_rate_radps for stretch in legs)
+
+
+STEADY = ("leg", 100.0, 0.0)
+IN_A_ROW = {
+    "zigzag and turn": [("zigzag", 20, 4), ("turn", 35, 200)],
+    "zigzag and turn by the next order": [("zigzag", 20, 4), ("turn", 20, 200)],
+    "zigzag and turn to the side of its last order": [("zigzag", 20, 4), ("turn", -35, 200)],
+    "two zigzags": [("zigzag", 10, 4), ("zigzag", 20, 4)],
+    "turn to the other side": [("turn", 35, 360), ("turn", -35, 360)],
+    "turn and zigzag": [("turn", 25, 270), ("leg", 40, 0), ("zigzag", -20, 5)],
+    "turns with short legs": [("turn", 35, 70), ("leg", 40, 0), ("turn", -35, 120), ("leg", 40, 0), ("turn", 20, 90)],
+}
+
+
+@pytest.mark.parametrize("restless_deg", [0.0, 2.0])
+@pytest.mark.parametrize("case", IN_A_ROW)
+def test_manoeuvres_in_a_row_are_one_trial_each(tmp_path, case, restless_deg) -> None:
+    table, known = steered([STEADY, *IN_A_ROW[case], STEADY], restless_deg)
+    table.to_csv(tmp_path / "voyage.csv", index=False)
+    found = [stretch for stretch in log(tmp_path / "voyage.csv").found if stretch.kind.excites]
+    assert [stretch.kind.value for stretch in found] == [kind for kind, _, _ in known]
+    for stretch, (_, begin, end) in zip(found, known, strict=True):
+        assert stretch.begin_s - T0 == pytest.approx(begin, abs=6.0)  # from the helm's last correction on
+        assert -4.0 < stretch.end_s - T0 - end < 65.0  # until the swing is checked
 
 
 def test_trials_are_read_again_and_begin_when_they_say(made, tmp_path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from tank2sim.records.audit import audit_and_repair, audit_trial, record_noise, repair_trial
 from tank2sim.records.audit.rudder import rudder_response
+from tank2sim.records.audit.rudder_clock import rudder_clock_findings
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import select_rows
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
@@ -499,6 +500,29 @@ def test_a_rudder_that_is_late_is_noted_and_left_as_it_is(late_s):
     assert (finding.column, finding.kind, finding.safe) == ("delta_deg", "note", False)
     assert finding.evidence["delay_s"] == pytest.approx(late_s, abs=1.5)
     assert repair_trial(record)[0] is record
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_helm_that_answers_the_yaw_of_gusts_has_no_late_rudder(tmp_path, seed):
+    """A 20/20 zigzag at 1 Hz in gusts: the phase of the loop is no delay of a clock."""
+    rng, step, order = np.random.default_rng(seed), 0.1, 0.0
+    psi = rate = delta = gust = 0.0
+    rows = []
+    for k in range(9000):
+        if k == 600:
+            order = np.radians(20)
+        if psi * np.sign(order) > np.radians(20):
+            order = -order
+        delta += np.clip(order - delta, -np.radians(2.5) * step, np.radians(2.5) * step)
+        gust += -gust * step / 8 + 0.01 * np.sqrt(2 * step / 8) * rng.normal()
+        rate += step * (0.05 * delta - rate + gust) / 12
+        psi += step * rate
+        rows.append((k * step, np.degrees(delta), np.degrees(rate), np.degrees(psi), 6.0))
+    table = np.array(rows[::10])
+    table[:, 1:4] += rng.normal(size=(len(table), 3)) * [0.1, 0.02, 0.1]
+    path = tmp_path / "trial.csv"
+    np.savetxt(path, table, delimiter=",", header="t_s,delta_deg,r_degps,psi_deg,u_mps", comments="")
+    assert rudder_clock_findings(read_trial_file(path)) == []
 
 
 @pytest.mark.parametrize("late_s", [0.0, -1.0, -3.0])

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
@@ -271,7 +272,8 @@ def identify_craft(
     problem, driven_by = craft_problem(ship.card, read), craft_driven_by(ship.card, read)
     runs = problem.runs
     try:
-        with np.errstate(all="ignore"):  # a step of the search may be one to an unstable craft
+        # A step of the search may be one to an unstable craft. Threads of the linear algebra only wait for each other.
+        with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
             fit = fit_craft(problem.with_runs(runs[: len(fitted)]), progress)
     except np.linalg.LinAlgError:
         remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tank2sim.api.craft_identification import CraftTrialPaths, craft_trial_files
 from tank2sim.api.result import Result, ResultTable
@@ -138,7 +139,7 @@ def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult
         raise InputError("trials", "", "there are none, and a craft is validated by what it did", remedy)
     problem = craft_problem(card, [read_craft_trial(path, card.thrusters) for path in paths])
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
             predictions = predict_by_card(problem)
     except np.linalg.LinAlgError:
         remedy = "identify the card from trials first"

@@ -83,6 +83,9 @@ _HOLDS, _MOVES = 0.5, 0.2
 """Share of samples equal to the one before of a stream that holds its values, as an order does, and of one that moves
 (project choice)."""
 
+_CLEARLY = 0.05
+"""By how much the agreement of a rudder with the turn is above that of all other streams (project choice)."""
+
 _DOUBTED = 0.85
 """Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
 
@@ -463,7 +466,10 @@ class _Search:
         nameless = [
             stream
             for stream in self.streams
-            if not stream.quantity and len(stream.values) >= FEW_SAMPLES and np.ptp(stream.values) > 0
+            if not stream.quantity
+            and len(stream.values) >= FEW_SAMPLES
+            and np.ptp(stream.values) > 0
+            and not names_another(stream.name)
         ]
         if self._best("heading") is None or self._best("cog") is None:
             self._unnamed_directions([stream for stream in nameless if self._circular(stream)])
@@ -485,7 +491,7 @@ class _Search:
             follows = component_evidence(time, values, self.motion.speed_mps, self.motion).agreement or 0.0
             agreement = min(evidence.agreement or 0.0, follows)
             unit = stream.unit or evidence.unit
-            if agreement > 0.9 and evidence.unit and values.min() >= 0 and not names_another(stream.name):
+            if agreement > 0.9 and evidence.unit and values.min() >= 0:
                 if not self._closer_than_water(time, values * QUANTITIES["sog"].units[unit]):
                     continue
                 text = f"by content alone: {evidence.text}"
@@ -588,13 +594,14 @@ class _Search:
         self.add(stream, confidence, why, unit=unit, sign=sign)
 
     def _unnamed_rudder(self) -> None:
-        """The stream without a name that leads the turn as a rudder does; none where no rate of turn is certain."""
-        if all((best := self._best(name)) is None or best.confidence < 0.8 for name in ("yaw_rate", "heading")):
+        """The stream without a name that leads the turn as a rudder does; none where no rate of turn is known."""
+        rates = [best.confidence for name in ("yaw_rate", "heading") if (best := self._best(name)) is not None]
+        if not rates:
             return
         taken = {channel.stream for channel in self.found if channel.confidence >= USED_FROM}
         candidates = []
         for stream in self.streams:
-            if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0:
+            if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0 or names_another(stream.name):
                 continue
             time, values = self.thin(stream)
             evidence, lag = steering_evidence(time, values, *self.rate)
@@ -602,12 +609,15 @@ class _Search:
             if evidence.agreement is not None and evidence.agreement > AGREES and lag >= 1.0 and unit:
                 candidates.append((evidence.agreement, stream, evidence, unit))
         candidates.sort(key=lambda entry: -entry[0])
-        one_rudder = len(candidates) < 3 and all(self._alike(candidates[0][1], entry[1]) for entry in candidates[1:])
-        for _, stream, evidence, unit in candidates:
+        for place, (agreement, stream, evidence, unit) in enumerate(candidates):
             quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
-            single = one_rudder or (stream is candidates[0][1] and candidates[0][0] > candidates[1][0] + 0.05)
-            text = f"by content alone: {evidence.text}" + ("" if single else f"; {len(candidates)} streams would do")
-            self.add(stream, 0.75 if single else 0.5, text, quantity=quantity, unit=unit, sign=evidence.sign)
+            others = [entry for entry in candidates if not self._alike(candidates[0][1], entry[1])]
+            clear = not others or (place == 0 and agreement > others[0][0] + _CLEARLY)
+            text = f"by content alone: {evidence.text}"
+            if not clear:
+                text += f"; the same is true of {', '.join(e[1].name for e in candidates if e[1] is not stream)}"
+            confidence = (0.75 if max(rates) > 0.8 else 0.7) if clear else 0.7 if place == 0 else 0.5
+            self.add(stream, confidence, text, quantity=quantity, unit=unit, sign=evidence.sign)
 
     @staticmethod
     def _alike(first: LogStream, second: LogStream) -> bool:

@@ -83,45 +83,59 @@ QUANTITIES: dict[str, LogQuantity] = {
 }
 """Every quantity of a channel. Signs are those of the trial format: starboard, ahead and clockwise are positive."""
 
-_PORT = r"\b(port|left|bb|backbord|babord|ps|l|prt|ptt|links|babor|izquierd[oa]|bakboord|sinistr[oa])\b"
+_PORT = (
+    r"\b(port|left|bb|backbord|babord|ps|l|prt|ptt|links|babor|izquierd[oa]|bakboord|sinistr[oa]|lew[aye]j?|bombordo"
+    r"|bagbord|paapuuri|vasen|iskele)\b"
+)
 _STARBOARD = (
     r"\b(stbd|starboard|right|stb|steuerbord|tribord|sb|r|strb|rechts|estribor|derech[oa]|stuurboord|dritta|destr[oa]"
-    r"|styrbord)\b"
+    r"|styrbord|praw[aye]j?|boreste|estibordo|tyyrpuuri|oikea|sancak)\b"
 )
 _ORDER = (
     r"\b(orders?|ordered|ord|cmd|commands?|commanded|demand|set|setpoint|soll|desired|ref|reference|target|commande"
-    r"|consigne|ordre|orden|ordenado|ordine|comando|gewenste|onsket|\w*(?:sollwert|kommando|commando|befehl|ordre))\b"
+    r"|consigne|ordre|orden|ordenado|ordine|comando|gewenste|onsket|zadan[aye]|nastawa|ordem|beordrad|onskad|beordret|ohje|komento|emir|emri|komut\w*|istenen|\w*(?:sollwert|kommando|commando|befehl|ordre|kasky))\b"
 )
 _RUDDER = (
-    r"\b(rudder|rud|ruder\w*|helm|delta|rsa|barre|barra|timone?|gouvernail|roer\w*|ror(?:vinkel|utslag|kommando|ordre)?"
-    r"|steering)\b"
+    r"\b(rudder|rud|ruder\w*|helm|delta|rsa|barre|barra|timone?|gouvernail|roer\w*|ror(?:vinkel|utslag|kommando|ordre|udslag)?"
+    r"|roder\w*|steering|steru?|leme|perasin\w*|dumen)\b"
 )
 _REVOLUTIONS = (
-    r"\b(rpm|\w*drehzahl|revs|revolutions|umdrehungen|giri|tours|regime|revoluciones|\w*toerental|\w*turtall)\b"
+    r"\b(rpm|\w*drehzahl|revs|revolutions|umdrehungen|giri|tours|regime|revoluciones|\w*toerental|\w*turtall"
+    r"|obr(?:oty|otow|otowa)?|rotac(?:ao|oes)|\w*varvtal|\w*omdrejning\w*|\w*kierrosluku|kierrokset|devir|devri)\b"
 )
-_SHAFT = rf"{_REVOLUTIONS}|\b(shaft|propeller|engine|n|helice|elica|arbre)\b"
+_SHAFT = rf"{_REVOLUTIONS}|\b(shaft|propeller|engine|n|helice|elica|arbre|sruby|walu|potkuri\w*|pervane)\b"
 _NOT_SPEED = r"\b(temp\w*|torque|fuel|power|load|pressure|flow|hours|current|alarm|limit)\b"
 _THRUST = (
     r"\b(thrust|thruster|thrusters|thr|schub|motor|motors|moteur|motore|throttle|propulsor|propulseur|propulsore|esc|pwm"
-    r"|fahrhebel|stuwkracht|padrag|cmd|command)\b"
+    r"|fahrhebel|stuwkracht|\w*padrag|ster strumieniowy|pednik|silnik|\w*potkuri|moottori|itici|motoru|cmd|command)\b"
 )
 _WIND = (
     r"\b(wind(?:geschw\w*|richtung|snelheid|richting|speed|angle)?|wnd|awa|aws|twa|tws|twd|vent|viento|vento"
-    r"|vindhastighet|vindretning)\b"
+    r"|vind|vindhastighe[td]|vindretning|vindriktning|wiatru?|tuul(?:i|en)|ruzgar)\b"
 )
-_FROM = r"\b(dir|direction|angle|winkel|angulo|angolo|\w*richtung|\w*richting|\w*retning|awa|twd)\b"
-_TRUE = r"\b(true|wahr\w*|vrai|real|reale|tw[asd])\b"
-_WATER = r"\b(water|stw|wassers?|log|through|eau|surface|agua|acqua|vannet)\b"
-_GROUND = r"\b(ground|grund|sog|over|gps|fondo?|grond|suolo|grunn)\b"
+_FROM = (
+    r"\b(dir|direction|angle|winkel|angulo|angolo|\w*richtung|\w*richting|\w*retning|\w*riktning|kierunek|kat"
+    r"|direcao|\w*vinkel|suunta|kulma|yonu|acisi|awa|twd)\b"
+)
+_TRUE = r"\b(true|wahr\w*|vrai|real|reale|rzeczywist\w*|verdadeir[oa]|sann?|sand|todellinen|gercek|tw[asd])\b"
+_WATER = (
+    r"\b(water|stw|wassers?|log|through|eau|surface|agua|superficie|acqua|vannet|vattnet|vandet|loggfart|wody|wodzie"
+    r"|veden|vedessa|suya)\b"
+)
+_GROUND = r"\b(ground|grund|sog|over|gps|fondo?|fundo|grond|suolo|grunn|dnem|dna|pohjan|yere)\b"
 _RATE_WORDS = (
     r"\b(rot|yawrate|yaw rate|turn rate|rate of turn|drehgeschw\w*|drehrate|wendegeschw\w*|gyr ?z|gyro ?z|omega ?z"
     r"|wz|angular velocity z|rate ?turn|taux de giration|vitesse de (?:giration|rotation)|(?:velocidad|regimen) de giro"
-    r"|draaisnelheid|bochtaanwijzer|velocita (?:di accostata|angolare)|svinghastighet|dreiehastighet)\b|^r$"
+    r"|draaisnelheid|bochtaanwijzer|velocita (?:di accostata|angolare)|svinghastighet|dreiehastighet"
+    r"|predkosc (?:katowa|zwrotu|obrotu)|(?:taxa|velocidade|razao) de (?:guinada|giro)|girhastighet"
+    r"|svanghastighet|vridhastighet"
+    r"|drejehastighed|kaantymisnopeus|kulmanopeus|donu?s hizi|donme hizi)\b|^r$"
 )
 _SPEED_WORDS = (
-    r"\b(speed|spd|fahrt|vitesse|velocity|\w*geschw\w*|sog|stw|velocidad|velocita|snelheid|grondsnelheid|fart)\b"
+    r"\b(speed|spd|fahrt|vitesse|velocity|\w*geschw\w*|sog|stw|velocidad|velocita|snelheid|grondsnelheid|fart"
+    r"|\w*fart|predkosc|velocidade|nopeus|hiz|hizi)\b"
 )
-_TRANSVERSE = r"\b(transverse|trans|lateral|sway|quer\w*)\b"
+_TRANSVERSE = r"\b(transverse|trans|lateral|sway|quer\w*|transversal|tvar\w*|poprzeczn[ay])\b"
 
 _PATTERNS: tuple[tuple[str, str, str], ...] = (
     # quantity, words that must be there, words that must not
@@ -130,13 +144,14 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     ("y", r"^(y|pos|position)? ?(e|east|easting)( position| pos)?( m)?$", r"^e$"),
     (
         "latitude",
-        r"\b(lat|latitude|breite|breitengrad|latitud|latitudine|breedte|breedtegraad|bredde|breddegrad)\b",
+        r"\b(lat|latitude|breite|breitengrad|latitud|latitudine|breedte|breedtegraad|bredde|breddegrad|szerokosc"
+        r"|leveys(?:aste|piiri)?|enlem)\b",
         r"\b(lateral|accel\w*|latency)\b",
     ),
     (
         "longitude",
         r"\b(lon|lng|long|longitude|lange|laenge|langengrad|laengengrad|longitud|longitudine|lengte|lengtegraad|lengde"
-        r"|lengdegrad)\b",
+        r"|lengdegrad|laengde|laengdegrad|dlugosc|pituus(?:aste|piiri)?|boylam)\b",
         r"\b(longitudinal|speed|spd|water|accel\w*)\b",
     ),
     ("wind_direction", rf"(?=.*{_WIND})(?=.*{_TRUE})(?=.*({_FROM}|\btwa\b))", ""),
@@ -158,19 +173,24 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     ("yaw_rate", _RATE_WORDS, r"\b(desired|set|error|ref)\b"),
     (
         "magnetic_heading",
-        r"(?=.*\b(heading|hdg|compass|kompass)\b)(?=.*\b(mag|magnetic|compass|kompass|hdm)\b)|\bhdm\b",
+        r"(?=.*\b(heading|hdg|compass|kompass)\b)(?=.*\b(mag|magnetic|compass|kompass|hdm)\b)|\bhdm\b"
+        r"|\b(kurs kompasowy|kompassisuunta|manyetik pruva)\b",
         r"\b(true|gps|gnss)\b",
     ),
     (
         "heading",
         r"\b(heading|hdg|hdt|psi|yaw|steuerkurs|gyro|cap|true heading|kreiselkurs|rumbo|proa|prua|gyrokoers|gyrokurs"
-        r"|vorausrichtung|voorliggende koers|ware koers|kurs rechtweisend|rettvisende kurs|stevnet kurs)\b",
-        r"\b(rate|speed|error|err|desired|des|set|cmd|ref|control|mag|u|r|e|x|y|z|fondo?|grunn|grond|suolo|grund)\b",
+        r"|vorausrichtung|voorliggende koers|ware koers|kurs rechtweisend|rettvisende kurs|stevnet kurs"
+        r"|kurs (?:rzeczywisty|zyroskopowy|zyrokompasowy)|rumo (?:verdadeiro|da giro)|aproamento"
+        r"|(?:kompass)?kurs rattvisande"
+        r"|stavad kurs|styret kurs|keulasuunta|hyrrasuunta|pruva)\b",
+        r"\b(rate|speed|error|err|desired|des|set|cmd|ref|control|mag|u|r|e|x|y|z|fondo?|fundo|grunn|grond|suolo|grund)\b",
     ),
     (
         "cog",
-        r"\b(cog|track|course|crs|route|rotta|kug|grondkoers|beholden kurs)\b"
-        rf"|(?=.*\b(kurs|koers|rumbo)\b)(?=.*{_GROUND})",
+        r"\b(cog|track|course|crs|route|rotta|kug|grondkoers|beholden kurs|grundkurs"
+        r"|(?:kat )?drogi|kulkusuunta)\b"
+        rf"|(?=.*\b(kurs|koers|rumbo|rumo|rota|suunta)\b)(?=.*{_GROUND})",
         r"\b(error|cross|desired|speed|set|planned|ordered|to)\b",
     ),
     ("v_water", rf"(?=.*{_TRANSVERSE})(?=.*{_SPEED_WORDS})(?!.*\b(ground|grund)\b)", ""),
@@ -178,7 +198,7 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     ("u_water", rf"(?=.*{_SPEED_WORDS})(?=.*{_WATER})|\b(stw|fd ?w|loggefahrt)\b", _TRANSVERSE),
     (
         "sog",
-        rf"(?=.*{_SPEED_WORDS})(?=.*{_GROUND})|\b(grondsnelheid|fug|fart o grunn)\b",
+        rf"(?=.*{_SPEED_WORDS})(?=.*{_GROUND})|\b(grondsnelheid|fug|fart o grunn|grundfart)\b",
         rf"{_TRANSVERSE}|\b(wind|water)\b",
     ),
     ("a_x", r"\b(acc|accel|acceleration)\b.*\bx\b|\b(accx|ax)\b", ""),
@@ -186,7 +206,7 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
     (
         "heel",
         r"\b(heel|roll|phi|krangung|kraengung|rollwinkel|roulis|gite|escora|balance|slagzij|helling|sbandamento|rollio"
-        r"|krengning|rull)\b",
+        r"|krengning|rull|przechyl|adernamento|banda|balanco|krangning|rullning|kraengning|kallistu(?:s|ma)|yalpa|meyil)\b",
         r"\b(rate|desired|speed|batt\w*|cell\w*)\b",
     ),
 )
@@ -217,7 +237,7 @@ def unit_of_signal_k(name: str, quantity: str) -> str:
     return "1/s" if name.endswith(".revolutions") else next(iter(QUANTITIES[quantity].units))
 
 
-_LETTERS = str.maketrans({"ø": "o", "æ": "ae", "ß": "ss"})
+_LETTERS = str.maketrans({"ø": "o", "æ": "ae", "ß": "ss", "ł": "l", "ı": "i"})
 """Letters that are not one of a to z with an accent."""
 
 
@@ -236,8 +256,8 @@ def _without_accents(text: str) -> str:
 def quantity_of_name(name: str) -> str:
     """Quantity that the words of a name suggest; empty if they suggest none.
 
-    English, German, French, Spanish, Dutch, Italian, Norwegian, and the abbreviations of NMEA are known. A number
-    behind a word is not part of it (``ROT1``).
+    English, German, French, Spanish, Portuguese, Italian, Dutch, Danish, Norwegian, Swedish, Finnish, Polish, Turkish,
+    and the abbreviations of NMEA are known. A number behind a word is not part of it (``ROT1``).
     """
     words = re.sub(r"(?<=[a-z])(?=\d)", " ", plain_words(name))
     for quantity, wanted, barred in _COMPILED:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -122,6 +123,18 @@ class _Signals:
     heading: Array
     rate: Array
     rest_s: float
+
+    @property
+    def step(self) -> float:
+        """s."""
+        return float(self.time[1] - self.time[0])
+
+    def held(self, begin: int, end: int) -> Array:
+        """Steering where it does not move to another order."""
+        values = self.steering[begin:end]
+        reach = max(1, round(JUMP_S / self.step))
+        still = np.abs(values[reach:] - values[:-reach]) < 0.5 * self.threshold
+        return values[reach:][still] if len(values) > reach else values[:0]
 
 
 @dataclass(frozen=True)
@@ -300,6 +313,27 @@ _UNSTEERED = (StretchKind.STEADY, StretchKind.ACCELERATE, StretchKind.COAST, Str
 
 _JOINABLE = (StretchKind.STEADY, StretchKind.REST, StretchKind.ASTERN)
 
+FAR_TURN_RAD = math.radians(100.0)
+"""Change of heading under one order from which it is a turn, and not a leg of a zigzag. Project choice: a leg of the
+20/20 zigzag changes it by 40 deg, and an overshoot comes back."""
+
+CHANGED_COURSE_RAD = math.radians(45.0)
+"""Change of heading from which a rudder's order is a turn, and no step. Project choice: steps leave the course as it is
+in the mean."""
+
+_OTHER_ORDER = 0.3
+"""Relative difference from which two rudders to one side are two orders. Project choice: corrections of a helmsman are
+smaller in the mean, the step from 20 to 35 deg is larger."""
+
+_MOVING = 0.1
+"""Least change between samples, over the threshold, of a rudder on its way: a fifth of what gear turns in 0.2 s."""
+
+_ALIKE = 0.4
+"""Relative difference of the orders of a zigzag. Project choice: ITTC's are equal; angles differ by the gear."""
+
+_FOLLOWING = 0.7
+"""Share of the legs of a zigzag in which the heading follows the order (project choice)."""
+
 _STEPS_LEAST = 4
 """Short stretches in a row that are one of steps. Project choice: fewer are an approach and a manoeuvre."""
 
@@ -328,7 +362,7 @@ def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
         else:
             groups.append([piece])
     out: list[_Piece] = []
-    for piece in _steps(signals, [_joined(signals, group) for group in groups]):
+    for piece in _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)]):
         same = out and out[-1].kind == piece.kind and piece.kind in _JOINABLE
         settled = out and out[-1].kind is StretchKind.ACCELERATE and piece.kind is StretchKind.STEADY
         if same or (settled and (piece.end - piece.begin) * step < 2 * signals.rest_s):
@@ -353,8 +387,11 @@ def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     """Rows of at least :data:`_STEPS_LEAST` short stretches as one of steps each."""
     step = float(signals.time[1] - signals.time[0])
     longest = _STEPS_LONGEST * signals.rest_s
+    ship = signals.threshold == HELD_RUDDER_RAD
     short = [
-        (piece.end - piece.begin) * step < longest and piece.kind not in (StretchKind.ZIGZAG, StretchKind.REST)
+        (piece.end - piece.begin) * step < longest
+        and piece.kind not in (StretchKind.ZIGZAG, StretchKind.REST)
+        and not (ship and abs(_turned(signals, piece.begin, piece.end)) > CHANGED_COURSE_RAD)
         for piece in pieces
     ]
     out: list[_Piece] = []
@@ -373,39 +410,149 @@ def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
 
 def _belongs(signals: _Signals, group: Sequence[_Piece], piece: _Piece, brief: bool) -> bool:
     last = group[-1]
-    same_power = abs(piece.propulsion - last.propulsion) <= PROPULSION_STEP * signals.full or math.isnan(
-        piece.propulsion
-    )
+    same_power = _same_power(signals, last, piece)
     steered = (StretchKind.TURN, StretchKind.PIVOT)
     if last.kind in steered and piece.kind in steered:
+        if _amidships(signals, last):
+            return False
         if last.kind == piece.kind is StretchKind.PIVOT and not brief:
             return False
         return same_power
     return brief and same_power and last.kind in steered and piece.kind in (StretchKind.STEADY, StretchKind.ACCELERATE)
 
 
-def _joined(signals: _Signals, group: Sequence[_Piece]) -> _Piece:
-    while len(group) > 1 and group[-1].kind in (StretchKind.STEADY, StretchKind.ACCELERATE):
-        group = [*group[:-2], replace(group[-2], end=group[-1].end)]
-    begin, end, first = group[0].begin, group[-1].end, group[0]
+def _manoeuvres(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
+    """The manoeuvres of a group: zigzags, turns, and what is left, as one of steps each."""
     if len(group) == 1:
-        kind = first.kind
-        lasted = (end - begin) * float(signals.time[1] - signals.time[0])
-        if kind is StretchKind.TURN and (abs(_turned(signals, begin, end)) < LEAST_TURN_RAD or lasted < LEAST_TURN_S):
-            kind = StretchKind.STEADY
-        return replace(first, kind=kind)
-    levels = np.array([piece.level for piece in group if abs(piece.level) > signals.threshold])
-    powers = np.array([piece.propulsion for piece in group])
-    alternating = len(levels) > 2 and bool((levels[1:] * levels[:-1] < 0).mean() > 0.7)
-    alike = float(np.ptp(np.abs(levels))) < 0.4 * float(np.max(np.abs(levels))) if len(levels) else False
-    constant = np.isnan(powers).any() or np.ptp(powers) < 2 * PROPULSION_STEP * signals.full
-    if alternating and alike and constant:
-        kind = StretchKind.ZIGZAG
-    elif len(levels) <= 2 and _main_share(group) > 0.8:
-        kind = StretchKind.TURN if first.kind is not StretchKind.PIVOT else StretchKind.PIVOT
-    else:
-        kind = StretchKind.STEPS
-    return replace(first, begin=begin, end=end, kind=kind)
+        return [_single(signals, group[0])]
+    legs = _legs(signals, group)
+    out: list[_Piece] = []
+    rest: list[_Piece] = []
+    place = 0
+    while place < len(legs):
+        count, kind = _zigzag_length(signals, legs[place:]), StretchKind.ZIGZAG
+        if not count and _turns_far(signals, legs[place]):
+            checked = place + 1 < len(legs) and _checks_swing(signals, *legs[place : place + 2])
+            count, kind = 1 + checked, legs[place].kind
+        if count:
+            out += [*_remaining(signals, rest), _whole(legs[place : place + count], kind)]
+            rest, place = [], place + count
+        else:
+            rest.append(legs[place])
+            place += 1
+    if out and len(rest) == 1 and _checks_swing(signals, legs[-2], rest[0]):
+        out[-1], rest = replace(out[-1], end=rest[0].end), []
+    return out + _remaining(signals, rest)
+
+
+def _single(signals: _Signals, piece: _Piece) -> _Piece:
+    """A piece alone: without a change of heading it is not a turn."""
+    lasted = (piece.end - piece.begin) * signals.step
+    turned = abs(_turned(signals, piece.begin, piece.end))
+    if piece.kind is StretchKind.TURN and (turned < LEAST_TURN_RAD or lasted < LEAST_TURN_S):
+        return replace(piece, kind=StretchKind.STEADY)
+    return piece
+
+
+def _legs(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
+    """Pieces of a group to one side as one each: a helmsman's corrections of an order are no order of their own."""
+    sides: list[list[_Piece]] = []
+    for piece in group:
+        if (
+            sides
+            and (_amidships(signals, piece) or sides[-1][0].level * piece.level > 0)
+            and _same_power(signals, sides[-1][0], piece)
+        ):
+            sides[-1].append(piece)
+        else:
+            sides.append([piece])
+    legs = [leg for pieces in sides for leg in _levels(signals, pieces)]
+    for place, (last, leg) in enumerate(pairwise(legs)):
+        begin = _movement_begin(signals, leg, last.begin)
+        legs[place : place + 2] = replace(legs[place], end=begin), replace(leg, begin=begin)
+    return legs
+
+
+def _amidships(signals: _Signals, piece: _Piece) -> bool:
+    """Whether the rudder is amidships at the end of a piece: for a moment, or brought back slowly."""
+    late = signals.steering[(piece.begin + piece.end) // 2 : piece.end]
+    return bool(abs(np.median(late)) <= signals.threshold)
+
+
+def _levels(signals: _Signals, pieces: Sequence[_Piece]) -> list[_Piece]:
+    """Pieces to one side as one leg, or as several where an order goes over into another for long."""
+    steered = [piece.end for piece in pieces if not _amidships(signals, piece)]
+    begin, end = pieces[0].begin, steered[-1] if steered else pieces[-1].end
+    settled = signals.rest_s / signals.step
+    costs: dict[int, float] = {}
+    for place, piece in enumerate(pieces):
+        parts = signals.held(begin, piece.begin), signals.held(piece.begin, end)
+        if min(map(len, parts)) > settled:
+            before, after = map(np.median, parts)
+            if abs(after - before) > max(_OTHER_ORDER * max(abs(before), abs(after)), signals.threshold):
+                costs[place] = float(np.abs(parts[0] - before).sum() + np.abs(parts[1] - after).sum())
+    if costs:
+        place = min(costs, key=costs.__getitem__)
+        return [*_levels(signals, pieces[:place]), *_levels(signals, pieces[place:])]
+    held_orders = signals.held(begin, end)
+    level = float(np.median(held_orders)) if len(pieces) > 1 and len(held_orders) else pieces[0].level
+    return [replace(pieces[0], end=pieces[-1].end, level=level)]
+
+
+def _movement_begin(signals: _Signals, leg: _Piece, least: int) -> int:
+    """The sample from which the rudder moves to the order of a leg, after sample `least`."""
+    begin, towards = leg.begin, math.copysign(1.0, leg.level) * np.diff(signals.steering)
+    while begin - 1 > least and towards[begin - 1] > _MOVING * signals.threshold:
+        begin -= 1
+    return begin
+
+
+def _same_power(signals: _Signals, first: _Piece, second: _Piece) -> bool:
+    return math.isnan(second.propulsion) or (
+        abs(second.propulsion - first.propulsion) <= PROPULSION_STEP * signals.full
+    )
+
+
+def _zigzag_length(signals: _Signals, legs: Sequence[_Piece]) -> int:
+    """How many of the first legs are a zigzag: opposite orders of one size that each turn the vessel; 0 for none."""
+    count = 0
+    for place, leg in enumerate(legs):
+        sizes = [abs(each.level) for each in legs[: place + 1]]
+        alike = max(sizes) - min(sizes) < _ALIKE * max(sizes)
+        other = place == 0 or leg.level * legs[place - 1].level < 0
+        same_power = abs(leg.propulsion - legs[0].propulsion) < 2 * PROPULSION_STEP * signals.full
+        if not (alike and other and (same_power or math.isnan(leg.propulsion))) or _turns_far(signals, leg):
+            break
+        count = place + 1
+    following = sum(_turned(signals, leg.begin, leg.end) * leg.level >= 0 for leg in legs[:count])
+    return count if count > 2 and following > _FOLLOWING * count else 0
+
+
+def _turns_far(signals: _Signals, leg: _Piece) -> bool:
+    """Whether a leg turns farther than one of a zigzag does."""
+    turn = leg.kind is StretchKind.TURN and abs(leg.level) > signals.threshold
+    return turn and abs(_turned(signals, leg.begin, leg.end)) > FAR_TURN_RAD
+
+
+def _checks_swing(signals: _Signals, turn: _Piece, check: _Piece) -> bool:
+    """Whether the second of two legs checks the swing of the first: short and small, or the heading does not follow."""
+    short = (check.end - check.begin) * signals.step < signals.rest_s
+    follows = _turned(signals, check.begin, check.end) * check.level > 0
+    return turn.level * check.level < 0 and (not follows or (short and abs(check.level) < 0.5 * abs(turn.level)))
+
+
+def _remaining(signals: _Signals, legs: Sequence[_Piece]) -> list[_Piece]:
+    """Legs that are neither a zigzag nor far turns."""
+    if len(legs) < 2:
+        return [_single(signals, leg) for leg in legs]
+    levels = [leg.level for leg in legs if abs(leg.level) > signals.threshold]
+    if len(levels) <= 2 and _main_share(legs) > 0.8:
+        return [_whole(legs, StretchKind.PIVOT if legs[0].kind is StretchKind.PIVOT else StretchKind.TURN)]
+    return [_whole(legs, StretchKind.STEPS)]
+
+
+def _whole(legs: Sequence[_Piece], kind: StretchKind) -> _Piece:
+    return replace(legs[0], end=legs[-1].end, kind=kind)
 
 
 def _main_share(group: Sequence[_Piece]) -> float:

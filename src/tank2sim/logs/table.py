@@ -28,9 +28,9 @@ _ZONES_H |= {"est": -5, "edt": -4, "cst": -6, "cdt": -5, "mst": -7, "mdt": -6, "
 
 _TIME_WORDS = re.compile(
     r"\b(time|times|timestamp|zeit|uhrzeit|zeitstempel|utc|datetime|epoch|stamp|heure|horodatage|hora|ora|tijd|tijdstip"
-    r"|tid|tidspunkt|t|secs|seconds)\b"
+    r"|tid|tidspunkt|czas|tempo|aika|zaman|saat|t|secs|seconds)\b"
 )
-_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha|data|dato)\b")
+_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha|data|dato|paivamaara|tarih)\b")
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 """Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""

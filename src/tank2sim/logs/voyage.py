@@ -124,6 +124,8 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
         remedy = f"say which is what in a channels file (--channels), as docs/logs.md shows: {_listed(named)}"
         raise InputError(logs[0].path, "", problem, remedy)
     findings += _to_confirm(found)
+    if channels is None:
+        findings += _not_understood(found, streams)
     series, origin = _derived(series)
     findings += _gap_findings(series)
     begin = min(float(entry.time_s[0]) for entry in series.values())
@@ -142,6 +144,9 @@ def _gathered(findings: list[LogFinding]) -> list[LogFinding]:
         for key, group in groups.items()
     ]
 
+
+MOST_NAMED = 20
+"""Streams that a note lists by name (project choice: logs of boards hold hundreds)."""
 
 _CLOCKS_AGREE_S = 0.5
 """Difference of the clocks of two logs that is reported, s. Project choice: a ship turns by a degree at most."""
@@ -189,6 +194,19 @@ def _shift(first: tuple[Array, Array], second: tuple[Array, Array]) -> float | N
     correlations = [float(np.corrcoef(reference, np.interp(grid + lag, *second))[0, 1]) for lag in lags]
     best = int(np.nanargmax(correlations))
     return float(lags[best]) if correlations[best] > AGREES else None
+
+
+def _not_understood(found: ChannelSet, streams: list[LogStream]) -> list[LogFinding]:
+    """The streams that vary and are no channel, neither by name nor by content, as one note."""
+    known = {channel.stream for channel in found.channels}
+    names = [stream.name for stream in streams if stream.name not in known and np.ptp(stream.values) > 0]
+    if not names:
+        return []
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    text = (
+        f"columns that were not understood: {', '.join(names[:MOST_NAMED])}{more}; add them to channels.toml if they "
+    )
+    return [LogFinding("note", f"{text}are quantities of it", evidence={"streams": len(names)})]
 
 
 def _listed(named: Mapping[str, LogStream]) -> str:

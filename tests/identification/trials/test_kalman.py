@@ -7,7 +7,13 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
-from tank2sim.identification.trials.methods.kalman_gains import Variances, gains, innovation_tangents, smooth_states
+from tank2sim.identification.trials.methods.kalman_gains import (
+    Variances,
+    gains,
+    innovation_tangents,
+    smooth_states,
+    variant_likelihoods,
+)
 from tank2sim.identification.trials.methods.kalman_search import task_of
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
@@ -58,6 +64,40 @@ def test_filter_and_smoother_are_those_of_dense_gaussian_algebra():
     states, errors = smooth_states(A[None], C[None], found, before[None], e[None])
     np.testing.assert_allclose(states.ravel(), mean, atol=1e-9)
     np.testing.assert_allclose(errors.ravel(), spread, atol=1e-9)
+
+
+def test_runs_of_different_lengths_say_together_what_each_says_alone():
+    rng = np.random.default_rng(1)
+    lengths, n, nz, ny, k, variants = (5, 12, 8), 12, 4, 2, 3, 2
+
+    def stacked(*shape):
+        values = rng.normal(size=(len(lengths), n, *shape))
+        for run, length in enumerate(lengths):
+            values[run, length:] = np.nan  # what is in the padding does not matter
+        return values
+
+    tangents = Tangents(0.5 * stacked(nz, nz), stacked(nz, k), stacked(ny, nz), stacked(ny, k))
+    innovations, after = stacked(ny), stacked(nz)
+    process, measurement = rng.uniform(0.1, 0.2, (variants, 3, nz)), rng.uniform(0.1, 0.2, (variants, 3, n, ny))
+    start, factors = np.broadcast_to(np.eye(nz), (variants, 3, nz, nz)), rng.uniform(0.2, 0.9, (variants, 3, 1))
+
+    def said(runs, length, of):
+        part = np.s_[runs, :length]
+        along = Tangents(*(values[part] for values in (tangents.A, tangents.B, tangents.C, tangents.D)))
+        noise = Variances(process[:, runs], measurement[:, runs, :length], start[:, runs], of)
+        found = gains(along.A, along.C, Variances(noise.process[0], noise.measurement[0], noise.start[0], of))
+        likelihood = variant_likelihoods(along, noise, innovations[part], after[part], factors[:, runs])
+        return found.log_determinant, *likelihood, innovation_tangents(along, found)
+
+    determinant, cost, information, (J, last) = said(slice(None), n, lengths)
+    alone = [said(slice(run, run + 1), length, None) for run, length in enumerate(lengths)]
+    assert determinant == pytest.approx(sum(one[0] for one in alone))
+    np.testing.assert_allclose(cost, sum(one[1] for one in alone))
+    np.testing.assert_allclose(information, sum(one[2] for one in alone))
+    for run, length in enumerate(lengths):
+        np.testing.assert_allclose(J[run, :length], alone[run][3][0][0])
+        np.testing.assert_allclose(last[run], alone[run][3][1][0])
+    assert (J[0, lengths[0] :] == 0).all()
 
 
 @pytest.mark.slow

@@ -12,7 +12,10 @@ import tank2sim as t2s
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics import build
-from tank2sim.identification.trials.identify import IdentificationOptions, structure_by_evidence
+from tank2sim.identification.trials.assessment import structure_choice
+from tank2sim.identification.trials.assessment.model_selection import Criteria
+from tank2sim.identification.trials.assessment.structure_choice import structure_by_evidence
+from tank2sim.identification.trials.identify import IdentificationOptions
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -149,6 +152,24 @@ def test_evidence_takes_the_terms_that_made_the_trials(ship: str, start: str, ex
     trials = measured(sorted(tmp_path.glob("*.csv")), card)
     structure, notices = structure_by_evidence(card, trials, IdentificationOptions())
     assert structure == expected and bool(notices) == (expected == "cross_flow")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ship", "start", "expected"), [("mariner", "mariner", "card"), ("kvlcc2", "kvlcc2-captive", "cross_flow")]
+)
+def test_where_the_criterion_decides_nothing_the_predictions_of_trials_left_out_do(
+    ship: str, start: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alike = Criteria(aic=0.0, bic=0.0, samples=100.0, parameters=10.0)
+    monkeypatch.setattr(structure_choice, "criteria", lambda *_: alike)
+    for angle in (10, 20):
+        t2s.load(ship).zigzag(angle, angle).df[::10].to_csv(tmp_path / f"{angle}.csv", index=False)
+    card = read_card(start)
+    assert isinstance(card, ManoeuvringCard)
+    trials = measured(sorted(tmp_path.glob("*.csv")), card)
+    structure, notices = structure_by_evidence(card, trials, IdentificationOptions())
+    assert structure == expected and notices
 
 
 @pytest.mark.slow

@@ -17,7 +17,13 @@ from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbance
 from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, kalman
 from tank2sim.identification.trials.methods.kalman_gains import smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import Levels
-from tank2sim.identification.trials.methods.kalman_search import SearchPoint, SearchTask, normal, task_of
+from tank2sim.identification.trials.methods.kalman_search import (
+    SearchPoint,
+    SearchTask,
+    normal,
+    task_of,
+    whitened_innovations,
+)
 from tank2sim.identification.trials.problem.estimation_problem import Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -131,8 +137,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     problem = with_disturbances(problem, *_disturbances_of(problem, first.smoothed))
     estimate = kalman(problem, first.values, settings, progress)
     levels = levels_of(problem, estimate)
-    by_run = np.stack([information(problem.with_runs((run,)), estimate.values, levels) for run in problem.runs])
-    return CraftFit(problem, estimate, levels, by_run)
+    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
 
 
 def _first_estimate(problem: Problem, settings: KalmanSettings, progress: SearchReport) -> KalmanEstimate:
@@ -213,10 +218,10 @@ def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
 
 
 def information(problem: Problem, values: Array, levels: Levels) -> Array:
-    """Information of the runs of a problem (k, k) at parameters and noise levels."""
-    task, point = _point(problem, values, levels)
-    found: Array = normal(task, point)[0] - problem.prior_precision(problem.prior_error)
-    return found
+    """Information of each run of a problem (runs, k, k) at parameters and noise levels."""
+    J, _ = whitened_innovations(_point(problem, values, levels)[1].filtered)
+    flat = J.reshape(len(J), -1, J.shape[-1])
+    return np.asarray(np.swapaxes(flat, 1, 2) @ flat)
 
 
 def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:

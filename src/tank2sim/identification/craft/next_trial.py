@@ -146,6 +146,6 @@ def _added_information(fit: CraftFit, inputs: Array) -> Array | None:
     shown = sensitivity.shown(states, inputs, p)
     made = replace(run, name="candidate", begin_s=0.0, inputs=inputs, measured=shown)
     try:
-        return information(problem.with_runs((made,)), fit.estimate.values, fit.levels)
+        return np.asarray(information(problem.with_runs((made,)), fit.estimate.values, fit.levels)[0])
     except np.linalg.LinAlgError:
         return None

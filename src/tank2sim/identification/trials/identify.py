@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
-from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
 from tank2sim.identification.trials.assessment.evaluation import replay_error
@@ -27,7 +26,6 @@ from tank2sim.identification.trials.assessment.method_choice import (
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
-    criteria,
     cross_validate,
     predictive_weights,
     simplest,
@@ -41,6 +39,7 @@ from tank2sim.identification.trials.assessment.prediction_intervals import (
     compare_held_out,
     criteria_or_none,
 )
+from tank2sim.identification.trials.assessment.structure_choice import posed_in, structure_by_evidence
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
@@ -61,8 +60,6 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     lowered_bound_notice,
     polynomial_over_trials,
     problem_from_card,
-    with_captive,
-    with_correlations,
     with_range,
 )
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
@@ -76,10 +73,8 @@ from tank2sim.identification.trials.problem.water_current import (
     without_current,
 )
 from tank2sim.marks import CHECK
-from tank2sim.records.trials import RUDDERS, Trial
-from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
-from tank2sim.simulation.run import simulate
 
 PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
@@ -87,22 +82,6 @@ small against the motion; shorter pieces show less of the derivatives, longer on
 
 LEAST_PIECE = 0.5
 """Shortest piece, in L/u0: in less the state hardly responds to the rudder, and initial states outnumber the data."""
-
-STRONGLY = 1.0
-"""Difference of the Bayesian information criterion for each independent sample by which the card's own terms must be
-better: residuals that are smaller by a factor e in generalised variance. On measured trials model error, which the
-criterion takes for noise, shifts it by up to 0.2; on trials of a ship that has the card's terms it is 59 (project
-choice: between the two)."""
-
-HARD_RUDDER = math.radians(35.0)
-"""Rudder of the turns that two structures are compared by: that of the turning test of IMO resolution MSC.137(76)."""
-
-NEARLY_HARD = 0.9
-"""Share of that rudder from which a trial shows what a hard turn does (project choice)."""
-
-DIFFERENT_TURN = 0.1
-"""Share by which the tactical diameters of two structures may differ (project choice: twice what is asked of a
-prediction)."""
 
 LEAST_WEIGHT = 0.02
 """Structures of less weight are left out of an average: of 100 members they would be one or two (project choice)."""
@@ -454,74 +433,6 @@ def _choice(problem: Problem, in_pieces: Estimate, trials: Measured, options: Id
     return choose_method(signal_residuals(problem, in_pieces))
 
 
-def structure_by_evidence(
-    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, holdout: Measured | None = None
-) -> tuple[str, tuple[str, ...]]:
-    """Name of the structure, and a notice: cross-flow drag, or the card's own terms if the trials prefer them strongly.
-
-    Both are fitted by equation error. Terms of the card are preferred if their Bayesian information criterion is less
-    by more than :data:`STRONGLY` for each independent sample. Where the trials hardly distinguish the two, cross-flow
-    drag is the better guess beyond them: it is bounded by the physics of separated flow where a polynomial is not. If
-    the hard turns of the two differ, and none was held out to judge by, a notice is marked.
-    """
-    if card.model.kind != "abkowitz":
-        return "card", ()
-    found: list[Criteria] = []
-    cards: list[ManoeuvringCard] = []
-    try:
-        for name in ("card", "cross_flow"):
-            started = STRUCTURES[name].start(card)
-            posed = _posed(card, started, trials, options)
-            posed = posed.without(refuse_unseen(posed))
-            estimate = equation_error(posed)
-            found.append(criteria(posed, estimate, found[0].samples if found else None))
-            cards.append(card_with_estimate(started, estimate))
-    except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
-        return "card", ()
-    own, drag = found
-    difference = (own.bic - drag.bic) / own.samples
-    if difference < -STRONGLY:
-        return "card", ()
-    words = "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer"
-    criterion = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
-    chosen = f"{words} strongly {criterion}; --structure card keeps them"
-    hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
-    undecided = abs(difference) < STRONGLY and hardest < NEARLY_HARD * HARD_RUDDER
-    return "cross_flow", (chosen, *(_turns_in_doubt(*cards) if undecided else ()))
-
-
-def _largest_rudder(trial: Trial) -> float:
-    """Largest angle of the rudder, or order, in a trial, rad."""
-    known = (trial.signals[name] for name in RUDDERS if name in trial.signals)
-    return max((float(np.nanmax(np.abs(values))) for values in known), default=0.0)
-
-
-def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard) -> Sequence[str]:
-    """A marked sentence if the turns of two structures that the trials do not distinguish are different ones."""
-    gear = drag.steering_gear
-    rudder = min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
-    sizes = [_tactical_diameter(each, rudder) for each in (own, drag)]
-    if not any(np.isfinite(sizes)) or abs(sizes[0] / sizes[1] - 1) < DIFFERENT_TURN:
-        return ()
-    texts = [f"{size:.2f} L" if np.isfinite(size) else "none" for size in sizes]
-    return (
-        f"{CHECK} the trials hardly distinguish two structures of the hull, whose turns with "
-        f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag, taken) and "
-        f"{texts[0]} (the card's own terms): fit or hold out a turn with as much rudder",
-    )
-
-
-def _tactical_diameter(card: ManoeuvringCard, rudder: float) -> float:
-    """In lengths, in still water; nan if the ship does not turn round."""
-    model = build(card)
-    try:
-        run = simulate(model, Turn(rudder), inputs=undisturbed_inputs(model))
-    except InputError:  # a polynomial that drives itself out of all bounds
-        return math.nan
-    size = run.figures["tactical_diameter_lengths"]
-    return float(size) if isinstance(size, float) else math.nan
-
-
 def cross_validate_structures(
     card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, executor: Executor | None = None
 ) -> dict[str, CrossValidation]:
@@ -529,7 +440,7 @@ def cross_validate_structures(
     results = {}
     for name, structure in STRUCTURES.items():
         started = structure.start(card)
-        problem = _posed(card, started, trials, options)
+        problem = posed_in(card, started, trials, options)
         posed = portable(problem, started, trials.driven_by)
         results[name] = cross_validate(posed, partial(_in_pieces, options=options), yaw_rate_error, executor)
     return results
@@ -560,7 +471,7 @@ def _fitted(
     Output error and the Kalman filter estimate the current with the parameters; the other methods take the card's.
     """
     started = STRUCTURES[structure].start(card)
-    problem = _posed(card, started, trials, options)
+    problem = posed_in(card, started, trials, options)
     unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
     problem = problem.without(unseen)
     current = None
@@ -568,7 +479,7 @@ def _fitted(
         joint, choice = _estimate_and_choice(with_current(problem), trials, options, progress)
         estimate, current = without_current(joint, started)
         started = card_in(started, current)
-        problem = _posed(card, started, trials, options).without(unseen)
+        problem = posed_in(card, started, trials, options).without(unseen)
     else:
         estimate, choice = _estimate_and_choice(problem, trials, options, progress)
     improved = with_range(card_with_estimate(started, estimate), problem)
@@ -594,7 +505,7 @@ def _kept_weights(
     card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, structures: Mapping[str, CrossValidation]
 ) -> dict[str, float]:
     """Weights of the structures, those below :data:`LEAST_WEIGHT` left out; a window of a run counts as a sample."""
-    problem = _posed(card, card, trials, options)
+    problem = posed_in(card, card, trials, options)
     samples = [max(1.0, (run.times[-1] - run.times[0]) / (PIECE * problem.ship_time)) for run in problem.runs]
     weights = predictive_weights(structures, samples)
     kept = {name: weight for name, weight in weights.items() if weight >= LEAST_WEIGHT}
@@ -605,13 +516,6 @@ def _average_in_words(weights: Mapping[str, float]) -> str:
     shares = ", ".join(f"{name} {100 * weights[name]:.0f} %" for name in sorted(weights, key=weights.__getitem__)[::-1])
     words = "intervals are of all, the card is that of the first"
     return f"average over structures by their predictions: {shares}; {words}"
-
-
-def _posed(
-    card: ManoeuvringCard, started: ManoeuvringCard, trials: Measured, options: IdentificationOptions
-) -> Problem:
-    problem = problem_from_card(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
-    return with_captive(with_correlations(problem, card), started, trials.captive)
 
 
 def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:

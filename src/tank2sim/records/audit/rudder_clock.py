@@ -21,6 +21,11 @@ STEADY_ROWS, REACH_ROWS, MOVES = 6, 20, 3
 LATE = 0.17
 """Lateness, as a share of the time in which the yaw rate comes half-way, that is not due to the short-time expansion:
 free-running models with right clocks (KVLCC2 of HSVA and MARIN, Esso Osaka) stay below 0.15."""
+_FARTHEST = 0.6
+"""Largest share that is determined: beyond, the yaw rate has come half-way without the rudder. Project choice."""
+_AGREEING = 0.3
+"""How far the middle half of the movements, one by one, may be from their common lateness, over it. A delay is the same
+in all of them; the phase of a loop (a helm or autopilot that answers the yaw, and gusts) is not. Project choice."""
 _BETTER = 2.0
 """Ratio of the sums of squares without and with the shift; wind alone gives up to 1.4. Project choice."""
 
@@ -37,7 +42,7 @@ class _Move:
 
 def rudder_clock_findings(trial: Trial) -> list[Finding]:
     """A rudder angle that is late. An early one, or an order, cannot be distinguished from a slow ship or steering
-    gear.
+    gear; and nothing is found where the movements do not agree, as in feedback of a yaw that gusts drive.
 
     Shortly after a rudder moves, r = a + b t + c I + d J, with I the integral over time of the change of the rudder
     and J that of I: the first terms of the answer of any linear ship, none of which comes before its cause. The shift
@@ -54,11 +59,15 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
         return []
     reach = int(np.median([move.reach for move in moves]))
     shifts = np.arange(-reach, reach + 1, max(1, reach // 40))
-    squares = np.array([sum(_squares(move, rudder, rate, step, int(shift)) for move in moves) for shift in shifts])
-    best = int(np.argmin(squares))
+    each = np.array([[_squares(move, rudder, rate, step, int(shift)) for shift in shifts] for move in moves])
+    squares = each.sum(axis=0)
+    best, least = int(np.argmin(squares)), LATE * reach
     late = float(shifts[best]) * step
     unshifted = float(squares[np.argmin(np.abs(shifts))])
-    if late < LATE * reach * step or unshifted < _BETTER * squares[best] or best == len(shifts) - 1:
+    if not least < shifts[best] < _FARTHEST * reach or unshifted < _BETTER * squares[best]:
+        return []
+    quarters = np.percentile(shifts[np.argmin(each, axis=1)], [25, 75])  # of the movements one by one
+    if np.abs(quarters - shifts[best]).max() > _AGREEING * shifts[best]:
         return []
     what = f"the yaw rate answers {late:.3g} s before the rudder moves, in {len(moves)} movements"
     truth = f"the rudder is late by about {late:.2g} s (its clock, or a filter in the sensor)"

@@ -76,10 +76,20 @@ def _verdict(cut: Sequence[Json], faults: int) -> str:
     """What the log gives for an identification."""
     if not cut:
         return "The log has no manoeuvre that could be cut out as a trial."
-    stems = (PurePath(stretch["file"]).stem for stretch in cut[:_MOST_TRACKS])  # such as 02_zigzag_-20
-    names = ", ".join(stem.partition("_")[2].replace("_", " ") for stem in stems)
+    orders: dict[str, list[str]] = {}  # kind to the orders of its trials, empty without any
+    for stretch in cut:
+        _, kind, *order = PurePath(stretch["file"]).stem.split("_")  # such as 02_zigzag_-20
+        orders.setdefault(kind, []).append(" ".join(order))
+    names = ", ".join(f"{kind} {_in_short(each)}".rstrip() for kind, each in orders.items())
     count = f"{len(cut)} trials are" if len(cut) > 1 else "One trial is"
     return f"{count} cut out: {names}." + (f" {faults} faults are noted below." if faults else "")
+
+
+def _in_short(orders: Sequence[str]) -> str:
+    """Orders of the trials of a kind, or how many these are."""
+    if all(orders):
+        return " ".join(orders)
+    return f"({len(orders)})" if len(orders) > 1 else ""
 
 
 def _map(found: Json) -> list[PageSection]:
@@ -87,9 +97,8 @@ def _map(found: Json) -> list[PageSection]:
         return []
     time, x, y = (vector(found["track"][name]) for name in ("t_s", "x_m", "y_m"))
     tracks = [TrackData(label="voyage", x_m=x, y_m=y, time_s=time)]
-    exciting = sorted(
-        (stretch for stretch in found["stretches"] if stretch["file"]), key=lambda stretch: -stretch["duration_s"]
-    )[:_MOST_TRACKS]
+    cut = [stretch for stretch in found["stretches"] if stretch["file"]]
+    exciting = sorted(cut, key=lambda stretch: -stretch["duration_s"])[:_MOST_TRACKS]
     for stretch in sorted(exciting, key=lambda stretch: float(stretch["begins_s"])):
         inside = _inside(time, stretch)
         if inside.sum() > 1:
@@ -97,6 +106,8 @@ def _map(found: Json) -> list[PageSection]:
             tracks.append(TrackData(label=label, x_m=x[inside], y_m=y[inside], time_s=time[inside]))
     origin = found["origin_deg"]
     caption = f"Origin at {origin[0]:g} deg N, {origin[1]:g} deg E (WGS 84)." if origin else ""
+    if len(cut) > _MOST_TRACKS:
+        caption += f" The longest {_MOST_TRACKS} of {len(cut)} trials are shown."
     chart = Illustration(chart=track_chart(tracks, title="Map"), caption=caption)
     return [PageSection(heading="Map", charts=[chart])]
 

@@ -230,7 +230,7 @@ def _minimise(
         return gain < 1e-6 * max(1.0, better.cost)
 
     found = damped_gauss_newton(point(values, windows), linearise, move, report, steps=20)
-    (*_, best), last = found
+    best, _, last = found
     return best.values, best.windows, last or linearise(best)
 
 

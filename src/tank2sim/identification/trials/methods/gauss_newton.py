@@ -25,7 +25,7 @@ def damped_gauss_newton(
     report: Callable[[Point, float], bool],
     steps: int,
     damping_range: tuple[float, float] = (1e-6, 1e-3),
-) -> tuple[list[Point], System | None]:
+) -> tuple[Point, tuple[float, ...], System | None]:
     """Steps that each lower the cost, until none does.
 
     Parameters
@@ -45,14 +45,15 @@ def damped_gauss_newton(
 
     Returns
     -------
-    path : list
-        All points, the best last.
+    best : Point
+    costs : tuple of float
+        Of all points after the start, the best last.
     system : System or None
-        Normal equations at the last point; None where they were not computed.
+        Normal equations at the best point; None where they were not computed.
     """
-    path, damping = [start], 0.0
+    point, damping = start, 0.0
+    costs: tuple[float, ...] = ()
     for _ in range(steps):
-        point = path[-1]
         system = linearise(point)
         for _attempt in range(MOST_ATTEMPTS):
             moved = move(point, system, damping)
@@ -60,9 +61,9 @@ def damped_gauss_newton(
                 break
             damping = max(10 * damping, damping_range[1])
         else:
-            return path, system
-        path.append(moved)
+            return point, costs, system
         damping = damping / 10 if damping > damping_range[0] else 0.0
-        if report(moved, point.cost - moved.cost):
+        point, gain, costs = moved, point.cost - moved.cost, (*costs, moved.cost)
+        if report(point, gain):
             break
-    return path, None
+    return point, costs, None

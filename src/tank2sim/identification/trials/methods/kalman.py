@@ -147,20 +147,22 @@ def kalman(
     """
     settings = settings or KalmanSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)
-    path = [task.first_point((problem.prior_mean if start is None else start).copy())]
+    best = task.first_point((problem.prior_mean if start is None else start).copy())
+    costs: tuple[float, ...] = ()
     scale: Mapping[str, float] = {}
     for number in range(_ROUNDS):
-        path += maximise(
-            task, path[-1], settings.iterations, lambda point: progress("kalman", point.values, point.cost)
-        )[1:]
-        wanted = evidence_scale(problem, _information(task, path[-1]), path[-1].values, scale)
+        best, found = maximise(
+            task, best, settings.iterations, lambda point: progress("kalman", point.values, point.cost)
+        )
+        costs += found
+        wanted = evidence_scale(problem, _information(task, best), best.values, scale)
         same = all(abs(factor / scale.get(group, 1.0) - 1) < SAME_SCALE for group, factor in wanted.items())
         if not settings.scale_prior or number == _ROUNDS - 1 or same:
             break
         scale = wanted
         task = replace(task, problem=replace(problem, prior_error=scaled_prior(problem, scale)))
-        path = [*path[:-1], task.relinearise(path[-1])]
-    return _estimate(task, path, scale)
+        best = task.relinearise(best)
+    return _estimate(task, best, costs, scale)
 
 
 def _information(task: SearchTask, point: SearchPoint) -> Array:
@@ -168,8 +170,10 @@ def _information(task: SearchTask, point: SearchPoint) -> Array:
     return normal(task, point)[0] - task.problem.prior_precision(task.problem.prior_error)
 
 
-def _estimate(task: SearchTask, path: list[SearchPoint], scale: Mapping[str, float]) -> KalmanEstimate:
-    problem, batch, best = task.problem, task.batch, path[-1]
+def _estimate(
+    task: SearchTask, best: SearchPoint, costs: tuple[float, ...], scale: Mapping[str, float]
+) -> KalmanEstimate:
+    problem, batch = task.problem, task.batch
     information = _information(task, best)
     before = problem.prior_precision(problem.prior_error)
     spread = np.sqrt((best.filtered.innovations**2).sum(axis=(0, 1)) / np.maximum(batch.known.sum(axis=(0, 1)), 1))
@@ -182,7 +186,7 @@ def _estimate(task: SearchTask, path: list[SearchPoint], scale: Mapping[str, flo
         covariance=sandwich(information, problem.prior_error, scores(task, best.filtered), before),
         information=information,
         noise=dict(zip(problem.seen, map(float, spread), strict=True)),
-        cost=tuple(point.cost for point in path[1:]),
+        cost=costs,
         prior_scale=dict(scale),
         process_noise=dict(zip(task.disturbed.pushed, correlated, strict=False)),
         drift=dict(zip(problem.seen, correlated[len(task.disturbed.pushed) :], strict=False)),

@@ -1,15 +1,18 @@
 """The Kalman filter's gains along a linearised trajectory, the derivatives of its innovations, and the smoother.
 
-Runs of a batch are padded to the same length; an instant without a measurement has a row of zeros in C, a residual of 0
-and a variance of 1, and adds nothing to the likelihood. All functions work on stacks of small matrices with any leading
-axes, of which the last is the run.
+Runs of a batch are padded to the same length, and left at their ends; an instant without a measurement has a row of
+zeros in C, a residual of 0 and a variance of 1, and adds nothing to the likelihood. All functions work on stacks of
+small matrices with any leading axes, of which the last is the run.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.process_noise import Tangents
@@ -27,11 +30,14 @@ class Variances:
         1 where not measured.
     start : array (..., runs, nz, nz)
         Covariance of the first state.
+    lengths : sequence of int (runs,), optional
+        Instants of each run, of which the rest of the n is padding; by default all have n.
     """
 
     process: Array
     measurement: Array
     start: Array
+    lengths: Sequence[int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +47,19 @@ class Gains:
     Parameters
     ----------
     K : array (runs, n, nz, ny)
-        Gains.
+        Gains; 0 in the padding.
     whitener : array (runs, n, ny, ny)
-        W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``.
+        W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``; 1 in the padding.
     P : array (runs, n, nz, nz)
-        Covariance of the state before each measurement.
+        Covariance of the state before each measurement; 0 in the padding.
+    lengths : sequence of int (runs,), optional
+        As those of :class:`Variances`.
     """
 
     K: Array
     whitener: Array
     P: Array
+    lengths: Sequence[int] | None = None
 
     @property
     def log_determinant(self) -> float:
@@ -58,17 +67,32 @@ class Gains:
         return float(-2 * np.log(np.diagonal(self.whitener, axis1=-2, axis2=-1)).sum())
 
 
+def _together(lengths: Sequence[int] | None, runs: int, n: int) -> Iterator[tuple[range, NDArray[np.intp]]]:
+    """Instants in their order, taken apart where a run ends, each part with the runs that go on in it."""
+    every = np.full(runs, n) if lengths is None else np.asarray(lengths)
+    for begin, end in pairwise([0, *np.unique(every).tolist()]):
+        yield range(begin, end), np.flatnonzero(every > begin)
+
+
 def gains(A: Array, C: Array, variances: Variances) -> Gains:
     """Filter gains of A (runs, n, nz, nz) and C (runs, n, ny, nz)."""
     runs, n, ny, nz = C.shape
-    result = Gains(np.empty((runs, n, nz, ny)), np.empty((runs, n, ny, ny)), np.empty((runs, n, nz, nz)))
-    P = variances.start
-    for k in range(n):
-        result.P[:, k] = P
-        _, W, M = _update(P, C[:, k], variances.measurement[:, k])
-        result.whitener[:, k] = W
-        result.K[:, k] = np.swapaxes(M, -1, -2) @ W
-        P = _following(P, M, A[:, k], variances.process)
+    result = Gains(
+        np.zeros((runs, n, nz, ny)),
+        np.tile(np.eye(ny), (runs, n, 1, 1)),
+        np.zeros((runs, n, nz, nz)),
+        variances.lengths,
+    )
+    last = variances.start.copy()
+    for instants, on in _together(variances.lengths, runs, n):
+        P, process = last[on], variances.process[on]
+        for k in instants:
+            result.P[on, k] = P
+            _, W, M = _update(P, C[on, k], variances.measurement[on, k])
+            result.whitener[on, k] = W
+            result.K[on, k] = np.swapaxes(M, -1, -2) @ W
+            P = _following(P, M, A[on, k], process)
+        last[on] = P
     return result
 
 
@@ -100,24 +124,29 @@ def variant_likelihoods(
     count, runs, g = factors.shape
     n, _, nz = tangents.C.shape[1:]
     cost, information = np.zeros(count), np.zeros((count, count))
-    P, before = variances.start, np.zeros((count, runs, nz, 1))
-    A, places = np.empty((count, runs, nz, nz)), np.arange(nz - g, nz)
-    for k in range(n):
-        C = tangents.C[:, k]
-        A[:] = tangents.A[:, k]
-        A[..., places, places] = factors
-        S, W, M = _update(P, C, variances.measurement[:, :, k])
-        e = innovations[:, k, :, None] - C @ before
-        white = W @ e
-        cost += (white[..., 0] ** 2 - 2 * np.log(np.diagonal(W, axis1=-2, axis2=-1))).sum(axis=(1, 2))
-        variance = np.diagonal(S, axis1=-2, axis2=-1)
-        d = ((e - e[:1])[..., 0] / np.sqrt(variance[:1])).reshape(count, -1)
-        t = ((variance - variance[:1]) / variance[:1]).reshape(count, -1)
-        information += d @ d.T + 0.5 * t @ t.T
-        correction = np.swapaxes(M, -1, -2) @ white
-        before = A @ (before + correction - correction[:1])  # relative to the state of the first variant
-        before[..., nz - g :, 0] += (factors - factors[:1]) * after[:, k, nz - g :]
-        P = _following(P, M, A, variances.process)
+    last, relative = variances.start.copy(), np.zeros((count, runs, nz, 1))
+    places = np.arange(nz - g, nz)
+    for instants, on in _together(variances.lengths, runs, n):
+        P, before = last[:, on], relative[:, on]
+        process, phi = variances.process[:, on], factors[:, on]
+        A = np.empty((count, len(on), nz, nz))
+        for k in instants:
+            C = tangents.C[on, k]
+            A[:] = tangents.A[on, k]
+            A[..., places, places] = phi
+            S, W, M = _update(P, C, variances.measurement[:, on, k])
+            e = innovations[on, k, :, None] - C @ before
+            white = W @ e
+            cost += (white[..., 0] ** 2 - 2 * np.log(np.diagonal(W, axis1=-2, axis2=-1))).sum(axis=(1, 2))
+            variance = np.diagonal(S, axis1=-2, axis2=-1)
+            d = ((e - e[:1])[..., 0] / np.sqrt(variance[:1])).reshape(count, -1)
+            t = ((variance - variance[:1]) / variance[:1]).reshape(count, -1)
+            information += d @ d.T + 0.5 * t @ t.T
+            correction = np.swapaxes(M, -1, -2) @ white
+            before = A @ (before + correction - correction[:1])  # relative to the state of the first variant
+            before[..., nz - g :, 0] += (phi - phi[:1]) * after[on, k, nz - g :]
+            P = _following(P, M, A, process)
+        last[:, on], relative[:, on] = P, before
     return cost, information
 
 
@@ -172,10 +201,14 @@ def innovation_tangents(tangents: Tangents, found: Gains, start: Array | None = 
     """
     A, B, C, D = tangents.A, tangents.B, tangents.C, tangents.D
     runs, n, _, k = D.shape
-    result = np.empty(D.shape)
-    S = last = np.zeros((runs, A.shape[-1], k)) if start is None else start
-    for row in range(n):
-        e = -(C[:, row] @ S + D[:, row])
-        result[:, row] = found.whitener[:, row] @ e
-        last, S = S, A[:, row] @ (S + found.K[:, row] @ e) + B[:, row]
+    result = np.zeros(D.shape)
+    last = np.zeros((runs, A.shape[-1], k)) if start is None else start.copy()
+    following = last.copy()
+    for rows, on in _together(found.lengths, runs, n):
+        S = following[on]
+        for row in rows:
+            before, e = S, -(C[on, row] @ S + D[on, row])
+            result[on, row] = found.whitener[on, row] @ e
+            S = A[on, row] @ (S + found.K[on, row] @ e) + B[on, row]
+        last[on], following[on] = before, S
     return result, last

@@ -117,7 +117,7 @@ class Levels:
         process = np.concatenate([np.zeros((runs, nx)), power * (1 - self.factors(batch.steps) ** 2)], axis=1)
         start = np.broadcast_to(np.diag(np.concatenate([nominal**2, power])), (runs, nx + len(power), nx + len(power)))
         measurement = np.where(batch.known, np.exp(2 * self.measurement), 1.0)
-        return Variances(process, measurement, start if batch.spread is None else batch.spread)
+        return Variances(process, measurement, start if batch.spread is None else batch.spread, batch.lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,20 +154,21 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
     """Gains along a trajectory (before, after), and the observer with these gains on its own trajectory."""
     factors = levels.factors(batch.steps)
     cases = [(p, phi, np.array([h])) for phi, h in zip(factors, batch.steps, strict=True)]
-    stacked = [
-        disturbed.tangents(before, after, inputs, case)
-        for before, after, inputs, case in zip(*along, batch.inputs, cases, strict=True)
-    ]
-    mask = batch.known[..., None]
-    tangents = Tangents(
-        A=np.stack([run_tangents.A for run_tangents in stacked]),
-        B=np.stack([run_tangents.B for run_tangents in stacked]),
-        C=np.where(mask, np.stack([run_tangents.C for run_tangents in stacked]), 0.0),
-        D=np.where(mask, np.stack([run_tangents.D for run_tangents in stacked]), 0.0),
-    )
+    runs, n, ny = batch.measured.shape
+    nz, k = batch.starts.shape[1], disturbed.parameters
+    tangents = Tangents(*(np.zeros((runs, n, *shape)) for shape in ((nz, nz), (nz, k), (ny, nz), (ny, k))))
+    for number, (length, case) in enumerate(zip(batch.lengths, cases, strict=True)):
+        rows, mask = np.s_[number, :length], batch.known[number, :length, :, None]
+        of_run = disturbed.tangents(along[0][rows], along[1][rows], batch.inputs[rows], case)
+        tangents.A[rows], tangents.B[rows] = of_run.A, of_run.B
+        tangents.C[rows], tangents.D[rows] = np.where(mask, of_run.C, 0.0), np.where(mask, of_run.D, 0.0)
     found = gains(tangents.A, tangents.C, levels.variances(batch, disturbed.nominal))
-    runs = zip(batch.starts, batch.inputs, batch.measured, found.K, cases, strict=True)
-    before = np.stack([disturbed.predicted(*run) for run in runs])
+    before = np.empty((runs, n, nz))
+    for number, (length, case) in enumerate(zip(batch.lengths, cases, strict=True)):
+        rows = np.s_[number, :length]
+        start, inputs, measured = batch.starts[number], batch.inputs[rows], batch.measured[rows]
+        before[rows] = disturbed.predicted(start, inputs, measured, found.K[rows], case)
+        before[number, length:] = before[number, length - 1]
     if not np.isfinite(before).all() or np.abs(before).max() > 1e9:
         return FilterPass(before, before, np.zeros_like(batch.measured), tangents, found, np.inf)
     seen = np.stack([disturbed.seen(states, inputs, p) for states, inputs in zip(before, batch.inputs, strict=True)])

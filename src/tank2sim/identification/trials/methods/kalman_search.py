@@ -146,8 +146,8 @@ def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: b
 
 def maximise(
     task: SearchTask, start: SearchPoint, iterations: int, report: Callable[[SearchPoint], None], *, hold: bool = False
-) -> list[SearchPoint]:
-    """Damped steps of parameters and levels together while the likelihood grows: all points, the best last.
+) -> tuple[SearchPoint, tuple[float, ...]]:
+    """Damped steps of parameters and levels together while the likelihood grows: the best point, and all their costs.
 
     With `hold` the parameters do not change, only the levels.
     """
@@ -175,7 +175,7 @@ def maximise(
         report(better)
         return gain < ENOUGH
 
-    return damped_gauss_newton(start, linearise, move, is_last, iterations, damping_range=(1e-3, 1e-2))[0]
+    return damped_gauss_newton(start, linearise, move, is_last, iterations, damping_range=(1e-3, 1e-2))[:2]
 
 
 def normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
@@ -217,6 +217,7 @@ def _level_normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
         np.stack([variant.process for variant in each]),
         np.stack([variant.measurement for variant in each]),
         np.stack([variant.start for variant in each]),
+        task.batch.lengths,
     )
     factors = np.stack([variant.factors(task.batch.steps) for variant in variants])
     cost, information = variant_likelihoods(filtered.tangents, variances, filtered.innovations, filtered.after, factors)

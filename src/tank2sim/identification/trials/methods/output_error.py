@@ -182,7 +182,7 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
         return gain < tolerance * max(1.0, 1e-3 * better.cost)
 
     found = damped_gauss_newton(point(search.values, search.starts), linearise, move, report, LONGEST_SEARCH)
-    (*_, best), last = found
+    best, _, last = found
     return last or linearise(best)
 
 

@@ -62,7 +62,7 @@ class Disturbed:
         whole, pushes = _pushed(model, [state.derivative for state in pushed])
         drifts = ca.SX.sym("drift", len(seen) if drifting else 0)
         correlated = ca.vertcat(pushes, drifts)
-        self.correlated = int(correlated.numel())
+        self.correlated, self.parameters = int(correlated.numel()), len(free)
         z, phi, h = ca.vertcat(model.x, correlated), ca.SX.sym("phi", self.correlated), ca.SX.sym("h")
         theta = ca.vcat([model.symbol(name) for name in free])
         moved = runge_kutta_step(whole)(model.x, ca.vertcat(model.u, pushes), model.p, h)

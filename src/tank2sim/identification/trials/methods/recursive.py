@@ -166,7 +166,7 @@ def recursive(
     for number in range(settings.passes):
         if number:
             point = task.point(at, point.levels, (point.filtered.before, point.filtered.after))
-        point = maximise(task, point, LEVEL_ITERATIONS, lambda _: None, hold=True)[-1]
+        point = maximise(task, point, LEVEL_ITERATIONS, lambda _: None, hold=True)[0]
         steps: list[_Step] = []
         for step in _pass(task, point, settings, hold=number > 0):
             steps.append(step)

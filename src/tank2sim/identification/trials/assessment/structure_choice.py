@@ -1,0 +1,156 @@
+"""Choice between the card's own terms of the hull and cross-flow drag, by the trials.
+
+Beyond the trials a polynomial may be anything; cross-flow drag is bounded by the physics of separated flow. Where the
+trials hardly distinguish the two, the turns with hard rudder may still differ, and the choice says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import undisturbed_inputs
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.assessment.identifiability import refuse_unseen
+from tank2sim.identification.trials.assessment.model_selection import (
+    Criteria,
+    criteria,
+    cross_validate,
+    simplest,
+    yaw_rate_error,
+)
+from tank2sim.identification.trials.methods.equation_error import equation_error
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import (
+    card_with_estimate,
+    problem_from_card,
+    with_captive,
+    with_correlations,
+)
+from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.marks import CHECK
+from tank2sim.records.trials import RUDDERS, Trial
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
+
+if TYPE_CHECKING:
+    from tank2sim.identification.trials.identify import IdentificationOptions
+
+STRONGLY = 1.0
+"""Difference of the Bayesian information criterion for each independent sample by which the card's own terms must be
+better: residuals that are smaller by a factor e in generalised variance. On measured trials model error, which the
+criterion takes for noise, shifts it by up to 0.2; on trials of a ship that has the card's terms it is 59 (project
+choice: between the two)."""
+
+HARD_RUDDER = math.radians(35.0)
+"""Rudder of the turns that two structures are compared by: that of the turning test of IMO resolution MSC.137(76)."""
+
+NEARLY_HARD = 0.9
+"""Share of that rudder from which a trial shows what a hard turn does (project choice)."""
+
+DIFFERENT_TURN = 0.1
+"""Share by which the tactical diameters of two structures may differ (project choice: twice what is asked of a
+prediction)."""
+
+
+def structure_by_evidence(
+    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, holdout: Measured | None = None
+) -> tuple[str, tuple[str, ...]]:
+    """Name of the structure, and a notice: cross-flow drag, or the card's own terms if the trials prefer them strongly.
+
+    Both are fitted by equation error. Terms of the card are preferred if their Bayesian information criterion is less
+    by more than :data:`STRONGLY` for each independent sample. Where that hardly distinguishes the two, each is fitted
+    without one trial at a time, and the card's terms are taken if they predict the trials left out better, by more than
+    one standard error of the difference (:func:`.simplest`). Else cross-flow drag is the better guess beyond the
+    trials: it is bounded by the physics of separated flow where a polynomial is not. If the hard turns of the two
+    differ, and none was held out to judge by, a notice is marked.
+    """
+    if card.model.kind != "abkowitz":
+        return "card", ()
+    found: list[Criteria] = []
+    cards: list[ManoeuvringCard] = []
+    problems: list[Problem] = []
+    try:
+        for name in ("card", "cross_flow"):
+            started = STRUCTURES[name].start(card)
+            posed = posed_in(card, started, trials, options)
+            posed = posed.without(refuse_unseen(posed))
+            estimate = equation_error(posed)
+            found.append(criteria(posed, estimate, found[0].samples if found else None))
+            cards.append(card_with_estimate(started, estimate))
+            problems.append(posed)
+    except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
+        return "card", ()
+    own, drag = found
+    difference = (own.bic - drag.bic) / own.samples
+    if difference < -STRONGLY:
+        return "card", ()
+    undecided = abs(difference) < STRONGLY
+    taken = "card" if undecided and _predicts_better(*problems) else "cross_flow"
+    criterion = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
+    chosen = (
+        "structure: the card's own third-order terms, which predict trials that were left out better than cross-flow "
+        f"drag {criterion}; --structure cross_flow takes that"
+        if taken == "card"
+        else "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer "
+        f"strongly {criterion}; --structure card keeps them"
+    )
+    hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
+    in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER
+    return taken, (chosen, *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
+
+
+def _predicts_better(own: Problem, drag: Problem) -> bool:
+    """Whether the card's own terms predict trials that were left out of the fit better than cross-flow drag does."""
+    if len(own.runs) < 2:
+        return False
+    problems = {"cross_flow": drag, "card": own}
+    found = {name: cross_validate(posed, equation_error, yaw_rate_error) for name, posed in problems.items()}
+    return simplest(found) == "card"
+
+
+def _largest_rudder(trial: Trial) -> float:
+    """Largest angle of the rudder, or order, in a trial, rad."""
+    known = (trial.signals[name] for name in RUDDERS if name in trial.signals)
+    return max((float(np.nanmax(np.abs(values))) for values in known), default=0.0)
+
+
+def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[str]:
+    """A marked sentence if the turns of two structures that the trials do not distinguish are different ones."""
+    gear = drag.steering_gear
+    rudder = min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
+    sizes = [_tactical_diameter(each, rudder) for each in (own, drag)]
+    if not any(np.isfinite(sizes)) or abs(sizes[0] / sizes[1] - 1) < DIFFERENT_TURN:
+        return ()
+    texts = [f"{size:.2f} L" if np.isfinite(size) else "none" for size in sizes]
+    mine, other = (", taken", "") if taken == "card" else ("", ", taken")
+    return (
+        f"{CHECK} the trials hardly distinguish two structures of the hull, whose turns with "
+        f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag{other}) and "
+        f"{texts[0]} (the card's own terms{mine}): fit or hold out a turn with as much rudder",
+    )
+
+
+def _tactical_diameter(card: ManoeuvringCard, rudder: float) -> float:
+    """In lengths, in still water; nan if the ship does not turn round."""
+    model = build(card)
+    try:
+        run = simulate(model, Turn(rudder), inputs=undisturbed_inputs(model))
+    except InputError:  # a polynomial that drives itself out of all bounds
+        return math.nan
+    size = run.figures["tactical_diameter_lengths"]
+    return float(size) if isinstance(size, float) else math.nan
+
+
+def posed_in(
+    card: ManoeuvringCard, started: ManoeuvringCard, trials: Measured, options: IdentificationOptions
+) -> Problem:
+    """The problem of a card that was started in a structure, with the correlations of the card's own coefficients."""
+    problem = problem_from_card(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
+    return with_captive(with_correlations(problem, card), started, trials.captive)
