@@ -140,6 +140,20 @@ def test_velocities_are_derived_from_heading_and_positions(noisy):
     assert np.all(np.abs(found.values - EXACT) < 4 * found.standard_errors)
 
 
+def test_velocities_slower_than_the_heading_are_enough(noisy):
+    """Speeds of a log once a second next to a yaw rate of five a second."""
+    slow = []
+    for one in noisy:
+        signals = dict(one.signals)
+        for name in ("u_mps", "v_mps"):
+            signals[name] = np.where(np.arange(len(one.time_s)) % 5 == 0, signals[name], np.nan)
+        slow.append(replace(one, signals=signals))
+    found = equation_error(problem(slow))
+    assert np.abs((found.values - EXACT) / found.standard_errors).max() < 4.0
+    fewer = found.standard_errors / equation_error(problem(noisy)).standard_errors
+    assert 1.0 < np.median(fewer) < 2 * np.sqrt(5)
+
+
 def test_what_cannot_be_derived_is_refused(noisy):
     with pytest.raises(InputError, match="neither velocities nor positions; give u_mps and v_mps"):
         equation_error(problem(noisy, seen=("motion.r", "motion.psi")))

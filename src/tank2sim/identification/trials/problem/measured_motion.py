@@ -43,7 +43,8 @@ class MeasuredMotion:
     Parameters
     ----------
     velocities : array (n, 3)
-        u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown.
+        u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown; straight lines between the samples
+        of a signal that is slower than the run.
     smooth : array (n, 6)
         :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps.
     noise : array (3,)
@@ -88,7 +89,7 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
         columns |= {name: derived_columns[name] for name in derived}
         notices.append(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}")
     _complete_positions(columns, missing, run.step_s)
-    velocities = np.column_stack([columns[name] for name in VELOCITIES])
+    velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
     smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
     position = [_filled(columns[name]) for name in POSITION]
     every = np.column_stack([*smooth, *position])
@@ -145,6 +146,13 @@ def _slope(column: Array, window: int, step: float) -> Array:
     slope: Array = savgol_filter(_filled(column), window, 3, deriv=1, delta=step)
     slope[_in_gaps(column)] = np.nan
     return slope
+
+
+def _bridged(column: Array) -> Array:
+    """A signal with straight lines between its samples, nan in gaps of more than its own step."""
+    bridged = _filled(column)
+    bridged[_in_gaps(column)] = np.nan
+    return bridged
 
 
 def _in_gaps(column: Array) -> NDArray[np.bool_]:
