@@ -87,7 +87,7 @@ def _of_craft(
     show_default=True,
     help="; ".join(f"{each.name}: {each.description}" for each in STRUCTURES.values())
     + f"; {AUTO}: cross-validation decides; {AVERAGE}: intervals of all, weighted by their predictions; {BY_EVIDENCE}: "
-    "cross_flow, or card if an information criterion prefers it strongly.",
+    "cross_flow, or card if an information criterion prefers it strongly or predictions of trials left out do.",
 )
 @click.option(
     "--campaign",

@@ -87,8 +87,8 @@ def structure_by_evidence(
             problems.append(posed)
     except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
         return "card", ()
-    own, drag = found
-    difference = (own.bic - drag.bic) / own.samples
+    of_card, drag = found
+    difference = (of_card.bic - drag.bic) / of_card.samples
     if difference < -STRONGLY:
         return "card", ()
     undecided = abs(difference) < STRONGLY
@@ -106,11 +106,11 @@ def structure_by_evidence(
     return taken, (chosen, *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
 
 
-def _predicts_better(own: Problem, drag: Problem) -> bool:
+def _predicts_better(of_card: Problem, drag: Problem) -> bool:
     """Whether the card's own terms predict trials that were left out of the fit better than cross-flow drag does."""
-    if len(own.runs) < 2:
+    if len(of_card.runs) < 2:
         return False
-    problems = {"cross_flow": drag, "card": own}
+    problems = {"cross_flow": drag, "card": of_card}
     found = {name: cross_validate(posed, equation_error, yaw_rate_error) for name, posed in problems.items()}
     return simplest(found) == "card"
 
@@ -121,11 +121,11 @@ def _largest_rudder(trial: Trial) -> float:
     return max((float(np.nanmax(np.abs(values))) for values in known), default=0.0)
 
 
-def _turns_in_doubt(own: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[str]:
+def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[str]:
     """A marked sentence if the turns of two structures that the trials do not distinguish are different ones."""
     gear = drag.steering_gear
     rudder = min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
-    sizes = [_tactical_diameter(each, rudder) for each in (own, drag)]
+    sizes = [_tactical_diameter(each, rudder) for each in (of_card, drag)]
     if not any(np.isfinite(sizes)) or abs(sizes[0] / sizes[1] - 1) < DIFFERENT_TURN:
         return ()
     texts = [f"{size:.2f} L" if np.isfinite(size) else "none" for size in sizes]
