@@ -150,15 +150,17 @@ def _about_best(fitting: Fitting) -> Fitting:
     """The explanations so far, fitted again about the motion of the best: its residual is small. "None" is scored about
     the same motion."""
     best, none = fitting.best(), fitting.found[()]
+    kept = [fit for fit in fitting.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     likelihood = fitting.likelihood.about(best)
     if likelihood.belief.waves is not None:
         likelihood = likelihood.with_waves(fit_waves(likelihood, best))
     likelihood = likelihood.with_scale(likelihood.noise_scale(best))
+    nearer = likelihood.at_best(best.hypothesis, best.theta, [best.logs], LAST_ROUNDS)
+    likelihood = likelihood.with_scale(likelihood.noise_scale(nearer))
     about = Fitting(likelihood, fitting.hypotheses, fitting.progress, fitting.executor)
-    kept = [fit for fit in fitting.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     about.fit(
-        [Proposal({}, [best.logs, none.logs, likelihood.belief.logs], ROUNDS_OF_NONE)]
-        + [refit(fit, [best.logs, fit.logs], ROUNDS) for fit in kept]
+        [Proposal({}, [nearer.logs, none.logs, likelihood.belief.logs], ROUNDS_OF_NONE)]
+        + [refit(fit, [nearer.logs, fit.logs], ROUNDS) for fit in kept]
     )
     return about
 
@@ -210,12 +212,17 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
         others = {effect: theta for effect, theta in thetas_of(best).items() if effect not in unknown}
         sets += [{effect: theta, name: still[name]} for effect, theta in others.items() for name in unknown]
     starts = [best.logs, fitting.likelihood.belief.logs]
+    common = [fit for fit in fitting.found.values() if set(unknown) & set(fit.hypothesis.effects)]
     fitting.fit(
         [
             Proposal(thetas, starts, ROUNDS, best.score + _FAR, each=tuple(name for name in unknown if name in thetas))
             for thetas in sets
         ]
     )
+    # The form that is the same in all trials, at the noise of the one that took its place: a score that has converged
+    # is lower than one that has not.
+    now = {fit: fitting.found[fit.hypothesis.effects] for fit in common}
+    fitting.fit([refit(fit, [other.logs], ROUNDS) for fit, other in now.items() if other is not fit])
     if most == 1 or not fitting.has(1):
         return
     best = fitting.best(1)
