@@ -427,7 +427,7 @@ def _manoeuvres(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
         return [_single(signals, group[0])]
     legs = _legs(signals, group)
     out: list[_Piece] = []
-    rest: list[_Piece] = []
+    others: list[_Piece] = []
     place = 0
     while place < len(legs):
         count, kind = _zigzag_length(signals, legs[place:]), StretchKind.ZIGZAG
@@ -435,14 +435,14 @@ def _manoeuvres(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
             checked = place + 1 < len(legs) and _checks_swing(signals, *legs[place : place + 2])
             count, kind = 1 + checked, legs[place].kind
         if count:
-            out += [*_remaining(signals, rest), _whole(legs[place : place + count], kind)]
-            rest, place = [], place + count
+            out += [*_remaining(signals, others), _whole(legs[place : place + count], kind)]
+            others, place = [], place + count
         else:
-            rest.append(legs[place])
+            others.append(legs[place])
             place += 1
-    if out and len(rest) == 1 and _checks_swing(signals, legs[-2], rest[0]):
-        out[-1], rest = replace(out[-1], end=rest[0].end), []
-    return out + _remaining(signals, rest)
+    if out and len(others) == 1 and _checks_swing(signals, legs[-2], others[0]):
+        out[-1], others = replace(out[-1], end=others[0].end), []
+    return out + _remaining(signals, others)
 
 
 def _single(signals: _Signals, piece: _Piece) -> _Piece:
