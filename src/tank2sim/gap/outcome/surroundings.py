@@ -226,7 +226,7 @@ class _Trial:
         ]
         still = self.still = input_record(self.replayer, _with(trial, self._in_trial(np.zeros(len(self.typical)))))
         self._known = ~np.isnan(still.readings)
-        self._passage = card.ship.length_m / card.model.speed_mps / (still.step_s * still.every)
+        self.passage = card.ship.length_m / card.model.speed_mps / (still.step_s * still.every)
         self._state = self.replayer.guess_initial_state(still, self.sigma, self.replayer.model.parameter_values())
         self.compare(1.0)
 
@@ -296,7 +296,7 @@ class _Trial:
     def weight(self, parts: Array, p: Array) -> float:
         """Weight of a reading: the errors of its trial are of one size, and independent once in a passage of L/u0."""
         size = max(float(np.sqrt(np.mean(self.away(parts, p) ** 2))), 1.0)
-        independent = max(len(self._known) / self._passage, 1.0)
+        independent = max(len(self._known) / self.passage, 1.0)
         return math.sqrt(min(independent / self.count, 1.0)) / size
 
     def predicted(self, parts: Array, p: Array, absent: Array) -> float:
@@ -318,7 +318,7 @@ def _of_trial(
     card: ManoeuvringCard, driven_by: str, given: Trial, effects: Sequence[str], noise: Mapping[str, float]
 ) -> dict[str, Surroundings]:
     """Together with the initial state and the instants of the orders: a heading that is a little off moves the track
-    as a current across it does."""
+    as a current across it does. Their errors are those of readings that are independent once in a passage of L/u0."""
     trial = _Trial(card, driven_by, given, effects, noise)
     model = _with_parts_as_states(trial.replayer.model, effects, trial.typical)
     replayer = Replayer(card, driven_by, trial.replayer.seen, model)
@@ -332,12 +332,13 @@ def _of_trial(
         residual: Array = ((replayer.motion(record, start, p) - record.readings) / sigma)[known]
         return residual
 
-    reach = _STEP * np.array([state.nominal for state in model.states])
-    slopes = difference_slopes(away, start, away(start), reach)
-    information = slopes.T @ slopes
-    information[-len(parts) :, -len(parts) :] += np.diag(trial.typical**-2)
-    size = max(float(np.mean(away(start) ** 2)), 1.0)
-    errors = np.sqrt(size * np.diag(np.linalg.pinv(information)))[-len(parts) :]
+    nominal = np.array([state.nominal for state in model.states])
+    slopes = difference_slopes(away, start, away(start), _STEP * nominal) * nominal
+    covariance = np.linalg.inv(
+        slopes.T @ slopes + np.eye(len(start))
+    )  # of states in nominal sizes, which they have before
+    size = max(float(np.mean(away(start) ** 2)), 1.0) * max(trial.passage, 1.0)
+    errors = (np.sqrt(size * np.diag(covariance)) * nominal)[-len(parts) :]
     pairs = zip(effects, parts.reshape(-1, 2), errors.reshape(-1, 2), strict=True)
     return {name: Surroundings.of_parts(part, error) for name, part, error in pairs}
 
