@@ -318,8 +318,8 @@ FAR_TURN_RAD = math.radians(100.0)
 20/20 zigzag changes it by 40 deg, and an overshoot comes back."""
 
 CHANGED_COURSE_RAD = math.radians(45.0)
-"""Change of heading from which a rudder's order is a turn, and no step. Project choice: steps leave the course as it is
-in the mean."""
+"""Change of heading from which a rudder's order is a turn, and not a step. Project choice: steps leave the course as
+it is in the mean."""
 
 _OTHER_ORDER = 0.3
 """Relative difference from which two rudders to one side are two orders. Project choice: corrections of a helmsman are
@@ -343,7 +343,7 @@ _STEPS_LONGEST = 2.5
 
 def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     """Pieces that belong together as one: zigzags, steps, slow changes of propulsion, short corrections between."""
-    step = float(signals.time[1] - signals.time[0])
+    step = signals.step
     joined: list[_Piece] = []
     for piece in pieces:
         last = joined[-1] if joined else None
@@ -385,7 +385,7 @@ def _straight(signals: _Signals, piece: _Piece) -> bool:
 
 def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     """Rows of at least :data:`_STEPS_LEAST` short stretches as one of steps each."""
-    step = float(signals.time[1] - signals.time[0])
+    step = signals.step
     longest = _STEPS_LONGEST * signals.rest_s
     ship = signals.threshold == HELD_RUDDER_RAD
     short = [
@@ -455,7 +455,7 @@ def _single(signals: _Signals, piece: _Piece) -> _Piece:
 
 
 def _legs(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
-    """Pieces of a group to one side as one each: a helmsman's corrections of an order are no order of their own."""
+    """Pieces of a group to one side as one each: a helmsman's corrections of an order belong to it."""
     sides: list[list[_Piece]] = []
     for piece in group:
         if (

@@ -84,8 +84,14 @@ def fit_surroundings(
         Variable to the standard deviation of one reading, SI; others are not compared.
     """
     found: dict[str, dict[str, Surroundings]] = {name: {} for name in effects}
-    for trial in measured.trials:
-        for name, surroundings in _of_trial(card, measured.driven_by, trial, effects, noise).items():
+    trials = [_Trial(card, measured.driven_by, trial, effects, noise) for trial in measured.trials]
+    if not trials:
+        return found
+    known = trials[0].replayer
+    model = _with_parts_as_states(known.model, effects, trials[0].typical)
+    replayer = Replayer(card, measured.driven_by, known.seen, model)
+    for trial in trials:
+        for name, surroundings in _of_trial(trial, replayer, effects).items():
             found[name][trial.name] = surroundings
     return found
 
@@ -314,14 +320,10 @@ class _Trial:
         return math.sqrt(left / without) if without > 0 else 1.0
 
 
-def _of_trial(
-    card: ManoeuvringCard, driven_by: str, given: Trial, effects: Sequence[str], noise: Mapping[str, float]
-) -> dict[str, Surroundings]:
+def _of_trial(trial: _Trial, replayer: Replayer, effects: Sequence[str]) -> dict[str, Surroundings]:
     """Together with the initial state and the instants of the orders: a heading that is a little off moves the track
     as a current across it does. Their errors are those of readings that are independent once in a passage of L/u0."""
-    trial = _Trial(card, driven_by, given, effects, noise)
-    model = _with_parts_as_states(trial.replayer.model, effects, trial.typical)
-    replayer = Replayer(card, driven_by, trial.replayer.seen, model)
+    model = replayer.model
     p, record, sigma = model.parameter_values(), trial.still, trial.sigma
     near = replayer.guess_initial_state(record, sigma, p)
     near[-len(trial.typical) :] = trial.parts(trial.replayer.model.parameter_values())
@@ -334,9 +336,7 @@ def _of_trial(
 
     nominal = np.array([state.nominal for state in model.states])
     slopes = difference_slopes(away, start, away(start), _STEP * nominal) * nominal
-    covariance = np.linalg.inv(
-        slopes.T @ slopes + np.eye(len(start))
-    )  # of states in nominal sizes, which they have before
+    covariance = np.linalg.inv(slopes.T @ slopes + np.eye(len(start)))  # in nominal sizes, their spread beforehand
     size = max(float(np.mean(away(start) ** 2)), 1.0) * max(trial.passage, 1.0)
     errors = (np.sqrt(size * np.diag(covariance)) * nominal)[-len(parts) :]
     pairs = zip(effects, parts.reshape(-1, 2), errors.reshape(-1, 2), strict=True)

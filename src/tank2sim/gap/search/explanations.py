@@ -221,8 +221,9 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
     )
     # The form that is the same in all trials, at the noise of the one that took its place: a score that has converged
     # is lower than one that has not.
-    now = {fit: fitting.found[fit.hypothesis.effects] for fit in common}
-    fitting.fit([refit(fit, [other.logs], ROUNDS) for fit, other in now.items() if other is not fit])
+    fitting.fit(
+        [refit(fit, [now.logs], ROUNDS) for fit in common if (now := fitting.found[fit.hypothesis.effects]) is not fit]
+    )
     if most == 1 or not fitting.has(1):
         return
     best = fitting.best(1)

@@ -31,7 +31,7 @@ def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, Ord
     Raises
     ------
     InputError
-        The estimates are those of no craft: its damping would drive it on.
+        The estimates are not those of a craft: its damping would drive it on.
     """
     changes: dict[str, object] = {}
     for number, thruster in enumerate(card.thrusters):
