@@ -25,6 +25,8 @@ from tank2sim.gap.search.model_choice import (
     TEMPER,
     Strange,
     decide,
+    decide_without,
+    doubtful_effects,
     find_strangeness,
     is_significant,
 )
@@ -210,6 +212,50 @@ def test_a_third_effect_of_the_kind_of_another_must_have_a_share_of_the_gain(thi
     for part in (share * 2000 - 1, share * 2000 + 1, EVIDENCE_NEEDED + 1):
         found = of_scores(fit(0), fit(-1000, 0), fit(-2000 + part, *pair), fit(-2000, *pair, third))
         assert len(found.best.hypothesis.effects) == (3 if part > max(share * 2000, EVIDENCE_NEEDED) else 2), part
+
+
+@pytest.mark.usefixtures("calm")
+def test_the_simplest_explanation_is_not_named_where_what_it_lacks_is_far_likelier() -> None:
+    """A pair that is within the card's uncertainty is no name, but makes a name without it improbable."""
+    pair = fit(-120, 1, 2, sure=2.0)  # odds of exp(70/6) to 1 against the single one
+    found = of_scores(fit(0), fit(-50, 0), pair)
+    assert (found.verdict, found.best.hypothesis.effects, found.alike) == (NO_EFFECT_MISSING, (), ())
+    nearly = of_scores(fit(0), fit(-50, 0), fit(-54, 1, 2, sure=2.0))  # odds of exp(4/6) to 1 against it
+    assert (nearly.verdict, nearly.best.hypothesis.effects) == (AMBIGUOUS, (YAW,))
+    assert [other.hypothesis.effects for other in nearly.alike] == [(SURGE, SWAY)]
+
+
+FOUR = (0, FORCE, DRAG, LAG)
+
+
+def search_of_four(force: float, drag: float) -> Search:
+    """Four effects, two of them alike, with a gain of 2000, and three of them each time, with so much of it less."""
+    lost = {0: 900.0, FORCE: force, DRAG: drag, LAG: 100.0}
+    threes = [fit(-2000 + lost[without], *(one for one in FOUR if one != without)) for without in FOUR]
+    fits = [fit(0), fit(-1000, 0), *threes, fit(-2000, *FOUR)]
+    return Search(CALM, tuple(sorted(fits, key=lambda found: found.score)), ())
+
+
+@pytest.mark.parametrize(
+    ("force", "drag", "doubtful"),
+    [(150, 50, (DRAG, FORCE)), (40, 50, (FORCE, DRAG)), (210, 190, (DRAG,)), (210, 201, ())],
+)
+def test_of_four_effects_those_alike_with_a_small_part_of_the_gain_are_doubtful(force, drag, doubtful) -> None:
+    search = search_of_four(force, drag)  # a tenth of the gain is 200
+    assert doubtful_effects(search, search.fits[0]) == tuple(NAMES[place] for place in doubtful)
+    of_three = next(one for one in search.fits if len(one.hypothesis.effects) == 3)
+    assert doubtful_effects(search, of_three) == ()
+
+
+@pytest.mark.usefixtures("calm")
+def test_without_a_doubtful_effect_the_others_are_judged_among_what_does_not_hold_it() -> None:
+    search = search_of_four(300.0, 12.0)
+    whole = decide(search)
+    fewer = decide_without(search, whole, NAMES[DRAG])
+    assert {*fewer.best.hypothesis.effects} == {NAMES[place] for place in FOUR if place != DRAG}
+    assert fewer.alike == () and fewer.verdict == MISSING
+    assert all(NAMES[DRAG] not in effects for effects in fewer.probabilities)
+    assert decide_without(search, fewer, NAMES[LAG]) is fewer  # the pair was not fitted
 
 
 @pytest.mark.usefixtures("calm")

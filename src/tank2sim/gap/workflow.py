@@ -58,7 +58,16 @@ from tank2sim.gap.result import (
 )
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
-from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, LIKELY, TEMPER, Decision, Strange, decide
+from tank2sim.gap.search.model_choice import (
+    EVIDENCE_NEEDED,
+    LIKELY,
+    TEMPER,
+    Decision,
+    Strange,
+    decide,
+    decide_without,
+    doubtful_effects,
+)
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
     above_low_speed,
@@ -401,10 +410,7 @@ def _judge_by_simulation(
     for _ in range(TRIES):
         if not current.best.hypothesis.effects:
             break
-        by_formula = remaining.likelihood.by_formula(current.best)
-        estimated = estimates(by_formula)
-        by_trial = surroundings_by_trial(by_formula, remaining.likelihood.motion.names)
-        proof = _prove(card, trials, _NamedEffects(estimated, by_trial), replays, remaining, current.best)
+        current, estimated, proof = _with_fewer(card, trials, remaining, current, replays, share)
         unknown = current.verdict == OUTSIDE_LIBRARY
         closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
         if closes and found.none.score - current.best.score < DECISIVE:
@@ -425,6 +431,41 @@ def _judge_by_simulation(
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
     return _Judged(decision, [], proof, tuple(withheld))
+
+
+def _with_fewer(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    decision: Decision,
+    replays: TrialReplays,
+    share: float,
+) -> tuple[Decision, list[Found], _Proof]:
+    """The decision without the effects whose gain could be an error of another's formula, and without which the fitted
+    trials are followed as closely (:data:`BETTER`); with the estimates and the proof."""
+    estimated, proof = _proof_of(card, trials, found, decision, replays)
+    for name in doubtful_effects(found, decision.best):
+        fewer = decide_without(found, decision, name, share)
+        if fewer is not decision:
+            of_fewer = _with_fewer(card, trials, found, fewer, replays, share)
+            reached, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, of_fewer[2]))
+            if without <= (1 + BETTER) * reached:
+                return of_fewer
+    return decision, estimated, proof
+
+
+def _proof_of(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    decision: Decision,
+    replays: TrialReplays,
+) -> tuple[list[Found], _Proof]:
+    """The effects of a decision as they are written on a card, and their proof."""
+    by_formula = found.likelihood.by_formula(decision.best)
+    estimated = estimates(by_formula)
+    by_trial = surroundings_by_trial(by_formula, found.likelihood.motion.names)
+    return estimated, _prove(card, trials, _NamedEffects(estimated, by_trial), replays, found, decision.best)
 
 
 def _surroundings_by_simulation(
@@ -476,6 +517,8 @@ def _surroundings_by_simulation(
         alike=alike,
         probabilities=_probabilities_by_simulation(card, trials[0], proofs),
     )
+    if not alike and decision.confidence(best) < LIKELY:
+        return judged
     estimated: list[Found] = [(best, common.values, common.errors)]
     said = (
         f"{best}: named by free-running simulations, not from instant to instant; fitted to the first half of each "

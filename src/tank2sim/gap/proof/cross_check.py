@@ -206,9 +206,6 @@ REMAINS = 1.5
 """Misfit in noise units from which a remaining gap is reported (project choice): the misfit beyond the noise is
 then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
-EVEN = 0.5
-"""A probability below which the opposite is likelier."""
-
 _BETTER = 0.05
 """A black box follows better if its misfit is smaller by this share (project choice), as in :func:`worse_trials`."""
 
@@ -224,12 +221,6 @@ def proof_cautions(gap: Gap) -> tuple[str, ...]:
     if gap.verdict not in (MISSING, AMBIGUOUS) or not gap.effects or before is None or after is None:
         return ()
     group, notices = f"the {'held-out' if held else 'fitting'} trials", []
-    least = min(gap.effects, key=lambda effect: effect.confidence)
-    if gap.verdict == MISSING and least.confidence < EVEN:
-        notices.append(
-            f"{least.name} is named as the simplest explanation, but those without it are together likelier: its "
-            f"probability is {least.confidence:.2g}"
-        )
     if round(after, 6) > REMAINS:
         notices.append(
             _what_remains(before, after, group, "named, but" if gap.verdict == MISSING else "with the best of them")

@@ -8,7 +8,7 @@ best explanation are not noise, a name would be a guess, and is withheld.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -41,6 +41,10 @@ BELIEVABLE = 0.5
 """Width of the card's coefficients, in their standard errors, below which an explanation makes them as good as the card
 states (project choice: of 18 made-up ships most have 0.1 to 0.6 with all their effects, and 1.7 to 2.5 where
 coefficients take the place of one)."""
+
+MANY = 4
+"""From so many effects on, one with a small part of the gain is judged by simulation (project choice): what three
+formulas leave looked like a fourth effect; of three, simulations with other coefficients do without a true one."""
 
 LIKELY = 0.5
 """An effect less probable than this is not named alone (project choice): all explanations with at least
@@ -123,6 +127,9 @@ class Strange:
 def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
     """Return the verdict that the scores of a search support.
 
+    Where the simplest explanation has an effect that is less probable than :data:`RIVAL`, for what fits much better is
+    within the uncertainty of the card, nothing is named.
+
     Parameters
     ----------
     search : Search
@@ -133,8 +140,7 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
     """
     none = search.none
     best = none
-    doubt = IN_WAVES if search.likelihood.belief.waves else 1.0
-    needed, temper = doubt * EVIDENCE_NEEDED, doubt * TEMPER
+    needed = _doubt(search) * EVIDENCE_NEEDED
     least = none.score  # of all that need fewer effects
     counts = [len(fit.hypothesis.effects) for fit in search.fits]
     for count in range(1, max(counts) + 1):
@@ -142,13 +148,54 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
         larger = next(filter(is_significant, of_count), None)
         if larger is None or (count > 1 and larger is not of_count[0]):
             continue  # what fits better is within the uncertainty of the card
-        if larger.score < least - max(needed, _share(larger, best) * (none.score - larger.score)):
+        share = 0.0 if _mends_the_card(larger, best) else _share(larger, best)
+        if larger.score < least - max(needed, share * (none.score - larger.score)):
             best = larger
         least = min(least, larger.score)
+    decision = _decision(search, best, false_discovery)
+    improbable = any(decision.confidence(name) < RIVAL for name in best.hypothesis.effects)
+    return _decision(search, none, false_discovery) if improbable else decision
+
+
+def decide_without(search: Search, decision: Decision, name: str, false_discovery: float = 1 - LIKELY) -> Decision:
+    """The decision for the best explanation without one of its effects; the same where that was not fitted.
+
+    What holds the effect next to others of the explanation is no longer compared with it.
+    """
+    names = {*decision.best.hypothesis.effects} - {name}
+    kept = tuple(
+        fit for fit in search.fits if name not in fit.hypothesis.effects or not names & {*fit.hypothesis.effects}
+    )
+    smaller = next((fit for fit in kept if {*fit.hypothesis.effects} == names), None)
+    if smaller is None or not names or not is_significant(smaller):
+        return decision
+    return _decision(replace(search, fits=kept), smaller, false_discovery)
+
+
+def doubtful_effects(search: Search, best: ExplanationFit) -> tuple[str, ...]:
+    """Effects of an explanation of :data:`MANY` whose part of the gain could be what the formula of another one leaves
+    (:data:`SAME_KIND_SHARE`), the smallest part first."""
+    effects = best.hypothesis.effects
+    if len(effects) < MANY:
+        return ()
+    gains = {}
+    for fit in search.fits:
+        if {*fit.hypothesis.effects} < {*effects} and len(fit.hypothesis.effects) == len(effects) - 1:
+            gain = fit.score - best.score
+            if gain < _share(best, fit) * (search.none.score - best.score):
+                (name,) = {*effects} - {*fit.hypothesis.effects}
+                gains[name] = gain
+    return tuple(sorted(gains, key=gains.__getitem__))
+
+
+def _decision(search: Search, best: ExplanationFit, false_discovery: float) -> Decision:
+    """What is said with an explanation: those that are as good, the probabilities of all, and the verdict."""
+    none = search.none
+    temper = _doubt(search) * TEMPER
     scores = np.array([fit.score for fit in search.fits]) / temper
     weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
     probabilities = {fit.hypothesis.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
-    behind = doubt * ALIKE
+    behind = _doubt(search) * ALIKE
     unsure = {name for name in best.hypothesis.effects if _confidence(probabilities, name) < 1 - false_discovery}
     if unsure:
         behind = max(behind, -2 * temper * np.log(RIVAL))
@@ -162,31 +209,35 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
         and len(fit.hypothesis.effects) <= max(len(best.hypothesis.effects), 1)
         and best is not none
     )
-    if unsure and not alike and false_discovery < 1 - LIKELY:
+    if unsure and not alike:
         alike = tuple(fit for fit in search.fits if not unsure & set(fit.hypothesis.effects))[:1]
     strange = find_strangeness(search.likelihood, best)
     verdict = NO_EFFECT_MISSING if best is none else AMBIGUOUS if alike else MISSING
     return Decision(OUTSIDE_LIBRARY if strange else verdict, best, alike, probabilities, strange)
 
 
+def _doubt(search: Search) -> float:
+    return IN_WAVES if search.likelihood.belief.waves else 1.0
+
+
 def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> float:
     return float(min(sum(p for effects, p in probabilities.items() if effect in effects), SUREST))
 
 
-def _share(larger: ExplanationFit, best: ExplanationFit) -> float:
-    """Share of the whole gain that effects which the best explanation so far lacks must have, where they look like
-    others of the larger one.
+def _mends_the_card(larger: ExplanationFit, best: ExplanationFit) -> bool:
+    """Whether the coefficients of the card are off by more than their standard errors with the best explanation so far,
+    and by much less with a larger one: what a formula leaves is small against its force, and does not need that."""
+    return best.width > 1.0 and larger.width < BELIEVABLE
 
-    None is asked for where without them the coefficients of the card are off by more than their standard errors, and
-    with them by much less: what a formula leaves is small against its force, and does not need that.
-    """
-    if best.width > 1.0 and larger.width < BELIEVABLE:
-        return 0.0
+
+def _share(larger: ExplanationFit, smaller: ExplanationFit) -> float:
+    """Share of the whole gain that effects which a smaller explanation lacks must have, where they look like others of
+    the larger one."""
     kinds = {name: EFFECTS[name].looks_like for name in larger.hypothesis.effects}
     alike = [
         kind
         for name, kind in kinds.items()
-        if name not in best.hypothesis.effects and kind in [kinds[other] for other in kinds if other != name]
+        if name not in smaller.hypothesis.effects and kind in [kinds[other] for other in kinds if other != name]
     ]
     return max((SAME_KIND_SHARE.get(kind, 0.0) for kind in alike), default=0.0)
 

@@ -1,0 +1,53 @@
+"""What simulations decide about names that scores gave, on replays that are made up."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tank2sim.gap import workflow
+from tank2sim.gap.result import MISSING, Passed
+from tank2sim.gap.search import model_choice
+from tank2sim.gap.search.explanations import Search
+from tank2sim.gap.search.model_choice import decide
+from tests.gap.test_model_choice import CALM, DRAG, FORCE, FOUR, LAG, fit
+from tests.gap.toy import NAMES
+
+NOISE = 0.1
+
+
+def replay(misfit: float) -> Passed:
+    """A fitted trial whose yaw rate is missed by so many noises."""
+    still = {"motion.r": np.zeros(50)}
+    off = {"motion.r": np.full(50, misfit * NOISE)}
+    return Passed(
+        "a", held_out=False, time_s=np.arange(50.0), noise={"motion.r": NOISE}, measured=still, before=off, after=off
+    )
+
+
+@pytest.mark.parametrize(
+    ("without_drag", "without_force", "named"),
+    [(1.04, 1.04, (0, FORCE, LAG)), (1.10, 1.04, (0, DRAG, LAG)), (1.10, 1.10, FOUR)],
+)
+def test_a_fourth_effect_stays_only_if_simulations_are_closer_with_it(
+    monkeypatch, without_drag: float, without_force: float, named: tuple[int, ...]
+) -> None:
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    misfits = {DRAG: without_drag, FORCE: without_force}
+
+    def proof_of(card, trials, found, decision, replays):
+        lacks = [place for place in FOUR if NAMES[place] not in decision.best.hypothesis.effects]
+        return [], SimpleNamespace(results=[replay(misfits[lacks[0]] if lacks else 1.0)])
+
+    monkeypatch.setattr(workflow, "_proof_of", proof_of)
+    lost = {DRAG: 20.0, FORCE: 50.0}  # of a gain of 2000, and the card would be wrong without
+    threes = [fit(-2000 + less, *(one for one in FOUR if one != gone), width=2.0) for gone, less in lost.items()]
+    found = Search(CALM, (fit(-2000, *FOUR, width=0.3), *threes, fit(-1000, 0, width=2.0), fit(0, width=2.5)), ())
+    whole = decide(found)
+    assert len(whole.best.hypothesis.effects) == len(FOUR)
+    decision, _, proof = workflow._with_fewer(None, None, found, whole, None, 0.5)
+    assert {*decision.best.hypothesis.effects} == {NAMES[place] for place in named}
+    assert decision.verdict == MISSING
+    assert len(proof.results) == 1
