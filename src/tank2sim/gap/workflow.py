@@ -441,15 +441,15 @@ def _with_fewer(
     replays: TrialReplays,
     share: float,
 ) -> tuple[Decision, list[Found], _Proof]:
-    """The decision without the effects whose gain could be an error of another's formula, and without which the fitted
-    trials are followed as closely (:data:`BETTER`); with the estimates and the proof."""
+    """The decision without its doubtful effects that bring the fitted trials no closer; with the estimates and the
+    proof."""
     estimated, proof = _proof_of(card, trials, found, decision, replays)
     for name in doubtful_effects(found, decision.best):
         fewer = decide_without(found, decision, name, share)
         if fewer is not decision:
             of_fewer = _with_fewer(card, trials, found, fewer, replays, share)
             reached, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, of_fewer[2]))
-            if without <= (1 + BETTER) * reached:
+            if without <= reached:
                 return of_fewer
     return decision, estimated, proof
 

@@ -42,9 +42,9 @@ BELIEVABLE = 0.5
 states (project choice: of 18 made-up ships most have 0.1 to 0.6 with all their effects, and 1.7 to 2.5 where
 coefficients take the place of one)."""
 
-MANY = 4
-"""From so many effects on, one with a small part of the gain is judged by simulation (project choice): what three
-formulas leave looked like a fourth effect; of three, simulations with other coefficients do without a true one."""
+DOUBTFUL = 25.0
+"""Gain below which one of several effects is judged by simulation as well (project choice: of five names that gained so
+little next to others, in made-up trials, three were wrong)."""
 
 LIKELY = 0.5
 """An effect less probable than this is not named alone (project choice): all explanations with at least
@@ -173,19 +173,17 @@ def decide_without(search: Search, decision: Decision, name: str, false_discover
 
 
 def doubtful_effects(search: Search, best: ExplanationFit) -> tuple[str, ...]:
-    """Effects of an explanation of :data:`MANY` whose part of the gain could be what the formula of another one leaves
-    (:data:`SAME_KIND_SHARE`), the smallest part first."""
-    effects = best.hypothesis.effects
-    if len(effects) < MANY:
-        return ()
+    """Effects of an explanation without which it scores worse by less than :data:`DOUBTFUL`, the smallest gain first.
+
+    Empty for a single effect.
+    """
+    effects = {*best.hypothesis.effects}
     gains = {}
     for fit in search.fits:
-        if {*fit.hypothesis.effects} < {*effects} and len(fit.hypothesis.effects) == len(effects) - 1:
-            gain = fit.score - best.score
-            if gain < _share(best, fit) * (search.none.score - best.score):
-                (name,) = {*effects} - {*fit.hypothesis.effects}
-                gains[name] = gain
-    return tuple(sorted(gains, key=gains.__getitem__))
+        lacking = effects - {*fit.hypothesis.effects}
+        if len(lacking) == 1 and 1 < len(effects) == len(fit.hypothesis.effects) + 1:
+            gains[lacking.pop()] = fit.score - best.score
+    return tuple(sorted((name for name in gains if gains[name] < _doubt(search) * DOUBTFUL), key=gains.__getitem__))
 
 
 def _decision(search: Search, best: ExplanationFit, false_discovery: float) -> Decision:

@@ -161,7 +161,7 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
     with residuals correlated over four half-overlapping windows, so that they hold for coloured noise, or the
     ordinary ones where these are larger: where few windows decide (the entry of a turn), the former are too small.
     """
-    import statsmodels.api as models  # here, for it takes a second to import
+    from statsmodels.regression.linear_model import OLS  # here, for it takes half a second to import
 
     table = np.column_stack(regressors)
     whole = np.isfinite(target) & np.isfinite(table).all(axis=1)
@@ -184,7 +184,7 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
         return None
     lags = 4 * (len(wanted) // int(np.count_nonzero(whole)))
     # No figure used here depends on a constant among the regressors, and looking for one takes two decompositions.
-    result = models.OLS(wanted, design, hasconst=False).fit()
+    result = OLS(wanted, design, hasconst=False).fit()
     robust = result.get_robustcov_results(cov_type="HAC", maxlags=lags, use_correction=True)
     residual = float(np.sqrt(np.mean(np.asarray(result.resid) ** 2)))
     errors = np.maximum(np.asarray(result.bse), np.asarray(robust.bse))
