@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from tank2sim.gap.inference import form_error, kalman_kernels
 from tank2sim.gap.inference import likelihood as module
-from tank2sim.gap.inference.fit import Belief, ExplanationFit
+from tank2sim.gap.inference.fit import NARROWER, Belief, ExplanationFit
 from tank2sim.gap.inference.form_error import Forms
 from tank2sim.gap.inference.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
 from tests.gap.dense import Dense
@@ -58,7 +58,9 @@ def dense_cost(of: Likelihood, toy: Toy, theta, *, about=None, marginal=(), form
 
 
 def believed(of: Likelihood, logs=LOGS) -> float:
-    return float(np.sum(((logs - of.belief.logs) / of.belief.spread) ** 2))
+    away = (logs - of.belief.logs) / of.belief.spread
+    away[-1] /= NARROWER if away[-1] < 0 else 1.0
+    return float(np.sum(away**2))
 
 
 @pytest.mark.parametrize("names", [(), ("0",), ("0", "1")])
@@ -222,6 +224,14 @@ def test_belief_is_a_parabola_with_bounds_at_three_deviations() -> None:
     assert belief.bounds[0] == pytest.approx([-0.5, -8.0]) and belief.bounds[1] == pytest.approx([2.5, 4.0])
     value, slope = belief.cost(np.array([2.0, -2.0]))
     assert value == pytest.approx(4.0) and slope == pytest.approx([8.0, 0.0])
+
+
+@pytest.mark.parametrize(("width", "cost", "slope"), [(0.0, 1.0, 1.0), (-4.0, 0.25, -0.25)])
+def test_coefficients_that_are_better_than_the_card_states_cost_less_than_worse_ones(width, cost, slope) -> None:
+    """By hand: two from the mean of -2, with a standard deviation of 2 above it and of 4 below."""
+    value, slopes = Belief(np.array([1.0, -2.0]), np.array([0.5, 2.0])).cost(np.array([1.0, width]))
+    assert NARROWER == 2.0
+    assert value == pytest.approx(cost) and slopes == pytest.approx([0.0, slope])
 
 
 def test_the_best_of_several_noises_is_begun_with() -> None:

@@ -226,6 +226,14 @@ def test_the_simplest_explanation_is_not_named_where_what_it_lacks_is_far_likeli
     assert [other.hypothesis.effects for other in nearly.alike] == [(SURGE, SWAY)]
 
 
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(("gain", "named"), [(EVIDENCE_NEEDED - 1, 0), (EVIDENCE_NEEDED + 1, 2)])
+def test_more_effects_must_be_ahead_of_what_simulations_excluded(gain: float, named: int) -> None:
+    search = Search(CALM, (fit(-50 - gain, 0, 1), fit(0)), ())
+    assert len(decide(search, excluded=[fit(-50, 0)]).best.hypothesis.effects) == named
+    assert len(decide(search, excluded=[fit(-50, 2)]).best.hypothesis.effects) == 2  # holds none of it
+
+
 FOUR = (0, FORCE, DRAG, LAG)
 
 

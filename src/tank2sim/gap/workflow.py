@@ -405,6 +405,7 @@ def _judge_by_simulation(
     `share` is the option ``false_discovery``.
     """
     withheld: list[str] = []
+    excluded: list[ExplanationFit] = []
     alone: _Proof | None = None
     remaining, current = found, decision
     for _ in range(TRIES):
@@ -423,9 +424,9 @@ def _judge_by_simulation(
             return _Judged(replace(current, verdict=verdict), estimated, boxed, tuple(withheld))
         if not unknown:
             withheld.append(" and ".join(current.best.hypothesis.effects))
-        kept = tuple(fit for fit in remaining.fits if fit is not current.best)
-        remaining = replace(remaining, fits=kept)
-        current = decide(remaining, share)
+        excluded.append(current.best)
+        remaining = replace(remaining, fits=tuple(fit for fit in remaining.fits if fit is not current.best))
+        current = decide(remaining, share, excluded)
     proof = alone or _prove(card, trials, _NamedEffects([], {}), replays, found, found.none)
     if decision.best.hypothesis.effects:
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH

@@ -68,8 +68,8 @@ compared by differences of some units."""
 QUOTIENT = 1e-3
 """Step of the logarithms of the noise in a difference quotient of slopes (project choice: a thousandth of a level)."""
 
-WIDTHS = (0.02, 2.5)
-"""Factor on the standard errors of the card's coefficients: 2 % where a card states none, and hardly above 5 %."""
+WIDTHS = (0.1, 2.5)
+"""Factor on the standard errors of the card's coefficients: where a card states none, 0.2 % to 5 % (project choice)."""
 
 
 class Likelihood:

@@ -7,7 +7,7 @@ best explanation are not noise, a name would be a guess, and is withheld.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,7 +124,7 @@ class Strange:
     excess: float
 
 
-def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
+def decide(search: Search, false_discovery: float = 1 - LIKELY, excluded: Sequence[ExplanationFit] = ()) -> Decision:
     """Return the verdict that the scores of a search support.
 
     Where the simplest explanation has an effect that is less probable than :data:`RIVAL`, for what fits much better is
@@ -137,6 +137,9 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
         Largest probability with which a single name may be wrong, 1 - :data:`SUREST` to 1 - :data:`LIKELY`. An effect
         whose own is larger is one of several candidates, so that of all names that are given alone no larger share is
         wrong on average.
+    excluded : sequence of ExplanationFit
+        Explanations that are not in the search any more, for simulations with them are not closer. One that holds the
+        effects of such a one and more must be ahead of it as well.
     """
     none = search.none
     best = none
@@ -149,7 +152,8 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
         if larger is None or (count > 1 and larger is not of_count[0]):
             continue  # what fits better is within the uncertainty of the card
         share = 0.0 if _mends_the_card(larger, best) else _share(larger, best)
-        if larger.score < least - max(needed, share * (none.score - larger.score)):
+        smaller = [fit.score for fit in excluded if {*fit.hypothesis.effects} < {*larger.hypothesis.effects}]
+        if larger.score < min([least, *smaller]) - max(needed, share * (none.score - larger.score)):
             best = larger
         least = min(least, larger.score)
     decision = _decision(search, best, false_discovery)
