@@ -165,8 +165,6 @@ def test_cautions_are_among_the_notices() -> None:
     poor = replace(gap, passed=(made_up.passed("turn35", 9.0, 5.0),))
     first, second, *_ = written(poor)["notices"]
     assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
-    unsure = replace(gap, effects=(replace(gap.effects[0], confidence=0.11),))
-    assert "those without it are together likelier: its probability is 0.11" in written(unsure)["notices"][0]
 
 
 def test_replays_are_thinned_in_the_units_of_their_columns_with_every_extreme() -> None:
