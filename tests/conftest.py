@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import os
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 # Matrices here are small and the workers of the tests share the cores: threads would only wait for each other.
@@ -17,6 +20,20 @@ from tank2sim.native.compiler import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("TANK2SIM_DATA", ROOT.parent / "shared"))
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Every second worker imports the test modules from the last one on, before they are collected.
+
+    What an import compiles is kept next to the module. In a fresh checkout two workers that go through the modules in
+    the same order would both compile all of them, their assertions included; now they meet in the middle.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+    if not int(worker.removeprefix("gw")) % 2 or session.config.args_source is not session.config.ArgsSource.TESTPATHS:
+        return
+    for path in sorted((ROOT / "tests").rglob("test_*.py"), reverse=True):
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # collection reports it
+            importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
 
 
 @pytest.fixture(scope="session")
@@ -65,3 +82,15 @@ def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
     own.chmod(0o755)
     own.replace(command)  # one name for all worker processes: what one has compiled is known by it
     os.environ["CC"] = str(command)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_processor(pytestconfig: pytest.Config) -> Iterator[None]:
+    """The fast tests see one processor, as their workers share them: each process that is begun imports for a second.
+
+    What needs several, and says so, begins them all the same; slow tests see as many as there are.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if "not slow" in pytestconfig.option.markexpr:
+            patch.setattr(os, "cpu_count", lambda: 1)
+        yield
