@@ -97,7 +97,7 @@ def invoked(*arguments):
     "arguments",
     [
         ("simulate", "kvlcc2-captive", "--manoeuvre", "turn:35"),
-        ("stability", "kvlcc2-captive"),
+        pytest.param(("stability", "kvlcc2-captive"), marks=pytest.mark.slow),
         ("influence", "kvlcc2-captive", "--figure", "tactical_diameter_m@35"),
         ("compare", "kvlcc2-captive", "kvlcc2-captive", "--members", "0"),
     ],

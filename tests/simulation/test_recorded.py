@@ -17,6 +17,7 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.recorded import _smoothed, recorded, repeat
 from tank2sim.simulation.rudder_record import _held
 from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
+from tests.marks import first_fast
 
 RATE, STEP = np.deg2rad(3.0), 0.05
 GEAR = "time_constant_s = 0.1\nmax_rate_degps = 3.0\nmax_angle_deg = 40.0"
@@ -116,7 +117,7 @@ def test_a_zigzag_whose_rudder_is_held_at_unequal_angles_is_repeated_with_them(m
     assert abs(repeat(even, Integrator(model)).figures["overshoots_deg"][0] - simulated[0]) > 0.5
 
 
-@pytest.mark.parametrize("off", [0.0, 0.5])
+@first_fast("off", [0.5, 0.0])
 @pytest.mark.parametrize(("rudder", "heading"), [(15, 1), (20, 10), (20, 7)])
 def test_course_nominal_heading_and_lag_come_from_all_reversals_together(model, rudder, heading, off):
     """A late controller, and a ship that is off her course when she begins: neither changes the nominal heading."""
@@ -156,7 +157,7 @@ def test_a_rudder_that_is_reversed_by_the_clock_at_any_heading_makes_no_zigzag(m
 
 
 @pytest.mark.parametrize(("approach", "every"), [(0.0, 1), (0.0, 10), (1.0, 1), (12.0, 10)])
-@pytest.mark.parametrize("side", [1, -1])
+@first_fast("side", [1, -1])
 def test_a_turn_begins_where_its_rudder_begins_to_move(model, side, approach, every):
     """Also in a record that begins at the execute. At 3 deg/s a rudder of 35 deg is over 12 s later, 58 m farther."""
     whole = sail(lambda t, turned, before: side * np.deg2rad(35) * (t >= 12.0), 240.0)
