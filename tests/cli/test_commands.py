@@ -94,7 +94,9 @@ def test_export_and_check_agree_and_a_wrong_card_fails(tmp_path) -> None:
         (["export", "mariner"], ["-o"]),
         (["export", "mariner", "-o", "x.fmu", "--fmi", "1"], ["--fmi"]),
         (["export", "mariner", "-o", "x.fmu", "--platforms", "amiga"], ["--platforms", "amiga"]),
-        (["export", VEHICLE, "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"]),
+        pytest.param(
+            ["export", VEHICLE, "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"], marks=pytest.mark.slow
+        ),
         pytest.param(
             ["export", VEHICLE, "-o", "x.fmu", "--json", "missing/x.json"],
             ["missing/x.json", "cannot be written"],
