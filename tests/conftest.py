@@ -71,11 +71,16 @@ def private_cache(session_folder: Path) -> None:
     os.environ["XDG_CACHE_HOME"] = str(session_folder / "cache")
 
 
+def of_every_change(config: pytest.Config) -> bool:
+    """Whether the tests that run are those of every change: the fast ones, or the essential ones of the slow."""
+    return "not slow" in config.option.markexpr or config.option.markexpr == "essential"
+
+
 @pytest.fixture(autouse=True, scope="session")
 def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
-    """The fast tests compile with little optimisation, sooner and to the same digits; slow ones as users do."""
+    """Tests of every change compile with little optimisation, sooner and to the same digits; others as users do."""
     compiler = find_compiler()
-    if compiler is None or "not slow" not in pytestconfig.option.markexpr or os.name != "posix":
+    if compiler is None or not of_every_change(pytestconfig) or os.name != "posix":
         return
     command, own = session_folder / "cc", session_folder / f"cc-{os.getpid()}"
     own.write_text(f'#!/bin/sh\nexec {shlex.join(compiler)} "$@" -Og\n', encoding="utf-8")
@@ -86,11 +91,11 @@ def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def one_processor(pytestconfig: pytest.Config) -> Iterator[None]:
-    """The fast tests see one processor, as their workers share them: each process that is begun imports for a second.
+    """Tests of every change see one processor, as their workers share them; a process that is begun takes a second.
 
-    What needs several, and says so, begins them all the same; slow tests see as many as there are.
+    What needs several, and says so, begins them all the same; other tests see as many as there are.
     """
     with pytest.MonkeyPatch.context() as patch:
-        if "not slow" in pytestconfig.option.markexpr:
+        if of_every_change(pytestconfig):
             patch.setattr(os, "cpu_count", lambda: 1)
         yield
