@@ -131,7 +131,6 @@ def test_a_sign_changed_in_the_generated_code_fails(
     assert report.max_error["motion.y"] > 0.1
 
 
-@pytest.mark.slow
 def test_an_fmu_of_another_ship_is_reported_by_its_variables(
     models: dict[str, Model], fmu_file: Callable[[str, int], Path]
 ) -> None:

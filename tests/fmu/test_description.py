@@ -21,7 +21,7 @@ from tank2sim.fmu.running import RunningFmu
 from tank2sim.fmu.unpacking import UnpackedFmu
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
-NAMES = pytest.mark.parametrize("name", ["hull", pytest.param("body", marks=pytest.mark.slow), "gain"])
+NAMES = pytest.mark.parametrize("name", ["hull", "body", "gain"])
 Unpacked = Callable[[str, int], UnpackedFmu]
 Instantiate = Callable[..., RunningFmu]
 
