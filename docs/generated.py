@@ -38,6 +38,8 @@ from tank2sim.records import campaign_form
 
 SOURCES = Path(tank2sim.__file__).parent
 
+_CHOICE = re.compile(r"project\s+choice", re.IGNORECASE)
+
 logger = logging.getLogger(__name__)
 
 FAMILIES = {
@@ -171,13 +173,14 @@ def project_constants() -> list[ProjectConstant]:
     """The constants whose docstrings call them a project choice, by module."""
     found = []
     for path in sorted(SOURCES.rglob("*.py")):
-        body = ast.parse(path.read_text(encoding="utf-8")).body
+        text = path.read_text(encoding="utf-8")
+        body = ast.parse(text).body if re.search(_CHOICE, text) else []
         for node, after in pairwise(body):
             if not (isinstance(node, ast.Assign | ast.AnnAssign) and isinstance(after, ast.Expr)):
                 continue
             target = node.targets[0] if isinstance(node, ast.Assign) else node.target
             reason = after.value.value if isinstance(after.value, ast.Constant) else None
-            if not isinstance(reason, str) or not re.search(r"project\s+choice", reason, re.IGNORECASE):
+            if not isinstance(reason, str) or not re.search(_CHOICE, reason):
                 continue
             place = path.relative_to(SOURCES).with_suffix("").as_posix().replace("/", ".")
             value = " ".join(ast.unparse(node.value).split()) if node.value else ""

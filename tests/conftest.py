@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import os
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 # Matrices here are small and the workers of the tests share the cores: threads would only wait for each other.
@@ -17,6 +20,20 @@ from tank2sim.native.compiler import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("TANK2SIM_DATA", ROOT.parent / "shared"))
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Every second worker imports the test modules from the last one on, before they are collected.
+
+    What an import compiles is kept next to the module. In a fresh checkout two workers that go through the modules in
+    the same order would both compile all of them, their assertions included; now they meet in the middle.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+    if not int(worker.removeprefix("gw")) % 2 or session.config.args_source is not session.config.ArgsSource.TESTPATHS:
+        return
+    for path in sorted((ROOT / "tests").rglob("test_*.py"), reverse=True):
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # collection reports it
+            importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
 
 
 @pytest.fixture(scope="session")
@@ -54,14 +71,34 @@ def private_cache(session_folder: Path) -> None:
     os.environ["XDG_CACHE_HOME"] = str(session_folder / "cache")
 
 
+def of_every_change(config: pytest.Config) -> bool:
+    """Whether the tests that run are those of every change: the fast ones, or the essential ones of the slow."""
+    return "not slow" in config.option.markexpr or config.option.markexpr == "essential"
+
+
 @pytest.fixture(autouse=True, scope="session")
 def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
-    """The fast tests compile with little optimisation, sooner and to the same digits; slow ones as users do."""
+    """Tests of every change compile with little optimisation, sooner and to the same digits; others as users do."""
     compiler = find_compiler()
-    if compiler is None or "not slow" not in pytestconfig.option.markexpr or os.name != "posix":
+    if compiler is None or not of_every_change(pytestconfig) or os.name != "posix":
         return
     command, own = session_folder / "cc", session_folder / f"cc-{os.getpid()}"
-    own.write_text(f'#!/bin/sh\nexec {shlex.join(compiler)} "$@" -Og\n', encoding="utf-8")
+    script = f'exec {shlex.join(compiler)} "$@"'
+    # Essential tests run many ships in lanes, where more time is gained by optimisation than it takes.
+    lanes = f'case "$*" in *lanes.c*) {script} ;; esac\n' if pytestconfig.option.markexpr == "essential" else ""
+    own.write_text(f"#!/bin/sh\n{lanes}{script} -Og\n", encoding="utf-8")
     own.chmod(0o755)
     own.replace(command)  # one name for all worker processes: what one has compiled is known by it
     os.environ["CC"] = str(command)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_processor(pytestconfig: pytest.Config) -> Iterator[None]:
+    """Tests of every change see one processor, as their workers share them; a process that is begun takes a second.
+
+    What needs several, and says so, begins them all the same; other tests see as many as there are.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if of_every_change(pytestconfig):
+            patch.setattr(os, "cpu_count", lambda: 1)
+        yield

@@ -136,7 +136,7 @@ SLOW = (
     *("design of a sea trial", "export", "gap with an unnamed effect", "gap without an effect", "glide of a programme"),
     *("guess", "identify", "influence of a steering card", "run and repeat", "signals", "signals with a filter"),
     *("simulate an ensemble", "stability", "stability of an ensemble", "stability with small probabilities", "steer"),
-    *("tow of one term", "validate"),
+    *("tow of one term", "validate", "influence with targets", "influence through two points", "gap", "run", "tow"),
 )
 """Names whose result and page take 2 s or more."""
 

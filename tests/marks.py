@@ -9,9 +9,9 @@ import pytest
 from _pytest.mark import ParameterSet
 
 
-def first_fast(names: str, values: Iterable[Any], **more: Any) -> pytest.MarkDecorator:
+def first_fast(names: str | tuple[str, ...], values: Iterable[Any], **more: Any) -> pytest.MarkDecorator:
     """``pytest.mark.parametrize`` of which the first value is a fast test and the others are slow ones."""
-    several, (first, *others), slow = "," in names, values, []
+    several, (first, *others), slow = not isinstance(names, str) or "," in names, values, []
     for value in others:
         if isinstance(value, ParameterSet):
             slow.append(pytest.param(*value.values, marks=[*value.marks, pytest.mark.slow], id=value.id))

@@ -145,6 +145,7 @@ def test_the_criteria_of_imo_are_a_table(ship) -> None:
     assert row["met"] == (row["found"] <= row["allowed"]) and row["allowed"] == 5.0
 
 
+@pytest.mark.slow
 def test_an_ensemble_is_the_same_for_the_same_seed(ship) -> None:
     first, second = (ship.turn(20, duration_s=100.0, members=4, seed=3).tables[1].df for _ in range(2))
     pd.testing.assert_frame_equal(first, second)
@@ -175,6 +176,7 @@ def test_a_tanks_campaign_gives_a_card_and_a_ship(data) -> None:
     assert found.card.covariance is not None
 
 
+@pytest.mark.slow
 def test_an_fmu_passes_its_check(ship, tmp_path) -> None:
     made = ship.to_fmu(tmp_path / "m.fmu", fmi=3)
     assert made.path.stat().st_size == len(made.exported.content)

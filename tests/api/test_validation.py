@@ -16,7 +16,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(folder):
-    return t2s.validate("mariner", folder, members=20)
+    return t2s.validate("mariner", folder, members=5)
 
 
 def test_a_ship_agrees_with_its_trial(found, folder):

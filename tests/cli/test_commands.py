@@ -33,6 +33,7 @@ def test_simulate_writes_what_is_asked(tmp_path) -> None:
     refused(again, "run.csv", "not an order")  # a trial has more than orders, and says which column
 
 
+@pytest.mark.slow
 def test_stability_gives_json(tmp_path) -> None:
     result = tank2sim("stability", "mariner", "--json", "s.json", cwd=tmp_path)
     assert result.returncode == 0 and "stable" in result.stdout
@@ -93,10 +94,13 @@ def test_export_and_check_agree_and_a_wrong_card_fails(tmp_path) -> None:
         (["export", "mariner"], ["-o"]),
         (["export", "mariner", "-o", "x.fmu", "--fmi", "1"], ["--fmi"]),
         (["export", "mariner", "-o", "x.fmu", "--platforms", "amiga"], ["--platforms", "amiga"]),
-        (["export", VEHICLE, "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"]),
-        (
+        pytest.param(
+            ["export", VEHICLE, "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"], marks=pytest.mark.slow
+        ),
+        pytest.param(
             ["export", VEHICLE, "-o", "x.fmu", "--json", "missing/x.json"],
             ["missing/x.json", "cannot be written"],
+            marks=pytest.mark.slow,
         ),
         (["check", "none.fmu"], ["none.fmu"]),
         (["tow", "none.csv"], ["none.csv"]),

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from tank2sim.cards import read_card
 from tests.cli.command_line import refused, tank2sim
 
 
+@pytest.mark.slow
 def test_an_mmg_ship_becomes_a_polynomial_with_its_errors(tmp_path: Path) -> None:
     done = tank2sim(
         "convert", "kvlcc2-l7-mmg", "--to", "abkowitz", "-o", "ship.toml", "--json", "made.json", cwd=tmp_path

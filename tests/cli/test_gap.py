@@ -120,7 +120,7 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     for reported in ("The model lacks an effect: current", "0.45", "250", "m/s", "turn-35", "held out", "8.00", "1.00"):
         assert reported in words, reported
     assert "next test: turn:35. A turn tells most." in words
-    again = tank2sim("stability", str(out / "improved.toml"), cwd=tmp_path)
+    again = tank2sim("simulate", str(out / "improved.toml"), "--manoeuvre", "turn:20", "--duration", "60", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
 
 

@@ -134,6 +134,7 @@ def test_a_column_with_a_long_gap_is_left_out_with_a_notice_or_refused_by_name(p
     assert "interpolated by straight lines" in run(gappy, "--column", "psi", "--max-gap", "12").output
 
 
+@pytest.mark.slow
 def test_charts_and_a_page_that_fetches_nothing(path, tmp_path):
     plots = tmp_path / "plots"
     run(path, "--column", "r", "--plot", plots)

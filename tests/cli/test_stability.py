@@ -53,6 +53,7 @@ def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) 
     assert re.search(r"\(\d\) the card has no \[propulsion\]", reported)
 
 
+@pytest.mark.slow
 def test_a_linear_card_has_no_curve_over_speed_and_weather_is_reported(tmp_path) -> None:
     weather = '[{name = "current", parameters = {speed_mps = 0.5, direction_deg = 90.0}}]'
     arguments = ["--set", "model.kind=linear", "--set", f"effects={weather}", "--speed", "5.4", "--json", "s.json"]

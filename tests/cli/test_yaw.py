@@ -112,6 +112,7 @@ def test_a_run_in_air_can_be_simulated_and_gives_j(folder):
     refused(tank2sim("yaw", "dry.csv", "--medium", "air", cwd=folder), "--simulate")
 
 
+@pytest.mark.slow
 def test_a_ships_motion_is_run_at_model_size(folder):
     asked = ("--simulate", "alyshev", "--similar-to", "38,8,100,120", "--json", "similar.json")
     ended = tank2sim("yaw", "similar.csv", *asked, cwd=folder)

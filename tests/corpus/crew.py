@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 
 from tests.corpus.inputs import RESULTS, plain, shortened, thinned
 from tests.corpus.worker import Job, Outcome, Worker
-
-WORKERS = 2
 
 
 class Crew:
@@ -16,7 +15,7 @@ class Crew:
 
     def __init__(self) -> None:
         self._free: SimpleQueue[Worker] = SimpleQueue()
-        self._workers = [Worker() for _ in range(WORKERS)]
+        self._workers = [Worker() for _ in range(os.cpu_count() or 1)]
         self._made: dict[str, bytes] = {}
         for worker in self._workers:
             self._free.put(worker)
@@ -29,7 +28,7 @@ class Crew:
             self._free.put(worker)
 
     def all(self, jobs: list[Job]) -> list[Outcome]:
-        with ThreadPoolExecutor(WORKERS) as pool:
+        with ThreadPoolExecutor(len(self._workers)) as pool:
             return list(pool.map(self.run, jobs))
 
     def made(self, name: str) -> bytes:

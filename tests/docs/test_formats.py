@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
-import subprocess
-import sys
 from itertools import chain
 
 import pytest
@@ -15,7 +14,6 @@ from tank2sim.cards import form
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.records import campaign_form
-from tests.conftest import ROOT
 
 from .examples import MANUAL
 
@@ -50,10 +48,10 @@ def test_the_page_of_effects_is_generated_from_the_library() -> None:
     assert len(EFFECTS) > 40
 
 
-def test_project_choices_are_listed_with_value_place_and_reason() -> None:
-    code = "import sys; sys.path.insert(0, 'docs'); import generated; print(generated.project_choices())"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    rows = [line.split(" | ") for line in done.stdout.splitlines() if line.startswith("| `")]
+def test_project_choices_are_listed_with_value_place_and_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(MANUAL))
+    generated = importlib.import_module("generated")
+    rows = [line.split(" | ") for line in generated.project_choices().splitlines() if line.startswith("| `")]
     assert len(rows) > 50 and all(len(row) == 5 for row in rows)
     assert any("`api.result.REPR_ROWS`" in row[0] and row[1] == "`20`" for row in rows)
     names = {row[0].removeprefix("| ").strip("`") for row in rows}

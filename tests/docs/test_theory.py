@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import re
 from pathlib import Path
@@ -50,8 +49,9 @@ def is_in_the_checkout(name: str) -> bool:
     path = ROOT / file if file.startswith(("benchmarks/", "docs/")) else ROOT / "tests" / file.removeprefix("tests/")
     if not path.is_file():
         return False
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return not test or any(isinstance(one, ast.FunctionDef) and one.name == test for one in tree.body)
+    return (
+        not test or re.search(rf"^def {re.escape(test)}\(", path.read_text(encoding="utf-8"), re.MULTILINE) is not None
+    )
 
 
 def test_the_manual_has_equations() -> None:

@@ -214,7 +214,7 @@ def test_the_library_exports_every_function_of_the_header(
 # ---- whatever a card calls things ----
 
 TEXT = st.one_of(
-    st.text(max_size=80),
+    st.text(st.characters(exclude_categories=["Cs"]), max_size=80),
     st.text(alphabet="<>&\"'%\\/.;:*?|{}[]()-_ \x00\x07\x1b\x7f\r\n\t\u2028\ufffe\ud800船🚢é", max_size=80),
     st.sampled_from(
         ["]]>", "*/", "../../x", "C:\\NUL", "con", "-->", "{{ 7 * 7 }}", "{% raw %}", "\x00", "x" * 5000, ""]

@@ -293,7 +293,7 @@ def test_the_file_tells_what_was_added_by_which_trials() -> None:
         assert "# The Mariner class cargo ship in the third-order" in text
 
 
-@pytest.mark.parametrize("name", ["current", "wind", "rudder_rate_limit", "roll_coupling", "flow_memory"])
+@first_fast("name", ["current", "wind", "rudder_rate_limit", "roll_coupling", "flow_memory"])
 def test_the_improved_card_is_linearised(name: str) -> None:
     found = [(name, si(name), {})]
     result = stability(

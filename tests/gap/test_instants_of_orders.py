@@ -22,16 +22,15 @@ ZIGZAGS = ("zigzag10_10", "zigzag15_15_port")
 
 
 @cache
-def sets() -> dict[tuple[str, tuple[str, ...]], Made]:
-    """Zigzags by ship and hidden effect, all of one ship in one batch."""
-    kinds = (("tanker", ()), ("model", ()), ("model", ("rudder_time_offset",)))
-    settings = [Setting(effects, 5, ship=ship, manoeuvres=ZIGZAGS) for ship, effects in kinds]
-    return dict(zip(kinds, make(settings), strict=True))
+def made_of(ship: str, effects: tuple[str, ...] = ()) -> Made:
+    """Zigzags of a ship with a hidden effect."""
+    (made,) = make([Setting(effects, 5, ship=ship, manoeuvres=ZIGZAGS)])
+    return made
 
 
 def written(folder: Path, ship: str, hertz: int):
     """Zigzags of a ship with nothing missing, as files; and the times at which the orders were given."""
-    made = sets()[ship, ()]
+    made = made_of(ship)
     write(sampled(made, hertz), folder)
     card = read_card(folder / "ship.toml")
     assert isinstance(card, ManoeuvringCard)
@@ -107,7 +106,7 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
 @pytest.mark.parametrize("hertz", [1, 2])
 def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz: int) -> None:
     """The true delay follows the zigzags to the noise; half an interval more or less does not."""
-    made = sets()["model", ("rudder_time_offset",)]
+    made = made_of("model", ("rudder_time_offset",))
     write(sampled(made, hertz), tmp_path)
     text, delay = (tmp_path / "ship.toml").read_text(encoding="utf-8"), made.parameters["rudder_time_offset"]["delay_s"]
     misfits = []

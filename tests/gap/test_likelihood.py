@@ -241,11 +241,11 @@ def test_the_best_of_several_noises_is_begun_with() -> None:
 
 
 def test_known_amplitudes_are_recovered_within_their_errors(monkeypatch) -> None:
-    """Over ten sets of noise the squared errors in standard deviations have a mean near one, for an exact formula."""
+    """Over five sets of noise the squared errors in standard deviations have a mean near one, for an exact formula."""
     monkeypatch.setattr(form_error, "FORM", 1e-6)
     toy, away = Toy((None, None)), []
     true = np.array([0.8, -0.6])
-    for seed in range(10):
+    for seed in range(5):
         of = judge(toy_motion(tuple(true), seed=seed), names=(), spread=1.0)
         fit = of.at_best(toy, np.zeros(2), [LOGS], [6])
         away.append(np.linalg.solve(np.linalg.cholesky(fit.covariance), fit.theta - true))

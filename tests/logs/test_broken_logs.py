@@ -14,6 +14,7 @@ from tank2sim.errors import InputError
 from tank2sim.logs.reading import read_log
 from tank2sim.records.reading import read_trial_file
 from tests.logs.made_logs import frame, nmea_lines, rmc, sentence, voyage
+from tests.marks import first_fast
 
 
 @pytest.fixture
@@ -221,7 +222,7 @@ def test_what_is_no_log_is_refused(tmp_path, name, content, problem) -> None:
 
 
 @pytest.mark.parametrize("name", ["voyage.bag", "voyage.mcap", "voyage.bin", "voyage.ulg", "voyage.nmea", "voyage.csv"])
-@pytest.mark.parametrize("share", [0.02, 0.35, 0.8])
+@first_fast("share", [0.35, 0.02, 0.8])
 def test_a_file_that_is_cut_off_is_refused_or_read_to_its_end(data, tmp_path, name, share) -> None:
     source = data / "data" / "logs" / "ship_21" / name
     if not source.is_file():

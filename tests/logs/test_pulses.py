@@ -17,7 +17,7 @@ from tests.logs.made_logs import T0, craft, frame, motion, voyage
 from tests.marks import first_fast
 
 
-@pytest.mark.parametrize(
+@first_fast(
     ("port", "starboard", "span"),
     [("pwm_left", "pwm_right", 400), ("servo3_raw", "servo1_raw", 500), ("ch1out", "ch2out", 400), ("C3", "C1", 400)],
 )

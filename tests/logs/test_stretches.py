@@ -13,6 +13,7 @@ from tank2sim.api.log import log
 from tank2sim.logs.clock import utc_text
 from tank2sim.records.reading import read_trial_file
 from tests.logs.made_logs import T0, frame, steered, truth_manoeuvres, voyage
+from tests.marks import first_fast
 
 SAME = {
     "zigzag": {"zigzag"},
@@ -63,7 +64,7 @@ IN_A_ROW = {
 }
 
 
-@pytest.mark.parametrize("restless_deg", [0.0, 2.0])
+@first_fast("restless_deg", [0.0, 2.0])
 @pytest.mark.parametrize("case", IN_A_ROW)
 def test_manoeuvres_in_a_row_are_one_trial_each(tmp_path, case, restless_deg) -> None:
     table, known = steered([STEADY, *IN_A_ROW[case], STEADY], restless_deg)
@@ -95,12 +96,12 @@ def test_the_audit_of_every_trial_finds_no_fault(made, tmp_path) -> None:
     assert t2s.audit(sorted((tmp_path / "voyage").glob("*.csv"))).passed
 
 
-@pytest.mark.parametrize("name", SHIP)
+@first_fast("name", SHIP)
 def test_manoeuvres_of_the_ship_are_found_in_every_format(data, name) -> None:
     check(data, "ship_21", name, {"zigzag", "turn", "stop"}, {"zigzag": 1, "turn": 2, "stop": 1})
 
 
-@pytest.mark.parametrize("name", SHIP)
+@first_fast("name", SHIP)
 def test_manoeuvres_of_the_craft_are_found_in_every_format(data, name) -> None:
     expected = {"zigzag": 2, "turn": 2, "steps": 1, "pivot": 2, "coast": 3, "astern": 1, "accelerate": 2}
     check(data, "usv_22", name, set(expected), expected)

@@ -13,6 +13,7 @@ from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import select_rows
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
+from tests.marks import first_fast
 from tests.records.motions import NOISE, NONE, motion, trial
 
 DEG = np.pi / 180
@@ -596,7 +597,7 @@ def gentle(heading, amplitude, step):
     return t, psi, rate, other
 
 
-@pytest.mark.parametrize("step", [0.1, 1.0])
+@first_fast("step", [0.1, 1.0])
 @pytest.mark.parametrize("heading", [0.0, 99.0, 200.0])
 def test_a_heading_printed_with_three_digits_is_the_motion_of_its_rate(heading, step):
     for amplitude in (1.0, 2.0, 4.0):

@@ -63,7 +63,7 @@ def found(trials):
     known = parse_card(text_of(OFF), "off.toml")
     fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
     held = Measured((trials["turn"],), "angle", ())
-    result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error"))
+    result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error", members=20))
     found = IdentificationResult(known, result, fitted, held)
     return result, found.to_dict(), found.charts()
 

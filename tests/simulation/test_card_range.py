@@ -97,8 +97,8 @@ def invoked(*arguments):
     "arguments",
     [
         ("simulate", "kvlcc2-captive", "--manoeuvre", "turn:35"),
-        ("stability", "kvlcc2-captive"),
-        ("influence", "kvlcc2-captive", "--figure", "tactical_diameter_m@35"),
+        pytest.param(("stability", "kvlcc2-captive"), marks=pytest.mark.slow),
+        pytest.param(("influence", "kvlcc2-captive", "--figure", "tactical_diameter_m@35"), marks=pytest.mark.slow),
         ("compare", "kvlcc2-captive", "kvlcc2-captive", "--members", "0"),
     ],
     ids=lambda arguments: arguments[0],

@@ -24,10 +24,11 @@ from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.run import simulate
+from tests.marks import first_fast
 
 pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
 
-WIDTHS = [lanes for lanes in (1, 2, 4, 8) if lanes <= widest_lanes()]
+WIDTHS = [lanes for lanes in (8, 4, 2, 1) if lanes <= widest_lanes()]
 
 TEN, TWENTY, LARGE = (math.radians(angle) for angle in (10.0, 20.0, 35.0))
 
@@ -40,8 +41,8 @@ MANOEUVRES = [
     (Zigzag(TWENTY, TEN, opposite=-TEN), 300.05),
 ]
 CASES = [(name, *case) for name in ("mariner", "kvlcc2") for case in MANOEUVRES]
-CASES += [("kvlcc2", Stop(), None), ("esso-osaka-ship", Stop(0.0), None)]
-CASES += [pytest.param("esso-osaka-ship", Stop(), None, marks=pytest.mark.slow)]
+CASES += [("kvlcc2", Stop(), None)]
+CASES += [pytest.param("esso-osaka-ship", stop, None, marks=pytest.mark.slow) for stop in (Stop(0.0), Stop())]
 
 
 def ships(card: ManoeuvringCard, model: Model, count: int) -> tuple[list[dict[str, float]], Array]:
@@ -188,7 +189,7 @@ def test_ships_that_are_doubtful_with_longer_steps_are_run_with_the_usual_ones(m
 SINGLE = Pace(1, single=True)
 
 
-@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+@first_fast("name", ["mariner", "kvlcc2"])
 @pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])
 def test_figures_in_single_precision_are_those_of_single_runs(name: str, manoeuvre) -> None:
     card = read_card(name)
@@ -287,7 +288,7 @@ def evaluated(function: ca.Function, columns: list[Array], lanes: int, *, single
     return found
 
 
-@pytest.mark.parametrize("lanes", WIDTHS)
+@first_fast("lanes", WIDTHS)
 def test_sine_and_cosine_are_exact_to_the_last_places(lanes: int) -> None:
     rng = np.random.default_rng(2)
     angles = np.concatenate([rng.uniform(-r, r, 4000) for r in (1.0, 10.0, 1e3, 9.9e4, 1e7)])
@@ -300,7 +301,7 @@ def test_sine_and_cosine_are_exact_to_the_last_places(lanes: int) -> None:
             np.testing.assert_allclose(values, expected, rtol=4e-16, atol=2e-16)
 
 
-@pytest.mark.parametrize("lanes", WIDTHS)
+@first_fast("lanes", WIDTHS)
 def test_angles_in_single_precision_are_exact_to_its_last_places(lanes: int) -> None:
     rng = np.random.default_rng(2)
     angles = np.concatenate([rng.uniform(-r, r, 4000) for r in (1.0, 10.0, 1e3, 8e3, 1e5)] + [np.zeros(16)])
@@ -314,7 +315,7 @@ def test_angles_in_single_precision_are_exact_to_its_last_places(lanes: int) -> 
     np.testing.assert_allclose(found, np.arctan2(a, b), rtol=4e-7, atol=0)
 
 
-@pytest.mark.parametrize("lanes", WIDTHS)
+@first_fast("lanes", WIDTHS)
 def test_angles_of_sides_are_exact_to_the_last_places(lanes: int) -> None:
     rng = np.random.default_rng(3)
     y, x = rng.normal(size=(2, 4000)) * 10.0 ** rng.integers(-8, 8, size=(2, 4000))
@@ -344,7 +345,7 @@ def test_angles_of_sides_are_exact_to_the_last_places(lanes: int) -> None:
     np.testing.assert_array_equal(np.signbit(found[~np.isnan(found)]), np.signbit(np.arctan2(y, x)[~np.isnan(found)]))
 
 
-@pytest.mark.parametrize("lanes", WIDTHS)
+@first_fast("lanes", WIDTHS)
 def test_operations_have_the_values_of_casadi_to_the_bit(lanes: int) -> None:
     rng = np.random.default_rng(5)
     a, b = rng.normal(size=(2, 400)).round(1)  # with ties and zeros

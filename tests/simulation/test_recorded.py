@@ -17,8 +17,9 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.recorded import _smoothed, recorded, repeat
 from tank2sim.simulation.rudder_record import _held
 from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
+from tests.marks import first_fast
 
-RATE, STEP = np.deg2rad(3.0), 0.05
+RATE, STEP = math.radians(3.0), 0.05
 GEAR = "time_constant_s = 0.1\nmax_rate_degps = 3.0\nmax_angle_deg = 40.0"
 
 
@@ -27,23 +28,23 @@ def model():
     return build(parse_card(CARD.replace("time_constant_s = 0.5", GEAR), "made_up.toml"))
 
 
+def rates(state, rudder):
+    u, v, r, psi = state[:4]
+    c, n = math.cos(psi), math.sin(psi)
+    return [*accelerations(u, v, r, rudder, TRUTH), r, u * c - v * n, u * n + v * c]
+
+
 def sail(order, duration, noise=0.0, begin_heading=0.4):
     """The record, every second step, of a ship whose rudder follows ``order(t, psi, r, rudder order before)``."""
     count = int(duration / STEP)
-    x = np.array([SPEED, 0.0, 0.0, begin_heading, 10.0, -20.0])
+    x = [SPEED, 0.0, 0.0, begin_heading, 10.0, -20.0]
     rows, rudder, wanted = [], 0.0, 0.0
     for k in range(count):
         rows.append([*x, rudder])
         wanted = order(k * STEP, x[3] - begin_heading, wanted)
-        rudder += np.clip(wanted - rudder, -RATE * STEP, RATE * STEP)
-
-        def rates(s, rudder=rudder):
-            u, v, r, psi = s[:4]
-            c, n = np.cos(psi), np.sin(psi)
-            return np.array([*accelerations(u, v, r, rudder, TRUTH), r, u * c - v * n, u * n + v * c])
-
-        middle = rates(x + STEP / 2 * rates(x))
-        x = x + STEP * middle
+        rudder += min(max(float(wanted) - rudder, -RATE * STEP), RATE * STEP)
+        half = [one + STEP / 2 * rate for one, rate in zip(x, rates(x, rudder), strict=True)]
+        x = [one + STEP * rate for one, rate in zip(x, rates(half, rudder), strict=True)]
     names = ("u_mps", "v_mps", "r_radps", "psi_rad", "x_m", "y_m", "delta_rad")
     rng, rows = np.random.default_rng(1), np.array(rows)[::2]
     signals = {
@@ -116,7 +117,7 @@ def test_a_zigzag_whose_rudder_is_held_at_unequal_angles_is_repeated_with_them(m
     assert abs(repeat(even, Integrator(model)).figures["overshoots_deg"][0] - simulated[0]) > 0.5
 
 
-@pytest.mark.parametrize("off", [0.0, 0.5])
+@first_fast("off", [0.5, 0.0])
 @pytest.mark.parametrize(("rudder", "heading"), [(15, 1), (20, 10), (20, 7)])
 def test_course_nominal_heading_and_lag_come_from_all_reversals_together(model, rudder, heading, off):
     """A late controller, and a ship that is off her course when she begins: neither changes the nominal heading."""
@@ -156,7 +157,7 @@ def test_a_rudder_that_is_reversed_by_the_clock_at_any_heading_makes_no_zigzag(m
 
 
 @pytest.mark.parametrize(("approach", "every"), [(0.0, 1), (0.0, 10), (1.0, 1), (12.0, 10)])
-@pytest.mark.parametrize("side", [1, -1])
+@first_fast("side", [1, -1])
 def test_a_turn_begins_where_its_rudder_begins_to_move(model, side, approach, every):
     """Also in a record that begins at the execute. At 3 deg/s a rudder of 35 deg is over 12 s later, 58 m farther."""
     whole = sail(lambda t, turned, before: side * np.deg2rad(35) * (t >= 12.0), 240.0)

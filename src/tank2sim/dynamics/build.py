@@ -37,8 +37,7 @@ def build(card: Card) -> Model:
     """
     entries = card.effects if isinstance(card, ManoeuvringCard | CraftCard) else ()
     effects = tuple(EFFECTS.get(entry.name) for entry in entries)
-    content = pickle.dumps(replace(card, covariance=None))
-    return _built(_Described(content, tuple(map(id, effects)), card, effects))
+    return _built(_described(card, effects))
 
 
 @dataclass(frozen=True)
@@ -51,6 +50,10 @@ class _Described:
     identities: tuple[int, ...]
     card: Card = field(compare=False)
     effects: tuple[Effect | None, ...] = field(compare=False)
+
+
+def _described(card: Card, effects: tuple[Effect | None, ...] = ()) -> _Described:
+    return _Described(pickle.dumps(replace(card, covariance=None)), tuple(map(id, effects)), card, effects)
 
 
 @lru_cache(maxsize=KEPT_MODELS)
@@ -76,10 +79,21 @@ def _model(card: Card) -> Model:
         raise TypeError(f"no model for {type(card).__name__}")
     for number, entry in enumerate(card.effects):
         _check_effect(card, entry, f"effects.{number}")
-    model = craft_model(card) if isinstance(card, CraftCard) else ship_model(card)
+    spelt = {place: key for place, key in card.spelt.items() if not place.startswith("effects.")}
+    model = _without_effects(_described(replace(card, text="", effects=(), spelt=spelt)))
     for entry in sorted(card.effects, key=_comes_last):
         model = _with_effect(model, card, entry)
     return model
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _without_effects(described: _Described) -> Model:
+    """The model on which the effects of a card go: the same whatever they are, and most of the work."""
+    card = described.card
+    if isinstance(card, CraftCard):
+        return craft_model(card)
+    assert isinstance(card, ManoeuvringCard)
+    return ship_model(card)
 
 
 def _comes_last(entry: EffectEntry) -> bool:

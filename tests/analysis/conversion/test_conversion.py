@@ -85,7 +85,7 @@ def test_there_and_back_is_the_same_card() -> None:
 
 
 @pytest.mark.parametrize("scaling", ["prime_ii", "bis", "dimensional"])
-@pytest.mark.parametrize("sign", ["port", "starboard"])
+@first_fast("sign", ["port", "starboard"])
 def test_other_conventions_are_the_same_ship(scaling: str, sign: str) -> None:
     made = t2s.convert("kvlcc2", scaling=scaling, rudder_sign=sign)
     assert made.made.card is not None

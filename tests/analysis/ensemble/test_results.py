@@ -161,6 +161,7 @@ def test_the_chance_of_a_criterion_is_the_share_that_meets_it() -> None:
     assert chance(ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(3, 0, {})).met is None
 
 
+@pytest.mark.slow
 def test_the_chance_of_meeting_a_limit_at_the_median_is_a_half(mariner_card, mariner) -> None:
     criteria = [one for one in imo_criteria(mariner) if one.name == "advance"]
     assert criteria[0].found is not None

@@ -9,6 +9,7 @@ from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.analysis.stability.trim import trim_effect
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
+from tests.marks import first_fast
 
 SYMMETRIC = {f"derivatives.{name}": 0.0 for name in ("Y0", "Y0u", "Y0uu", "N0", "N0u", "N0uu")}
 YV, YR, NV, NR = -1160e-5, -499e-5, -264e-5, -166e-5
@@ -39,7 +40,7 @@ def test_influences_and_neutral_values_of_a_symmetric_ship_are_in_closed_form(sy
     assert influence(symmetric, "Yr").neutral_percent == pytest.approx(100 * (YV * NR / NV / YR - 1), rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["Yv", "Nr", "Yvu", "N0"])
+@first_fast("name", ["Yv", "Nr", "Yvu", "N0"])
 def test_sensitivities_are_those_of_finite_differences_of_the_whole_analysis(name: str) -> None:
     """Of an asymmetric ship off her speed, so that the straight course moves too."""
     card = read_card("mariner")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -115,6 +116,10 @@ def names_of_effects() -> set[str]:
 def names_quoted(source: str, path: str) -> Iterator[tuple[int, str]]:
     """Line and text of each string that is the name of an effect, or of the model's variable for its parameter."""
     known = names_of_effects()
+    if not re.search(
+        f"""["'](?:{"|".join(map(re.escape, known))})["']""", source
+    ):  # most modules, which need not be taken apart
+        return
     for node in ast.walk(ast.parse(source, path)):
         if isinstance(node, ast.Constant) and node.value in known:
             yield node.lineno, node.value

@@ -14,10 +14,8 @@ def plain(tmp_path_factory):
     return written, reduce_campaign(read_campaign(written.path)).derivatives
 
 
-@pytest.mark.parametrize(
-    "name",
-    [name if name == "german.csv" else pytest.param(name, marks=pytest.mark.slow) for name in FORMATS],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORMATS)
 def test_derivatives_are_those_of_the_plain_files_to_the_digits_of_the_format(plain, tmp_path, name):
     for library, ending in (("h5py", ("h5", "73.mat")), ("nptdms", "tdms")):
         if name.endswith(ending):

@@ -235,7 +235,7 @@ def test_a_resistance_that_pushes_the_model_ahead_is_refused(sound):
     assert reduce_campaign(driven).derivatives["X0"].value > 0  # thrust may exceed the resistance
 
 
-@pytest.mark.parametrize("cut", [slice(None), slice(20, None), slice(None, -20)])
+@first_fast("cut", [slice(None), slice(20, None), slice(None, -20)])
 def test_a_run_copied_under_another_name_is_refused_with_both_names(tmp_path, cut):
     written = write(replace(SOUND, size="linear", rate_hz=5.0), tmp_path)
     header, *rows = (written.path.parent / "drift_+04.csv").read_text().splitlines()

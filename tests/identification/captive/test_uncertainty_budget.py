@@ -15,6 +15,7 @@ from tank2sim.identification.captive.uncertainty_budget import (
 )
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
+from tests.marks import first_fast
 
 SOUND = Campaign(seed=7, rate_hz=5.0)
 STATED = """[uncertainty]
@@ -49,7 +50,7 @@ def sound(tmp_path_factory):
     return budget_of(SOUND, tmp_path_factory.mktemp("sound"))
 
 
-@pytest.mark.parametrize(
+@first_fast(
     "campaign",
     [replace(SOUND, gain_error=0.01), replace(SOUND, size="linear", force_delay_s=0.03)],
     ids=["gains", "delay"],

@@ -65,6 +65,7 @@ def test_standard_errors_cover_the_truth_as_often_as_they_say(tmp_path, seeds, l
     assert least <= np.mean(inside) <= most
 
 
+@pytest.mark.slow
 def test_the_card_steers_like_the_ship_that_was_tested(tmp_path) -> None:
     truth = of_the_estimate(tmp_path)
     result = t2s.reduce_to_mmg(write_campaign(tmp_path, truth, noise=1e-4))

@@ -6,6 +6,7 @@ hydrodynamic parts alone (m u r and the like are added), rudder positive to star
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,7 @@ def model(*, by_angle: bool = True) -> Model:
 
 def accelerations(u, v, r, rudder, c, force=(0.0, 0.0, 0.0)):
     """du/dt, dv/dt, dr/dt; `force` is added to the prime X, Y, N at speed u0."""
-    U = np.hypot(u, v)
+    U = (u * u + v * v) ** 0.5
     vp, rp, du = v / U, r * LENGTH / U, (u - SPEED) / U
     X = c["X0"] + c["Xu"] * du + c["Xvv"] * vp**2 + c["Xvr"] * vp * rp + c["Xdd"] * rudder**2
     Y = c["Y0"] + c["Yv"] * vp + c["Yr"] * rp + c["Yd"] * rudder + c["Yvvv"] * vp**3
@@ -93,19 +94,19 @@ def zigzag(amplitude_deg: float, half_period_s: float = 50.0, rate_degps: float 
         if since < 0:
             return 0.0
         if since < over / 2:
-            return np.deg2rad(rate_degps * since)
+            return math.radians(rate_degps * since)
         number, inside = divmod(since, half_period_s)
         side = 1.0 if int(number) % 2 == 0 else -1.0
         if number == 0:
-            return np.deg2rad(amplitude_deg)
-        return np.deg2rad(side * min(amplitude_deg, -amplitude_deg + rate_degps * inside))
+            return math.radians(amplitude_deg)
+        return math.radians(side * min(amplitude_deg, -amplitude_deg + rate_degps * inside))
 
     return rudder
 
 
 def turn(angle_deg: float, rate_degps: float = 3.0, begin_s: float = 10.0):
     """A rudder that is put over and held."""
-    return lambda t: np.deg2rad(np.sign(angle_deg) * np.clip(rate_degps * (t - begin_s), 0, abs(angle_deg)))
+    return lambda t: math.radians(math.copysign(min(max(rate_degps * (t - begin_s), 0.0), abs(angle_deg)), angle_deg))
 
 
 def trial(
@@ -125,10 +126,10 @@ def trial(
     t = np.arange(0, duration + step / 2, step)
 
     def rates(time, x):
-        u, v, r, psi = x[:4]
-        pushed = (0.0, 0.0, 0.0) if force is None else _between(force, time / step)
-        cos, sin = np.cos(psi), np.sin(psi)
-        return [*accelerations(u, v, r, rudder(time), c, pushed), r, u * cos - v * sin, u * sin + v * cos]
+        u, v, r, psi = x[:4].tolist()  # numbers of Python: those of numpy are slow one by one
+        pushed = (0.0, 0.0, 0.0) if force is None else _between(force, time / step).tolist()
+        cos, sin = math.cos(psi), math.sin(psi)
+        return [*accelerations(u, v, r, float(rudder(float(time))), c, pushed), r, u * cos - v * sin, u * sin + v * cos]
 
     accuracy = {"rtol": 1e-5, "max_step": step} if force is not None else {"rtol": 1e-8, "atol": 1e-10, "max_step": 1.0}
     solution = solve_ivp(rates, (0, t[-1]), [*start, 0.3, 0.0, 0.0], t_eval=t, **accuracy)

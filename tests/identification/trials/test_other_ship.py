@@ -42,6 +42,7 @@ def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Pa
         assert other_ship(problem_from_card(card, trials.trials, trials.driven_by)) == (), files[0].parent
 
 
+@pytest.mark.slow
 def test_a_mariner_is_no_tanker(data: Path) -> None:
     trials = measured(
         [data / f"data/gap_cases/case_1/zigzag{angle}.csv" for angle in ("20_20", "10_10")], read_card("kvlcc2-captive")

@@ -7,6 +7,7 @@ import pytest
 
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tests.marks import first_fast
 
 STATED = 0.05
 
@@ -16,7 +17,7 @@ def asked(names: list[str], error: float = STATED) -> Problem:
     return Problem(model=None, free=tuple(names), prior_mean=ones, prior_error=error * ones, runs=())
 
 
-@pytest.mark.parametrize("noise", [1e-6, 0.05, 0.2])
+@first_fast("noise", [1e-6, 0.05, 0.2])
 @pytest.mark.parametrize("true", [2.0, 6.0])
 def test_the_scale_is_the_one_that_makes_the_measurements_likeliest(noise: float, true: float) -> None:
     """Of theta + noise, theta scattered by k times the stated error: k^2 = (mean square - noise^2)/error^2."""

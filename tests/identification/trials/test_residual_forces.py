@@ -110,6 +110,7 @@ def test_without_forces_and_scatter_all_members_are_the_manoeuvre_itself():
         np.testing.assert_allclose(values, plain[name], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_small_scatter_of_a_coefficient_goes_through_linearly():
     error = 0.01
     found = bands(SHIP, known(error), Turn(0.35), settings=PredictionSettings(members=80))

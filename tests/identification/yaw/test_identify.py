@@ -24,6 +24,7 @@ from tank2sim.identification.yaw.intervals import intervals, known_work
 from tank2sim.records.yaw import read_yaw_record, yaw_record_text
 from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig, yaw_record
 from tank2sim.simulation.yaw_rig_control import TunedController
+from tests.marks import first_fast
 from tests.yaw_truth import Truth, mirrored, record, written
 
 TRUTH = Truth()
@@ -284,7 +285,7 @@ def sampled(made, every, seed, pulses=3000):
     )
 
 
-@pytest.mark.parametrize("every", [2, 4, 8])  # 100, 50, 25 Hz
+@first_fast("every", [2, 4, 8])  # 100, 50, 25 Hz
 def test_seldom_rows_bias_neither_method_and_their_errors_cover_the_truth(water, every):
     off = {"energy_least_squares": [], "output_error": []}
     for seed in range(4):

@@ -314,6 +314,7 @@ def test_an_older_autopilot_without_responses_has_tables_in_their_place() -> Non
     assert [section.heading for section in result_page(older, "a.json").sections][:2] == ["Overview", "Gains"]
 
 
+@pytest.mark.slow
 def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
     command = "influence mariner --figure criterion_C K_per_s --json i.json --page i.html".split()
     assert tank2sim(*command, cwd=tmp_path).returncode == 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from tank2sim.arrays import Array
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial
@@ -13,6 +13,9 @@ from tank2sim.records.trials import MEASURED_COLUMNS, Trial
 WINDOW, DEGREE = 7, 3
 """Samples and degree of the Savitzky-Golay filter: a cubic through seven samples follows a ship at any usual rate, and
 leaves enough of the noise (0.67 of its variance) to measure it. Project choice."""
+_POWERS = np.vander(np.arange(WINDOW) - WINDOW // 2, DEGREE + 1).astype(float)
+_SMOOTHED: Array = _POWERS @ np.linalg.pinv(_POWERS)
+"""The filter: from the samples of a window to the values of the polynomial through them, (window, window)."""
 _MAD = 1.4826  # of the median absolute deviation to the standard deviation of normal noise
 
 
@@ -38,8 +41,11 @@ def white_noise(values: Array) -> float:
     known = values[np.isfinite(values)]
     if known.size < WINDOW:
         return 0.0
-    residual = known - savgol_filter(known, WINDOW, DEGREE)
-    noise_share = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
+    middle = WINDOW // 2
+    windows = sliding_window_view(known, WINDOW)
+    ends = _SMOOTHED[:middle] @ known[:WINDOW], _SMOOTHED[middle + 1 :] @ known[-WINDOW:]
+    residual = known - np.concatenate([ends[0], windows @ _SMOOTHED[middle], ends[1]])
+    noise_share = 1.0 - float(_SMOOTHED[middle, middle])
     apart = _MAD * float(np.median(np.abs(residual)))
     return max(apart / math.sqrt(noise_share), resolution(known) / math.sqrt(12.0))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.integrate import cumulative_trapezoid
+from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding
@@ -59,7 +59,7 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
         return []
     reach = int(np.median([move.reach for move in moves]))
     shifts = np.arange(-reach, reach + 1, max(1, reach // 40))
-    each = np.array([[_squares(move, rudder, rate, step, int(shift)) for shift in shifts] for move in moves])
+    each = np.array([_squares(move, rudder, rate, step, shifts) for move in moves])
     squares = each.sum(axis=0)
     best, least = int(np.argmin(squares)), LATE * reach
     late = float(shifts[best]) * step
@@ -124,21 +124,26 @@ def _move(start: tuple[int, int, int], end: int, rate: Array) -> _Move | None:
     return _Move(max(steady_row, row - reach), row, min(end, row + reach), reach)
 
 
-def _squares(move: _Move, rudder: Array, rate: Array, step: float, shift: int) -> float:
-    """Sum of squares that the answer to the rudder, taken `shift` rows later in the record, leaves of r."""
+def _squares(move: _Move, rudder: Array, rate: Array, step: float, shifts: NDArray[np.int_]) -> Array:
+    """Sums of squares that the answer to the rudder, taken so many rows later in the record, leaves of r: (shifts,)."""
     rows = np.arange(move.begin, move.end)
-    taken = np.clip(rows + shift, 0, len(rudder) - 1)
+    taken = np.clip(rows + shifts[:, None], 0, len(rudder) - 1)
     change = np.where(taken <= move.row, 0.0, rudder[taken] - rudder[move.row])
     once = _integral(change, step)
-    table = np.column_stack([np.ones(len(rows)), rows - rows[0], once, _integral(once, step)])
+    straight = np.broadcast_to(np.column_stack([np.ones(len(rows)), rows - rows[0]]), (*taken.shape, 2))
     known = np.isfinite(rate[rows])
-    table, wanted = table[known], rate[rows][known]
-    size = np.sqrt(np.mean(table**2, axis=0))
-    table = table / np.where(size > 0, size, 1.0)
-    found = np.linalg.lstsq(table, wanted, rcond=None)[0]
-    return float(np.sum((wanted - table @ found) ** 2))
+    table = np.concatenate([straight, once[..., None], _integral(once, step)[..., None]], axis=2)[:, known]
+    wanted = rate[rows][known]
+    size = np.sqrt(np.mean(table**2, axis=1, keepdims=True))
+    directions, weights, _ = np.linalg.svd(table / np.where(size > 0, size, 1.0), full_matrices=False)
+    # Without the directions that rounding alone makes: where the rudder has not moved yet, its columns are empty.
+    independent = weights > np.finfo(float).eps * max(table.shape[1:]) * weights[:, :1]
+    explained = directions @ (np.where(independent, wanted @ directions, 0.0)[..., None])
+    squares: Array = np.sum((wanted - explained[..., 0]) ** 2, axis=1)
+    return squares
 
 
 def _integral(values: Array, step: float) -> Array:
-    integral: Array = cumulative_trapezoid(values, dx=step, initial=0.0)
-    return integral
+    """Trapezoidal integral over the last axis, from 0."""
+    sums = np.cumsum(step * (values[..., 1:] + values[..., :-1]) / 2.0, axis=-1)
+    return np.concatenate([np.zeros_like(values[..., :1]), sums], axis=-1)

@@ -85,8 +85,10 @@ class AuditWindows:
         filled = np.where(missing, 0, values)
         offset = np.mean(filled)  # the kernels of derivatives sum to zero: less rounding
         inside = oaconvolve(filled - (offset if order else 0), kernel, mode="valid")
-        holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
-        picked: NDArray[AuditNumber] = np.where(holes, np.nan, inside)[:: self.hop or (self.samples + 1) // 2]
+        if missing.any():
+            holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
+            inside = np.where(holes, np.nan, inside)
+        picked: NDArray[AuditNumber] = inside[:: self.hop or (self.samples + 1) // 2]
         return picked
 
     def _kernel(self, order: int) -> Array:
