@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.gap import workflow
-from tank2sim.gap.result import MISSING, Passed
+from tank2sim.gap.result import MISSING, NO_EFFECT_MISSING, Passed
 from tank2sim.gap.search import model_choice
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import decide
@@ -51,3 +51,30 @@ def test_an_effect_with_little_gain_stays_only_if_simulations_are_closer_with_it
     assert {*decision.best.hypothesis.effects} == {NAMES[place] for place in named}
     assert decision.verdict == MISSING
     assert len(proof.results) == 1
+
+
+@pytest.mark.parametrize(
+    ("reached", "closer", "width", "named"),
+    [
+        (1.0, 0.94, 0.5, True),  # the card is right with it, and simulations are a little closer
+        (1.0, 0.96, 0.5, False),
+        (1.0, 0.5, 1.4, False),  # no card is made right, and the trials were followed to the noise
+        (2.0, 1.3, 1.4, True),
+        (2.0, 1.5, 1.4, False),
+    ],
+)
+def test_an_effect_that_scores_nearly_as_well_as_none_is_named_if_simulations_are_closer(
+    monkeypatch, reached: float, closer: float, width: float, named: bool
+) -> None:
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    of_more = SimpleNamespace(results=[replay(closer)])
+    monkeypatch.setattr(workflow, "_proof_of", lambda *arguments: ([], of_more))
+    monkeypatch.setattr(workflow, "_most_are_closer", lambda before, after: True)
+    found = Search(CALM, (fit(0, width=1.5), fit(8, 0, width=width)), ())
+    none = decide(found)
+    assert none.verdict == NO_EFFECT_MISSING
+    proved = none, [], SimpleNamespace(results=[replay(reached)])
+    decision, _, proof = workflow._with_more(None, None, found, proved, None, 0.5)
+    assert decision.best.hypothesis.effects == ((NAMES[0],) if named else ())
+    assert decision.verdict == (MISSING if named else NO_EFFECT_MISSING)
+    assert (proof is of_more) == named

@@ -26,10 +26,13 @@ from tank2sim.gap.search.model_choice import (
     TEMPER,
     Strange,
     decide,
+    decide_for,
     decide_without,
     doubtful_effects,
     find_strangeness,
     is_significant,
+    makes_the_card_right,
+    with_one_more,
 )
 from tests.gap.toy import NAMES, Toy, toy_motion
 from tests.gap.toy_likelihood import LOGS, judge
@@ -264,6 +267,32 @@ def test_without_a_doubtful_effect_the_others_are_judged_among_what_does_not_hol
     assert fewer.alike == () and fewer.verdict == MISSING
     assert all(NAMES[DRAG] not in effects for effects in fewer.probabilities)
     assert decide_without(search, fewer, NAMES[LAG]) is fewer  # the pair was not fitted
+
+
+def test_one_effect_more_is_tried_that_scores_nearly_as_well_and_is_significant() -> None:
+    best, near, far = fit(-50, 0), fit(-50 + ALIKE - 1, 0, 2), fit(-50 + ALIKE + 1, 0, 4)
+    others = fit(-49, 2, 3), fit(-48, 0, 1, sure=2.0), fit(-47, 0, 1, 2), fit(0)
+    search = Search(CALM, tuple(sorted([best, near, far, *others], key=lambda found: found.score)), ())
+    assert with_one_more(search, best) == (near,)
+
+
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(("width", "right"), [(0.7, True), (0.8, False)])
+def test_an_effect_that_makes_the_card_right_is_compared_with_those_that_do(width: float, right: bool) -> None:
+    """Probabilities of a larger explanation in place of none, whose coefficients are off by 1.5 standard errors."""
+    none, wide, narrow = fit(0, width=1.5), fit(4, 1, width=1.5), fit(8, 2, width=0.6)
+    larger = fit(6, 0, width=width)
+    search = Search(CALM, (none, wide, larger, narrow), ())
+    assert makes_the_card_right(larger, none) == right
+    assert not makes_the_card_right(fit(6, 0, width=0.3), fit(0, width=0.99))
+    found = decide_for(search, larger, none)
+    weights = {(YAW,): np.exp(-3 / TEMPER), (SWAY,): np.exp(-4 / TEMPER)} | (
+        {} if right else {(SURGE,): np.exp(-2 / TEMPER)}
+    )
+    for effects, weight in weights.items():
+        assert found.probabilities[effects] == pytest.approx(weight / sum(weights.values()))
+    assert found.best is larger and found.probabilities[()] == 0.0
+    assert [one.hypothesis.effects for one in found.alike] == [(SWAY,)] if right else [(SURGE,), (SWAY,)]
 
 
 @pytest.mark.usefixtures("calm")

@@ -65,8 +65,11 @@ from tank2sim.gap.search.model_choice import (
     Decision,
     Strange,
     decide,
+    decide_for,
     decide_without,
     doubtful_effects,
+    makes_the_card_right,
+    with_one_more,
 )
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -412,6 +415,7 @@ def _judge_by_simulation(
         if not current.best.hypothesis.effects:
             break
         current, estimated, proof = _with_fewer(card, trials, remaining, current, replays, share)
+        current, estimated, proof = _with_more(card, trials, remaining, (current, estimated, proof), replays, share)
         unknown = current.verdict == OUTSIDE_LIBRARY
         closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
         if closes and found.none.score - current.best.score < DECISIVE:
@@ -428,6 +432,11 @@ def _judge_by_simulation(
         remaining = replace(remaining, fits=tuple(fit for fit in remaining.fits if fit is not current.best))
         current = decide(remaining, share, excluded)
     proof = alone or _prove(card, trials, _NamedEffects([], {}), replays, found, found.none)
+    if decision.verdict == NO_EFFECT_MISSING:
+        more, estimated, with_more = _with_more(card, trials, found, (decision, [], proof), replays, share)
+        if more is not decision:
+            boxed = replace(with_more, results=_with_black_box(card, with_more, estimated, replays))
+            return _Judged(more, estimated, boxed, ())
     if decision.best.hypothesis.effects:
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
@@ -453,6 +462,38 @@ def _with_fewer(
             if without <= reached:
                 return of_fewer
     return decision, estimated, proof
+
+
+def _with_more(
+    card: ManoeuvringCard,
+    trials: tuple[Measured, Measured],
+    found: Search,
+    proved: tuple[Decision, list[Found], _Proof],
+    replays: TrialReplays,
+    share: float,
+) -> tuple[Decision, list[Found], _Proof]:
+    """What was proved, or that with one effect more, which scores as well and is followed more closely.
+
+    That is, the fitted trials are missed by less than :data:`CLEARLY` of what they were, where this is not near the
+    noise (:data:`NEAR_NOISE`); or by :data:`BETTER` less, where the coefficients of the card would else be off by more
+    than their standard errors.
+    """
+    decision, _, proof = proved
+    if decision.verdict == OUTSIDE_LIBRARY:
+        return proved
+    reached = _misfit_of(proof.results, "after", held_out=False)
+    for larger in with_one_more(found, decision.best)[:TRIES]:
+        limit = 1 - BETTER if makes_the_card_right(larger, decision.best) else CLEARLY
+        if limit == CLEARLY and reached < NEAR_NOISE:
+            continue
+        more = decide_for(found, larger, decision.best, share)
+        if more.verdict == OUTSIDE_LIBRARY:
+            continue
+        estimated, with_more = _proof_of(card, trials, found, more, replays)
+        closer = _misfit_of(with_more.results, "after", held_out=False) < limit * reached
+        if closer and _most_are_closer(proof.results, with_more.results):
+            return more, estimated, with_more
+    return proved
 
 
 def _proof_of(

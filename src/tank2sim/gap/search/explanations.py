@@ -182,7 +182,7 @@ def _explore(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
     enough = min(singles[0].gain - HOPELESS, COMPARABLE * singles[0].gain)
     proposed = [single for single in singles[:SINGLES] if single.gain > enough]
     proposed += [pair for pair in pairs[:PAIRS] if pair.gain > singles[0].gain]
-    if len(best.hypothesis.effects) == 1 and most > 1:
+    if len(best.hypothesis.effects) < min(most, 2):
         _fit_more(fitting, best, every)
     fitting.fit(_proposals(fitting, proposed, starts, least=1, limit=best.score + _FAR))
     if not fitting.has(2) or fitting.best(2).score > fitting.best(1).score - WORTH:

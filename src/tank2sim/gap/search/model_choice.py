@@ -176,6 +176,40 @@ def decide_without(search: Search, decision: Decision, name: str, false_discover
     return _decision(replace(search, fits=kept), smaller, false_discovery)
 
 
+def with_one_more(search: Search, best: ExplanationFit) -> tuple[ExplanationFit, ...]:
+    """Explanations with one effect more than the best that score as well (within :data:`ALIKE`), the best first."""
+    score, effects = best.score + _doubt(search) * ALIKE, {*best.hypothesis.effects}
+    return tuple(
+        fit
+        for fit in search.fits
+        if fit.score < score
+        and effects < {*fit.hypothesis.effects}
+        and len(fit.hypothesis.effects) == len(effects) + 1
+        and is_significant(fit)
+    )
+
+
+def makes_the_card_right(larger: ExplanationFit, best: ExplanationFit) -> bool:
+    """Whether the coefficients of the card are off by more than their standard errors with an explanation, and by less
+    than half as much (:data:`BELIEVABLE`) with a larger one."""
+    return best.width > 1.0 and larger.width < BELIEVABLE * best.width
+
+
+def decide_for(
+    search: Search, larger: ExplanationFit, best: ExplanationFit, false_discovery: float = 1 - LIKELY
+) -> Decision:
+    """The decision for a larger explanation in place of the best.
+
+    The best is no longer compared with it, nor, where the larger one makes the card right, what does not.
+    """
+    right = makes_the_card_right(larger, best)
+    fits = tuple(
+        replace(fit, score=np.inf) if fit is best or (right and not makes_the_card_right(fit, best)) else fit
+        for fit in search.fits
+    )
+    return _decision(replace(search, fits=fits), larger, false_discovery)
+
+
 def doubtful_effects(search: Search, best: ExplanationFit) -> tuple[str, ...]:
     """Effects of an explanation without which it scores worse by less than :data:`DOUBTFUL`, the smallest gain first.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding
@@ -144,6 +145,5 @@ def _squares(move: _Move, rudder: Array, rate: Array, step: float, shifts: NDArr
 
 
 def _integral(values: Array, step: float) -> Array:
-    """Trapezoidal integral over the last axis, from 0."""
-    sums = np.cumsum(step * (values[..., 1:] + values[..., :-1]) / 2.0, axis=-1)
-    return np.concatenate([np.zeros_like(values[..., :1]), sums], axis=-1)
+    integral: Array = cumulative_trapezoid(values, dx=step, initial=0.0)
+    return integral
