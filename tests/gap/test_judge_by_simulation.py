@@ -12,7 +12,7 @@ from tank2sim.gap.result import MISSING, NO_EFFECT_MISSING, Passed
 from tank2sim.gap.search import model_choice
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import decide
-from tests.gap.test_model_choice import CALM, DRAG, FORCE, FOUR, LAG, fit
+from tests.gap.made_scores import CALM, DRAG, FORCE, FOUR, LAG, fit
 from tests.gap.toy import NAMES
 
 NOISE = 0.1

@@ -34,17 +34,13 @@ from tank2sim.gap.search.model_choice import (
     makes_the_card_right,
     with_one_more,
 )
+from tests.gap.made_scores import BIAS, CALM, DRAG, FORCE, FOUR, IN_A_SEA, LAG, LATE, fit
 from tests.gap.toy import NAMES, Toy, toy_motion
 from tests.gap.toy_likelihood import LOGS, judge
 from tests.identification.trials import made_up_ship
 
 YAW, SURGE, SWAY, *_ = NAMES
 SETS = ((), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2))
-
-
-CALM = SimpleNamespace(belief=SimpleNamespace(waves=None))
-IN_A_SEA = SimpleNamespace(belief=SimpleNamespace(waves="a band"))
-"""Likelihoods of which a verdict reads no more."""
 
 
 def said(theta) -> module.Decision:
@@ -78,15 +74,6 @@ def test_what_is_hidden_in_the_toy_is_said(theta, verdict, effects) -> None:
 
 
 # -- scores typed by hand --------------------------------------------------------------------------------------------
-
-
-def fit(score: float, *indices: int, sure: float = 10.0, width: float = 0.8) -> ExplanationFit:
-    """An explanation whose sizes are 1 and so many standard errors."""
-    count = len(indices)
-    logs = np.append(LOGS[:-1], np.log(width))
-    return ExplanationFit(
-        Toy((None,) * count, indices=indices), np.ones(count), np.eye(count) / sure**2, logs, score, np.zeros(2)
-    )
 
 
 @pytest.fixture
@@ -156,9 +143,6 @@ def test_verdicts_follow_the_scores(fits, verdict, effects, alike) -> None:
     found = of_scores(*fits)
     assert (found.verdict, found.best.hypothesis.effects) == (verdict, effects)
     assert [alternative.hypothesis.effects for alternative in found.alike] == alike
-
-
-FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
 
 
 @pytest.mark.usefixtures("calm")
@@ -237,9 +221,6 @@ def test_more_effects_must_be_ahead_of_what_simulations_excluded(gain: float, na
     assert len(decide(search, excluded=[fit(-50, 2)]).best.hypothesis.effects) == 2  # holds none of it
 
 
-FOUR = (0, FORCE, DRAG, LAG)
-
-
 def search_of_four(force: float, drag: float) -> Search:
     """Four effects with a gain of 2000, and three of them each time, with so much of it less."""
     lost = {0: 900.0, FORCE: force, DRAG: drag, LAG: 100.0}
@@ -262,11 +243,11 @@ def test_effects_with_little_gain_next_to_others_are_doubtful(force, drag, doubt
 def test_without_a_doubtful_effect_the_others_are_judged_among_what_does_not_hold_it() -> None:
     search = search_of_four(300.0, 12.0)
     whole = decide(search)
-    fewer = decide_without(search, whole, NAMES[DRAG])
+    fewer = decide_without(search, whole, NAMES[DRAG], 0.5)
     assert {*fewer.best.hypothesis.effects} == {NAMES[place] for place in FOUR if place != DRAG}
     assert fewer.alike == () and fewer.verdict == MISSING
     assert all(NAMES[DRAG] not in effects for effects in fewer.probabilities)
-    assert decide_without(search, fewer, NAMES[LAG]) is fewer  # the pair was not fitted
+    assert decide_without(search, fewer, NAMES[LAG], 0.5) is fewer  # the pair was not fitted
 
 
 def test_one_effect_more_is_tried_that_scores_nearly_as_well_and_is_significant() -> None:
@@ -285,7 +266,7 @@ def test_an_effect_that_makes_the_card_right_is_compared_with_those_that_do(widt
     search = Search(CALM, (none, wide, larger, narrow), ())
     assert makes_the_card_right(larger, none) == right
     assert not makes_the_card_right(fit(6, 0, width=0.3), fit(0, width=0.99))
-    found = decide_for(search, larger, none)
+    found = decide_for(search, larger, none, 0.5)
     weights = {(YAW,): np.exp(-3 / TEMPER), (SWAY,): np.exp(-4 / TEMPER)} | (
         {} if right else {(SURGE,): np.exp(-2 / TEMPER)}
     )

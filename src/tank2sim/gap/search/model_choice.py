@@ -161,10 +161,19 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY, excluded: Sequen
     return _decision(search, none, false_discovery) if improbable else decision
 
 
-def decide_without(search: Search, decision: Decision, name: str, false_discovery: float = 1 - LIKELY) -> Decision:
+def decide_without(search: Search, decision: Decision, name: str, false_discovery: float) -> Decision:
     """The decision for the best explanation without one of its effects; the same where that was not fitted.
 
     What holds the effect next to others of the explanation is no longer compared with it.
+
+    Parameters
+    ----------
+    search : Search
+    decision : Decision
+    name : str
+        Of the effect.
+    false_discovery : float
+        As in :func:`decide`.
     """
     names = {*decision.best.hypothesis.effects} - {name}
     kept = tuple(
@@ -195,12 +204,17 @@ def makes_the_card_right(larger: ExplanationFit, best: ExplanationFit) -> bool:
     return best.width > 1.0 and larger.width < BELIEVABLE * best.width
 
 
-def decide_for(
-    search: Search, larger: ExplanationFit, best: ExplanationFit, false_discovery: float = 1 - LIKELY
-) -> Decision:
+def decide_for(search: Search, larger: ExplanationFit, best: ExplanationFit, false_discovery: float) -> Decision:
     """The decision for a larger explanation in place of the best.
 
     The best is no longer compared with it, nor, where the larger one makes the card right, what does not.
+
+    Parameters
+    ----------
+    search : Search
+    larger, best : ExplanationFit
+    false_discovery : float
+        As in :func:`decide`.
     """
     right = makes_the_card_right(larger, best)
     fits = tuple(

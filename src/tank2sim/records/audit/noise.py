@@ -16,7 +16,7 @@ leaves enough of the noise (0.67 of its variance) to measure it. Project choice.
 _POWERS = np.vander(np.arange(WINDOW) - WINDOW // 2, DEGREE + 1).astype(float)
 _SMOOTHED: Array = _POWERS @ np.linalg.pinv(_POWERS)
 """The filter: from the samples of a window to the values of the polynomial through them, (window, window). SciPy's fits
-the ends of a record anew each time, and takes six times as long."""
+a polynomial to the ends of each record, and takes six times as long."""
 _MAD = 1.4826  # of the median absolute deviation to the standard deviation of normal noise
 
 
