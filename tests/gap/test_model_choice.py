@@ -267,13 +267,12 @@ def test_an_effect_that_makes_the_card_right_is_compared_with_those_that_do(widt
     assert makes_the_card_right(larger, none) == right
     assert not makes_the_card_right(fit(6, 0, width=0.3), fit(0, width=0.99))
     found = decide_for(search, larger, none, 0.5)
-    weights = {(YAW,): np.exp(-3 / TEMPER), (SWAY,): np.exp(-4 / TEMPER)} | (
-        {} if right else {(SURGE,): np.exp(-2 / TEMPER)}
-    )
+    scores = {(): 6 + EVIDENCE_NEEDED, (YAW,): 6, (SWAY,): 8} | ({} if right else {(SURGE,): 4})
+    weights = {effects: np.exp(-score / 2 / TEMPER) for effects, score in scores.items()}
     for effects, weight in weights.items():
         assert found.probabilities[effects] == pytest.approx(weight / sum(weights.values()))
-    assert found.best is larger and found.probabilities[()] == 0.0
-    assert [one.hypothesis.effects for one in found.alike] == [(SWAY,)] if right else [(SURGE,), (SWAY,)]
+    assert found.best is larger and (found.probabilities[SURGE,] == 0.0) == right
+    assert [one.hypothesis.effects for one in found.alike] == ([(SWAY,)] if right else [(), (SURGE,), (SWAY,)])
 
 
 @pytest.mark.usefixtures("calm")

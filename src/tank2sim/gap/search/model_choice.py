@@ -207,7 +207,8 @@ def makes_the_card_right(larger: ExplanationFit, best: ExplanationFit) -> bool:
 def decide_for(search: Search, larger: ExplanationFit, best: ExplanationFit, false_discovery: float) -> Decision:
     """The decision for a larger explanation in place of the best.
 
-    The best is no longer compared with it, nor, where the larger one makes the card right, what does not.
+    What simulations say counts as the evidence that a name needs: the best is as much less probable. Where the larger
+    one makes the card right, what does not is no longer compared with it.
 
     Parameters
     ----------
@@ -217,10 +218,9 @@ def decide_for(search: Search, larger: ExplanationFit, best: ExplanationFit, fal
         As in :func:`decide`.
     """
     right = makes_the_card_right(larger, best)
-    fits = tuple(
-        replace(fit, score=np.inf) if fit is best or (right and not makes_the_card_right(fit, best)) else fit
-        for fit in search.fits
-    )
+    behind = {fit: np.inf for fit in search.fits if right and not makes_the_card_right(fit, best)}
+    behind[best] = larger.score + _doubt(search) * EVIDENCE_NEEDED
+    fits = tuple(replace(fit, score=behind[fit]) if fit in behind else fit for fit in search.fits)
     return _decision(replace(search, fits=fits), larger, false_discovery)
 
 
