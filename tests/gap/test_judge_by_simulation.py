@@ -27,6 +27,10 @@ def replay(misfit: float) -> Passed:
     )
 
 
+def judged_with(decision, misfit: float) -> workflow._Judged:
+    return workflow._Judged(decision, [], SimpleNamespace(results=[replay(misfit)]))
+
+
 @pytest.mark.parametrize(
     ("without_drag", "without_force", "named"),
     [(1.0, 0.9, (0, FORCE, LAG)), (1.01, 0.99, (0, DRAG, LAG)), (1.01, 1.01, FOUR)],
@@ -37,20 +41,19 @@ def test_an_effect_with_little_gain_stays_only_if_simulations_are_closer_with_it
     monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
     misfits = {DRAG: without_drag, FORCE: without_force}
 
-    def proof_of(card, trials, found, decision, replays):
+    def judged(card, trials, found, decision, replays):
         lacks = [place for place in FOUR if NAMES[place] not in decision.best.hypothesis.effects]
-        return [], SimpleNamespace(results=[replay(misfits[lacks[0]] if lacks else 1.0)])
+        return judged_with(decision, misfits[lacks[0]] if lacks else 1.0)
 
-    monkeypatch.setattr(workflow, "_proof_of", proof_of)
+    monkeypatch.setattr(workflow, "_prove_decision", judged)
     lost = {DRAG: 15.0, FORCE: 20.0}  # of a gain of 2000, and the card would be wrong without
     threes = [fit(-2000 + less, *(one for one in FOUR if one != gone), width=2.0) for gone, less in lost.items()]
     found = Search(CALM, (fit(-2000, *FOUR, width=0.3), *threes, fit(-1000, 0, width=2.0), fit(0, width=2.5)), ())
     whole = decide(found)
     assert len(whole.best.hypothesis.effects) == len(FOUR)
-    decision, _, proof = workflow._with_fewer(None, None, found, whole, None, 0.5)
+    decision = workflow._with_fewer(None, None, found, whole, None, 0.5).decision
     assert {*decision.best.hypothesis.effects} == {NAMES[place] for place in named}
     assert decision.verdict == MISSING
-    assert len(proof.results) == 1
 
 
 @pytest.mark.parametrize(
@@ -67,14 +70,15 @@ def test_an_effect_that_scores_nearly_as_well_as_none_is_named_if_simulations_ar
     monkeypatch, reached: float, closer: float, width: float, named: bool
 ) -> None:
     monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
-    of_more = SimpleNamespace(results=[replay(closer)])
-    monkeypatch.setattr(workflow, "_proof_of", lambda *arguments: ([], of_more))
+    monkeypatch.setattr(
+        workflow, "_prove_decision", lambda card, trials, found, decision, _: judged_with(decision, closer)
+    )
     monkeypatch.setattr(workflow, "_most_are_closer", lambda before, after: True)
     found = Search(CALM, (fit(0, width=1.5), fit(8, 0, width=width)), ())
     none = decide(found)
     assert none.verdict == NO_EFFECT_MISSING
-    proved = none, [], SimpleNamespace(results=[replay(reached)])
-    decision, _, proof = workflow._with_more(None, None, found, proved, None, 0.5)
+    found_more = workflow._with_more(None, None, found, judged_with(none, reached), None, 0.5)
+    decision = found_more.decision
     assert decision.best.hypothesis.effects == ((NAMES[0],) if named else ())
     assert decision.verdict == (MISSING if named else NO_EFFECT_MISSING)
-    assert (proof is of_more) == named
+    assert found_more.proof.results[0].misfit("after") == pytest.approx(closer if named else reached)

@@ -386,7 +386,7 @@ class _Judged:
     decision: Decision
     estimated: list[Found]
     proof: _Proof
-    withheld: tuple[str, ...]
+    withheld: tuple[str, ...] = ()
     by_simulation: str = ""
 
 
@@ -403,8 +403,10 @@ def _judge_by_simulation(
     An explanation that fits best from instant to instant, and with which no simulation comes closer, is excluded, and
     the remaining ones are judged again, :data:`TRIES` times at most. What comes after another was excluded, or acts
     next to something that no effect explains, must close the gap clearly (:data:`CLEARLY`); nothing is named without.
-    A name whose score is not far ahead of none (:data:`DECISIVE`) must also follow the fitted trials as closely as the
-    card's coefficients alone, fitted to them.
+    An effect that gained little must bring the fitted trials closer (:func:`_with_fewer`), and one more is named that
+    brings them much closer (:func:`_with_more`), also where the scores name none. A name whose score is not far ahead
+    of none (:data:`DECISIVE`) must also follow the fitted trials as closely as the card's coefficients alone, fitted to
+    them.
     `share` is the option ``false_discovery``.
     """
     withheld: list[str] = []
@@ -414,8 +416,9 @@ def _judge_by_simulation(
     for _ in range(TRIES):
         if not current.best.hypothesis.effects:
             break
-        current, estimated, proof = _with_fewer(card, trials, remaining, current, replays, share)
-        current, estimated, proof = _with_more(card, trials, remaining, (current, estimated, proof), replays, share)
+        judged = _with_fewer(card, trials, remaining, current, replays, share)
+        judged = _with_more(card, trials, remaining, judged, replays, share)
+        current, estimated, proof = judged.decision, judged.estimated, judged.proof
         unknown = current.verdict == OUTSIDE_LIBRARY
         closes = _closes_clearly(proof.results) if withheld or unknown else closes_gap(proof.results)
         if closes and found.none.score - current.best.score < DECISIVE:
@@ -433,10 +436,10 @@ def _judge_by_simulation(
         current = decide(remaining, share, excluded)
     proof = alone or _prove(card, trials, _NamedEffects([], {}), replays, found, found.none)
     if decision.verdict == NO_EFFECT_MISSING:
-        more, estimated, with_more = _with_more(card, trials, found, (decision, [], proof), replays, share)
-        if more is not decision:
-            boxed = replace(with_more, results=_with_black_box(card, with_more, estimated, replays))
-            return _Judged(more, estimated, boxed, ())
+        more = _with_more(card, trials, found, _Judged(decision, [], proof), replays, share)
+        if more.decision is not decision:
+            boxed = replace(more.proof, results=_with_black_box(card, more.proof, more.estimated, replays))
+            return replace(more, proof=boxed)
     if decision.best.hypothesis.effects:
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
@@ -450,38 +453,35 @@ def _with_fewer(
     decision: Decision,
     replays: TrialReplays,
     share: float,
-) -> tuple[Decision, list[Found], _Proof]:
-    """The decision without its doubtful effects that bring the fitted trials no closer; with the estimates and the
-    proof."""
-    estimated, proof = _proof_of(card, trials, found, decision, replays)
+) -> _Judged:
+    """The decision, with its proof, without its doubtful effects that bring the fitted trials no closer."""
+    judged = _prove_decision(card, trials, found, decision, replays)
     for name in doubtful_effects(found, decision.best):
         fewer = decide_without(found, decision, name, share)
         if fewer is not decision:
             of_fewer = _with_fewer(card, trials, found, fewer, replays, share)
-            reached, without = (_misfit_of(each.results, "after", held_out=False) for each in (proof, of_fewer[2]))
-            if without <= reached:
+            if _reached(of_fewer) <= _reached(judged):
                 return of_fewer
-    return decision, estimated, proof
+    return judged
 
 
 def _with_more(
     card: ManoeuvringCard,
     trials: tuple[Measured, Measured],
     found: Search,
-    proved: tuple[Decision, list[Found], _Proof],
+    judged: _Judged,
     replays: TrialReplays,
     share: float,
-) -> tuple[Decision, list[Found], _Proof]:
-    """What was proved, or that with one effect more, which scores as well and is followed more closely.
+) -> _Judged:
+    """The same, or a decision for one effect more, which scores as well and is followed more closely.
 
     That is, the fitted trials are missed by less than :data:`CLEARLY` of what they were, where this is not near the
     noise (:data:`NEAR_NOISE`); or by :data:`BETTER` less, where the coefficients of the card would else be off by more
     than their standard errors.
     """
-    decision, _, proof = proved
+    decision, reached = judged.decision, _reached(judged)
     if decision.verdict == OUTSIDE_LIBRARY:
-        return proved
-    reached = _misfit_of(proof.results, "after", held_out=False)
+        return judged
     for larger in with_one_more(found, decision.best)[:TRIES]:
         limit = 1 - BETTER if makes_the_card_right(larger, decision.best) else CLEARLY
         if limit == CLEARLY and reached < NEAR_NOISE:
@@ -489,25 +489,31 @@ def _with_more(
         more = decide_for(found, larger, decision.best, share)
         if more.verdict == OUTSIDE_LIBRARY:
             continue
-        estimated, with_more = _proof_of(card, trials, found, more, replays)
-        closer = _misfit_of(with_more.results, "after", held_out=False) < limit * reached
-        if closer and _most_are_closer(proof.results, with_more.results):
-            return more, estimated, with_more
-    return proved
+        of_more = _prove_decision(card, trials, found, more, replays)
+        closer = _reached(of_more) < limit * reached
+        if closer and _most_are_closer(judged.proof.results, of_more.proof.results):
+            return of_more
+    return judged
 
 
-def _proof_of(
+def _prove_decision(
     card: ManoeuvringCard,
     trials: tuple[Measured, Measured],
     found: Search,
     decision: Decision,
     replays: TrialReplays,
-) -> tuple[list[Found], _Proof]:
-    """The effects of a decision as they are written on a card, and their proof."""
+) -> _Judged:
+    """A decision with its effects as they are written on a card, and their proof."""
     by_formula = found.likelihood.by_formula(decision.best)
     estimated = estimates(by_formula)
     by_trial = surroundings_by_trial(by_formula, found.likelihood.motion.names)
-    return estimated, _prove(card, trials, _NamedEffects(estimated, by_trial), replays, found, decision.best)
+    proof = _prove(card, trials, _NamedEffects(estimated, by_trial), replays, found, decision.best)
+    return _Judged(decision, estimated, proof)
+
+
+def _reached(judged: _Judged) -> float:
+    """Misfit of the fitted trials, noise units."""
+    return _misfit_of(judged.proof.results, "after", held_out=False)
 
 
 def _surroundings_by_simulation(

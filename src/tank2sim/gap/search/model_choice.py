@@ -42,6 +42,10 @@ BELIEVABLE = 0.5
 states (project choice: of 18 made-up ships most have 0.1 to 0.6 with all their effects, and 1.7 to 2.5 where
 coefficients take the place of one)."""
 
+LESS_WRONG = 0.5
+"""Share of the coefficients' width below which a larger explanation makes a card right that is else off by more than
+its standard errors (project choice)."""
+
 DOUBTFUL = 25.0
 """Gain below which one of several effects is judged by simulation as well (project choice: of five names that gained so
 little next to others, in made-up trials, three were wrong)."""
@@ -151,7 +155,7 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY, excluded: Sequen
         larger = next(filter(is_significant, of_count), None)
         if larger is None or (count > 1 and larger is not of_count[0]):
             continue  # what fits better is within the uncertainty of the card
-        share = 0.0 if _mends_the_card(larger, best) else _share(larger, best)
+        share = 0.0 if _is_within_the_card(larger, best) else _share(larger, best)
         smaller = [fit.score for fit in excluded if {*fit.hypothesis.effects} < {*larger.hypothesis.effects}]
         if larger.score < min([least, *smaller]) - max(needed, share * (none.score - larger.score)):
             best = larger
@@ -200,8 +204,8 @@ def with_one_more(search: Search, best: ExplanationFit) -> tuple[ExplanationFit,
 
 def makes_the_card_right(larger: ExplanationFit, best: ExplanationFit) -> bool:
     """Whether the coefficients of the card are off by more than their standard errors with an explanation, and by less
-    than half as much (:data:`BELIEVABLE`) with a larger one."""
-    return best.width > 1.0 and larger.width < BELIEVABLE * best.width
+    than half as much (:data:`LESS_WRONG`) with a larger one."""
+    return best.width > 1.0 and larger.width < LESS_WRONG * best.width
 
 
 def decide_for(search: Search, larger: ExplanationFit, best: ExplanationFit, false_discovery: float) -> Decision:
@@ -274,7 +278,7 @@ def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> 
     return float(min(sum(p for effects, p in probabilities.items() if effect in effects), SUREST))
 
 
-def _mends_the_card(larger: ExplanationFit, best: ExplanationFit) -> bool:
+def _is_within_the_card(larger: ExplanationFit, best: ExplanationFit) -> bool:
     """Whether the coefficients of the card are off by more than their standard errors with the best explanation so far,
     and by much less with a larger one: what a formula leaves is small against its force, and does not need that."""
     return best.width > 1.0 and larger.width < BELIEVABLE
