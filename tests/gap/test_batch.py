@@ -154,10 +154,12 @@ def test_trials_that_sample_differently_keep_their_times(model: Model, steps: tu
             assert motion.measured[run, :count, place] == pytest.approx(wave(name, times), abs=0.03 * WAVES[name])
 
 
-def test_noise_is_that_of_a_mean_over_a_block(model: Model) -> None:
-    motion = batch_trials(model, [record(wave, step=0.1, noise=0.1, duration=400.0)], SHIP_TIME)
+@pytest.mark.parametrize(("step", "readings"), [(0.5, 1), (0.1, 1), (0.025, 4)])
+def test_noise_is_that_of_a_mean_over_the_readings_in_a_block(model: Model, step: float, readings: int) -> None:
+    motion = batch_trials(model, [record(wave, step=step, noise=0.1, duration=400.0)], SHIP_TIME)
+    assert motion.averaged == pytest.approx(readings, rel=0.01)
     for place, name in enumerate(order_of(motion)):
-        assert motion.noise[place] == pytest.approx(0.1 * WAVES[name] / np.sqrt(motion.fine), rel=0.1)
+        assert motion.noise[place] == pytest.approx(0.1 * WAVES[name] / np.sqrt(motion.fine * readings), rel=0.1)
 
 
 def test_a_signal_without_noise_still_has_one(model: Model) -> None:

@@ -12,6 +12,7 @@ from gap_truth import HULLS, Made, Setting, make, sampled, write
 from gap_truth.disturbances import WHITE, noise_scale
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.gap.outcome.improve_card import add_effects_to_card
 from tank2sim.gap.proof.open_loop import Replayer, input_record
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import measured
@@ -75,6 +76,28 @@ def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
         middle += [*(record.begin_s + (rows - 0.5) * record.step_s - given[trial.name])]
     assert np.abs(found).max() < 0.3
     assert np.std(found) < 0.5 * np.std(middle)
+
+
+def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_misses_the_motion_by_far(
+    tmp_path: Path,
+) -> None:
+    """A play in the gear, a step every few seconds: whole seconds of orders end 100 noises away."""
+    (made,) = make([Setting(("rudder_backlash",), 24, ship="model", manoeuvres=("random_steps",))])
+    write(sampled(made, 1), tmp_path)
+    given = read_card(tmp_path / "ship.toml")
+    assert isinstance(given, ManoeuvringCard)
+    trials = measured([tmp_path / "random_steps.csv"], given)
+    width = np.radians(made.parameters["rudder_backlash"]["width_deg"])
+    card = add_effects_to_card(
+        polynomial_over_trials(given, trials.trials), [("rudder_backlash", {"width_rad": width}, {})]
+    )
+    noise = noise_of("model")
+    replayer = Replayer(card, trials.driven_by, list(noise))
+    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
+    _, misfit = replayer._least_squares_start(input_record(replayer, trials.trials[0]), sigma, p, wrong=False)
+    assert misfit > 100
+    (replay,) = replay_trials(card, card, trials, noise, held_out=False)
+    assert replay.misfit("after") < 1.5
 
 
 def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_motion(tmp_path: Path) -> None:

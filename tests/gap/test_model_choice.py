@@ -231,7 +231,7 @@ def search_of_four(force: float, drag: float) -> Search:
 
 @pytest.mark.parametrize(
     ("force", "drag", "doubtful"),
-    [(20, 15, (DRAG, FORCE)), (15, 20, (FORCE, DRAG)), (DOUBTFUL + 1, DOUBTFUL - 1, (DRAG,)), (30, 40, ())],
+    [(20, 15, (DRAG, FORCE)), (15, 20, (FORCE, DRAG)), (DOUBTFUL + 1, DOUBTFUL - 1, (DRAG,)), (70, 80, ())],
 )
 def test_effects_with_little_gain_next_to_others_are_doubtful(force, drag, doubtful) -> None:
     search = search_of_four(force, drag)

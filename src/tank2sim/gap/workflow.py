@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import softmax
@@ -40,7 +41,7 @@ from tank2sim.gap.outcome.surroundings import (
     fit_surroundings,
     with_surroundings,
 )
-from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
+from tank2sim.gap.proof.cross_check import MUCH, BlackBox, black_box, closes_gap, trial_consistency, worse_trials
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import (
     AMBIGUOUS,
@@ -243,7 +244,7 @@ def _search_once(
     judged = _judge_by_simulation(card, trials, found, decision, replays, options.false_discovery)
     judged = _surroundings_by_simulation(card, trials, found, judged, replays, names)
     progress("where and how much")
-    return _assemble_gap(card, trials, found, judged, replays.noise)
+    return _assemble_gap(card, trials, found, judged, replays)
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
@@ -325,11 +326,13 @@ def _assemble_gap(
     trials: tuple[Measured, Measured],
     found: Search,
     judged: _Judged,
-    sigmas: Mapping[str, float],
+    replays: TrialReplays,
 ) -> tuple[Gap, tuple[Measured, Measured]]:
     """The results that follow from the decision, and the trials with the winds and currents that were found."""
     fitted, held = trials
     decision, estimated, proof = judged.decision, judged.estimated, judged.proof
+    box = _begin_black_box(card, proof, estimated, replays)
+    hidden = could_hide(found, decision.best, EVIDENCE_NEEDED)
     noise = _noise(found, decision.best, fitted)
     if decision.verdict == NO_EFFECT_MISSING:
         before, after = (_misfit_of(proof.results, version) for version in ("before", "after"))
@@ -342,11 +345,11 @@ def _assemble_gap(
             decision = replace(decision, verdict=COEFFICIENTS)
         elif after > MUCH:
             decision = replace(decision, verdict=OUTSIDE_LIBRARY)
-    improved, results = proof.improved, proof.results
     sensors = _sensor_faults(estimated)
     force = force_lacking(found.likelihood, found.none)
     every = (*fitted.trials, *held.trials)
     agreement = each_trial(found.likelihood, decision.best) if estimated else {}
+    improved, results = proof.improved, _with_black_box(proof, box().card, replays) if box else proof.results
     gap = Gap(
         card=card,
         improved=improved,
@@ -368,9 +371,9 @@ def _assemble_gap(
         figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
         missing_force=force,
         at_work=effects_at_work(found.likelihood, decision.best) if estimated else (),
-        could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
+        could_hide=hidden,
         agreement=agreement,
-        next_test=_next(card, found, decision, sigmas),
+        next_test=_next(card, found, decision, replays.noise),
         notices=_notices(
             card, replace(judged, decision=decision), agreement, (fitted, held), found.likelihood.belief.waves
         ),
@@ -427,8 +430,7 @@ def _judge_by_simulation(
             closes = with_effects < max((1 + BETTER) * without, NEAR_NOISE)
         if closes:
             verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
-            boxed = replace(proof, results=_with_black_box(card, proof, estimated, replays))
-            return _Judged(replace(current, verdict=verdict), estimated, boxed, tuple(withheld))
+            return _Judged(replace(current, verdict=verdict), estimated, proof, tuple(withheld))
         if not unknown:
             withheld.append(" and ".join(current.best.hypothesis.effects))
         excluded.append(current.best)
@@ -438,8 +440,7 @@ def _judge_by_simulation(
     if decision.verdict == NO_EFFECT_MISSING:
         more = _with_more(card, trials, found, _Judged(decision, [], proof), replays, share)
         if more.decision is not decision:
-            boxed = replace(more.proof, results=_with_black_box(card, more.proof, more.estimated, replays))
-            return replace(more, proof=boxed)
+            return more
     if decision.best.hypothesis.effects:
         follows = not decision.strange and _misfit_of(proof.results, "after") <= MUCH
         decision = replace(decision, verdict=NO_EFFECT_MISSING if follows else OUTSIDE_LIBRARY)
@@ -572,8 +573,7 @@ def _surroundings_by_simulation(
         f"{best}: named by free-running simulations, not from instant to instant; fitted to the first half of each "
         f"trial, it leaves {np.median(common.predicted):.0%} of the misfit of the second half (median)"
     )
-    boxed = replace(proof, results=_with_black_box(card, proof, estimated, replays))
-    return _Judged(decision, estimated, boxed, judged.withheld, said)
+    return _Judged(decision, estimated, proof, judged.withheld, said)
 
 
 def _at(fit: ExplanationFit, common: CommonSurroundings, trials: Sequence[str]) -> ExplanationFit:
@@ -681,15 +681,26 @@ def _prove(
     return proof
 
 
-def _with_black_box(
+def _begin_black_box(
     card: ManoeuvringCard, proof: _Proof, estimated: Sequence[Found], replays: TrialReplays
-) -> list[Passed]:
-    """The replays of a proof, and by a black box with as many coefficients as the named effects have parameters."""
-    box = black_box(card, proof.trials[0], replays.noise, max(sum(len(errors) for *_, errors in estimated), 1))
+) -> Callable[[], BlackBox] | None:
+    """A black box with as many coefficients as the named effects have parameters, fitted by another process if there is
+    one; none without effects."""
+    if not estimated:
+        return None
+    count = max(sum(len(errors) for *_, errors in estimated), 1)
+    arguments = card, proof.trials[0], dict(replays.noise), count
+    if replays.executor is None:
+        return partial(black_box, *arguments)
+    return replays.executor.submit(black_box, *arguments).result
+
+
+def _with_black_box(proof: _Proof, box: ManoeuvringCard, replays: TrialReplays) -> list[Passed]:
+    """The replays of a proof, and by the card of a black box."""
     boxed: list[Passed] = []
     for group, held_out in zip(proof.trials, (False, True), strict=True):
         of_group = [result for result in proof.results if result.held_out == held_out]
-        boxed += replays.with_black_box(of_group, box.card, group) if of_group else []
+        boxed += replays.with_black_box(of_group, box, group) if of_group else []
     return boxed
 
 
@@ -757,11 +768,12 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
         for name, value in trial.noise.items()
         if name in OBSERVED_SIGNALS
     }
+    readings = motion.fine * motion.averaged
     waves = found.likelihood.belief.waves
     in_waves = waves.motion if waves else {}
     sizes = {}
     for place, name in enumerate(motion.seen):
-        sigma = float(np.sqrt(noise.white[place] ** 2 * motion.fine + noise.slow[place] ** 2))
+        sigma = float(np.sqrt(noise.white[place] ** 2 * readings + noise.slow[place] ** 2))
         size, origin = (stated[name], "stated") if name in stated else (sigma, "estimated")
         sizes[name] = float(np.hypot(size, in_waves.get(name, 0.0))), origin
     return sizes

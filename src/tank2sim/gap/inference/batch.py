@@ -84,6 +84,8 @@ class MeasuredBatch:
     recorded : mapping
         Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
         `inputs` does not hold; directions without jumps of a full turn.
+    averaged : float
+        Readings of a sensor in a fine step, 1 or more, of which the measured values are the mean; median over the runs.
     """
 
     names: tuple[str, ...]
@@ -99,6 +101,7 @@ class MeasuredBatch:
     unsure_s: Array
     at_execute: _Truths
     recorded: Mapping[str, Array] = field(default_factory=dict)
+    averaged: float = 1.0
 
     @property
     def block_s(self) -> float:
@@ -152,13 +155,11 @@ class MeasuredBatch:
     def over_blocks(self, values: Array) -> Array:
         """Means of values of fine steps (R, n - 1, k) from the middle of a block to that of the next (R, T - 1, k)."""
         inside = values[:, self.fine // 2 : self.fine // 2 + (self.blocks - 1) * self.fine]
-        means: Array = inside.reshape(len(values), self.blocks - 1, self.fine, -1).mean(axis=2)
-        return means
+        return _means_of_blocks(inside, self.fine)
 
     def in_blocks(self, values: Array) -> Array:
         """Means over each block of values at the fine instants (R, n, k): (R, T, k)."""
-        means: Array = values.reshape(len(values), self.blocks, self.fine, -1).mean(axis=2)
-        return means
+        return _means_of_blocks(values, self.fine)
 
     @property
     def middles(self) -> Array:
@@ -226,7 +227,8 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         A trial is too short, or records neither velocities nor positions.
     """
     seen = seen_in(model, trials)
-    step = max(ship_time / FINE_PER_SHIP_TIME, *(sampling_step(trial) for trial in trials))
+    samplings = [sampling_step(trial) for trial in trials]
+    step = max(ship_time / FINE_PER_SHIP_TIME, *samplings)
     runs = tuple(prepare(model, trial, seen, step_s=step * (1 + 1e-6)) for trial in trials)
     step = max(run.step_s for run in runs)
     runs = tuple(_at_step(run, step) for run in runs)
@@ -254,6 +256,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         unsure_s=np.array([0.0 if "delta_rad" in trial.signals else sampling_step(trial) for trial in trials]),
         at_execute=np.zeros(len(runs), dtype=bool),
         recorded=_recorded(trials, runs, size, model.input_names),
+        averaged=max(1.0, step / float(np.median(samplings))),
         noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
     )
 
@@ -312,6 +315,14 @@ def _typical(noise: Sequence[Array], least: Array) -> Array:
     medians = [np.median(levels[levels > 0]) if (levels > 0).any() else 0.0 for levels in known.T]
     typical: Array = np.maximum(np.array(medians), least)
     return typical
+
+
+def _means_of_blocks(values: Array, fine: int) -> Array:
+    """Means of every `fine` values of each run (R, n fine, k): (R, n, k). A sum by einsum is three times as fast as
+    ``mean`` over a short axis in the middle."""
+    runs, steps, count = values.shape
+    means: Array = np.einsum("rbfk->rbk", values.reshape(runs, steps // fine, fine, count)) / fine
+    return means
 
 
 def _padded(rows: Array, size: int) -> Array:

@@ -107,7 +107,8 @@ class FilterColumns:
     Parameters
     ----------
     driving : array (R, T - 1, 6, 1 + k + nc)
-    shown : array (R, T, ny, 1 + k + nc)
+    shown : array (R, T, ny, 1 + k)
+        No sensor shows a coefficient itself.
     parameter_count : int
         k.
     coefficient_count : int
@@ -119,11 +120,15 @@ class FilterColumns:
     parameter_count: int
     coefficient_count: int
 
-    def scaled(self, width: float) -> FilterColumns:
-        """Return the columns with the coefficients' standard errors multiplied by `width`."""
+    def factors(self, width: float) -> Array:
+        """Factor on each column (1 + k + nc,) if the coefficients' standard errors are multiplied by `width`."""
         factors = np.ones(self.driving.shape[-1])
         factors[1 + self.parameter_count : 1 + self.parameter_count + self.coefficient_count] = width
-        return replace(self, driving=self.driving * factors, shown=self.shown * factors)
+        return factors
+
+    def scaled(self, width: float) -> FilterColumns:
+        """Return the columns with the coefficients' standard errors multiplied by `width`."""
+        return replace(self, driving=self.driving * self.factors(width))
 
 
 @dataclass(frozen=True, eq=False)

@@ -154,8 +154,8 @@ class Observer:
         ----------
         driving : array (R, T - 1, 6, C)
             Change of the states from block to block by the rates.
-        shown : array (R, T, ny, C)
-            Readings of the sensors; nan where nothing was measured.
+        shown : array (R, T, ny, S)
+            Readings of the sensors of the first S columns, zero in the others; nan where nothing was measured.
 
         Returns
         -------

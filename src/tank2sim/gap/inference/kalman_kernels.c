@@ -167,10 +167,11 @@ EXPORT void covariances(long runs, long blocks, const double *start, const doubl
   }
 }
 
-EXPORT int run_filter(long runs, long blocks, int count, const double *reading, const unsigned char *known,
-                      const double *transition, const double *spreading, const double *push, const double *fading,
-                      const double *gain, const double *white, const double *driving, const double *shown, int keep,
-                      double *whitened, double *after) {
+/* Of `count` columns the first `seen_count` have readings in `shown`; those of the others are zero. */
+EXPORT int run_filter(long runs, long blocks, int count, int seen_count, const double *reading,
+                      const unsigned char *known, const double *transition, const double *spreading,
+                      const double *push, const double *fading, const double *gain, const double *white,
+                      const double *driving, const double *shown, int keep, double *whitened, double *after) {
   double *work = malloc(sizeof(double) * count * (2 * NZ + NY));
   if (!work) return 1;
   double *z = work, *moved = work + NZ * count, *e = work + 2 * NZ * count;
@@ -187,7 +188,8 @@ EXPORT int run_filter(long runs, long blocks, int count, const double *reading, 
           memset(row, 0, sizeof(double) * count);
           continue;
         }
-        for (int c = 0; c < count; ++c) row[c] = shown[(at * NY + i) * count + c] - z[(SHORT + i) * count + c];
+        for (int c = 0; c < count; ++c) row[c] = -z[(SHORT + i) * count + c];
+        add(row, 1.0, shown + (at * NY + i) * seen_count, seen_count);
         for (int j = 0; j < MOTION; ++j)
           if (H[i * MOTION + j] != 0.0) add(row, -H[i * MOTION + j], z + j * count, count);
       }

@@ -90,17 +90,18 @@ def run_filter(
         Transition, spreading, push and fading.
     filtering : arrays (R, T, nz, ny), (R, T, ny, ny)
         Gains and inverse roots.
-    columns : arrays (R, T - 1, 6, C), (R, T, ny, C)
-        Driving and shown.
+    columns : arrays (R, T - 1, 6, C), (R, T, ny, S)
+        Driving, and what the first S of C columns show.
     keep : bool
         Whether the states are wanted, (R, T, nz, C); else they are (0, 0, nz, C).
     """
-    runs, blocks, ny, count = columns[1].shape
+    runs, blocks, ny, shown = columns[1].shape
+    count = columns[0].shape[-1]
     whitened = np.empty((runs, blocks, ny, count))
     after = np.empty((runs if keep else 0, blocks if keep else 0, filtering[0].shape[2], count))
     given = _places(*seeing, *moving, *filtering, *columns)
     run = _library(ny, _waves(moving[2])).run_filter
-    _need_memory(run(*_sizes(runs, blocks), count, *given, int(keep), *_places(whitened, after)))
+    _need_memory(run(*_sizes(runs, blocks), count, shown, *given, int(keep), *_places(whitened, after)))
     return whitened, after
 
 

@@ -206,9 +206,7 @@ class Likelihood:
         if len(theta) and self._forms is not None:
             forms.append(self._forms.columns(driving - self._lack, directed=hypothesis.directed))
         pairs = np.concatenate([driven, of_coefficients, *forms], axis=-1)
-        readings = np.zeros((*shown.shape, pairs.shape[-1]))
-        readings[..., : 1 + len(theta)] = seen
-        return FilterColumns(pairs, readings, len(theta), self.coefficients.scaled)
+        return FilterColumns(pairs, seen, len(theta), self.coefficients.scaled)
 
     def whiten(self, fit: ExplanationFit) -> tuple[Array, Array]:
         """Columns of an explanation in units of the innovations (R, T, ny, C), and its innovations (R, T, ny)."""
@@ -330,7 +328,7 @@ class Likelihood:
 
         def score(noisy: ExplanationFit) -> float:
             seen = self._observer(linear, noisy)
-            solved = self._solved(fit.hypothesis, fit.theta, seen, columns.scaled(noisy.width), free=True)
+            solved = self._solved(noisy, seen, columns, free=True)
             return self._score(noisy, seen, solved)
 
         return min((replace(fit, logs=logs) for logs in starts), key=score)
@@ -342,11 +340,10 @@ class Likelihood:
         seen = self._observer(linear, fit)
         best: ExplanationFit | None = None
         for _ in range(steps if len(theta) else 1):
-            columns = self.columns(hypothesis, theta, coefficients).scaled(fit.width)
-            solved = self._solved(hypothesis, theta, seen, columns)
+            at = replace(fit, theta=theta)
+            solved = self._solved(at, seen, self.columns(hypothesis, theta, coefficients))
             found = replace(
-                fit,
-                theta=theta,
+                at,
                 covariance=solved.covariance,
                 score=self._score(fit, seen, solved),
                 change=solved.change,
@@ -419,9 +416,8 @@ class Likelihood:
         def cost(logs: Array) -> tuple[float, Array]:
             noisy = replace(fit, logs=logs)
             seen = self._observer(linear, noisy)
-            wide = columns.scaled(noisy.width)
-            solved = self._solved(fit.hypothesis, fit.theta, seen, wide, free=True)
-            counted = (_mixed(part, solved.weights) for part in (wide.driving, wide.shown, solved.whitened))
+            solved = self._solved(noisy, seen, columns, free=True)
+            counted = (_mixed(part, solved.weights) for part in (columns.driving, columns.shown, solved.whitened))
             by_noise = slopes(seen, *counted)
             coefficients_change = solved.change[: columns.coefficient_count]
             by_width = 2 * (
@@ -439,11 +435,11 @@ class Likelihood:
         hypothesis, theta = fit.hypothesis, fit.theta
         linear = self.linear(hypothesis, theta)
         columns = self.columns(hypothesis, theta, self.of_coefficients(hypothesis, theta))
-        columns = self._informative(fit, linear, columns).scaled(fit.width)
+        columns = self._informative(fit, linear, columns)
 
         def cost(waves: WaveBand | None) -> float:
             seen = observer(linear, fit.noise, waves)
-            return seen.log_det + self._solved(hypothesis, theta, seen, columns, free=True).reduced_cost
+            return seen.log_det + self._solved(fit, seen, columns, free=True).reduced_cost
 
         return cost
 
@@ -460,7 +456,7 @@ class Likelihood:
         kept = 1 + k + count + np.flatnonzero(np.diag(gram)[count:] > LEAST_INFORMATION)
         parts = columns.driving[..., : 1 + k], columns.driving[..., 1 + k : 1 + k + count] @ directions
         driving = np.concatenate([*parts, columns.driving[..., kept]], axis=-1)
-        return FilterColumns(driving, columns.shown[..., : driving.shape[-1]], k, directions.shape[1])
+        return FilterColumns(driving, columns.shown, k, directions.shape[1])
 
     def _score(self, fit: ExplanationFit, seen: Observer, solved: _Solved) -> float:
         forms = np.abs(solved.change[self.coefficient_columns.shape[-1] :])
@@ -483,14 +479,14 @@ class Likelihood:
             cost -= float(np.linalg.slogdet(narrowed)[1])
         return cost
 
-    def _solved(
-        self, hypothesis: Hypothesis, theta: Array, seen: Observer, columns: FilterColumns, *, free: bool = False
-    ) -> _Solved:
+    def _solved(self, fit: ExplanationFit, seen: Observer, columns: FilterColumns, *, free: bool = False) -> _Solved:
         """Least squares over the parameters' and coefficients' columns, the parameters within their bounds; the cost of
-        the residual is at the given parameters, or at the solution if `free`."""
+        the residual is at the parameters of `fit`, or at the solution if `free`. The columns are without its width."""
+        hypothesis, theta = fit.hypothesis, fit.theta
         whitened = seen.whiten(columns.driving, columns.shown)
         flat = whitened.reshape(-1, whitened.shape[-1])
-        gram = flat.T @ flat
+        factors = columns.factors(fit.width)
+        gram = flat.T @ flat * np.outer(factors, factors)
         k, count = columns.parameter_count, columns.coefficient_count
         mean, precision = hypothesis.prior
         weight = np.diag(np.concatenate([precision, np.ones(gram.shape[0] - 1 - k)]))
@@ -523,6 +519,7 @@ class Likelihood:
         weights[0, 0] = 1.0
         weights[1:, 0] = whole if free else np.concatenate([np.zeros(k), alone])
         weights[1 + k :, 1:] = root
+        weights *= factors[:, None]
         return _Solved(
             reduced_cost,
             whole[:k],
@@ -546,8 +543,9 @@ def _bounded(normal: Array, pull: Array, low: Array, high: Array) -> Array:
 
 
 def _mixed(columns: Array, weights: Array) -> Array:
-    """Combinations of columns, the last axis: one product of matrices."""
-    mixed: Array = (columns.reshape(-1, columns.shape[-1]) @ weights).reshape(*columns.shape[:-1], weights.shape[1])
+    """Combinations of columns, the last axis: one product of matrices. Those that are not among them are zero."""
+    count = columns.shape[-1]
+    mixed: Array = (columns.reshape(-1, count) @ weights[:count]).reshape(*columns.shape[:-1], weights.shape[1])
     return mixed
 
 

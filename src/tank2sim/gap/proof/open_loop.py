@@ -119,7 +119,8 @@ _EXPLAINED = 0.5
 choice)."""
 
 _FOLLOWED = 50 * _NEAR
-"""Misfit in noise units up to which instants of orders are estimated (project choice): beyond, the model is wrong."""
+"""Misfit in noise units beyond which a model is wrong, and instants of orders do not explain what it misses, unless it
+is near the noise with them (project choice)."""
 
 _SETTLED = 0.02
 """A step below this share of the trust in the first reading ends the search."""
@@ -197,16 +198,17 @@ class Replayer:
     ) -> tuple[InputRecord, Array]:
         """The record with the instants at which its orders were given, and its initial state, that fit it best.
 
-        An order that was sampled once or twice a second was given at an unknown instant between two readings. Where the
-        model follows the record to within :data:`_FOLLOWED` noises, these instants are estimated together with the
-        initial state, each beforehand uniform over its interval (with the variance of that, 1/12). Without such steps,
-        and with a model that is further off, as :meth:`fit_initial_state`.
+        An order that was sampled once or twice a second was given at an unknown instant between two readings. These
+        instants are estimated together with the initial state, each beforehand uniform over its interval (with the
+        variance of that, 1/12). Without such steps, and with a model that is further off than they explain, as
+        :meth:`fit_initial_state`.
         """
         start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
         rows = self._unsure_steps(record)
-        if len(rows) and misfit < _FOLLOWED:
+        if len(rows):
             timed, begun, left = self._least_squares_instants(record, start, rows, sigma, p, near)
-            if left < max(min(_NEAR, misfit), _EXPLAINED * misfit):
+            explained = _EXPLAINED * misfit if misfit < _FOLLOWED else 0.0
+            if left < max(min(_NEAR, misfit), explained):
                 return timed, begun
         return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
 
@@ -253,7 +255,8 @@ class Replayer:
         """The record with the instants of the steps at `rows`, the initial state, and their misfit.
 
         By least squares on the beginning of the record, then on twice as many steps, and so on: a small error at an
-        early step of an unstable ship is a large one later, where the motion is not nearly linear in it.
+        early step of an unstable ship is a large one later, where the motion is not nearly linear in it. A model that
+        misses the beginning by more than :data:`_FOLLOWED` is wrong: the record as it is, and inf.
         """
         middle = record.middle
         guess, spread = _first_state(self, record, sigma, p)
@@ -300,7 +303,9 @@ class Replayer:
                 misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=3 * _ROUNDS
             )
             unknown[free] = found.x
-        left = float(np.sqrt(np.mean(found.fun[: int(known.sum())] ** 2)))
+            left = float(np.sqrt(np.mean(found.fun[: int(compared.sum())] ** 2)))
+            if not left < _FOLLOWED:
+                return record, start, np.inf
         return self._given_at(record, rows, unknown[size:]), unknown[:size], left
 
     def _slopes_of_motion(

@@ -157,7 +157,9 @@ class Screen:
         seen = observer(linear, base.noise, likelihood.belief.waves)
         columns = likelihood.columns(assumed, base.theta, likelihood.coefficient_columns).scaled(base.width)
         driving = np.concatenate([columns.driving, *(variant.driving for variant in self.every)], axis=-1)
-        shown = np.concatenate([columns.shown, *(-variant.shown for variant in self.every)], axis=-1)
+        of_coefficients = np.zeros((*columns.shown.shape[:-1], columns.driving.shape[-1] - columns.shown.shape[-1]))
+        of_variants = [-variant.shown for variant in self.every]
+        shown = np.concatenate([columns.shown, of_coefficients, *of_variants], axis=-1)
         flat = seen.whiten(driving, shown).reshape(-1, driving.shape[-1])
         gram = flat.T @ flat
         count = columns.driving.shape[-1]
