@@ -187,9 +187,10 @@ def test_derivatives_change_with_the_error_of_the_card_and_of_the_effect() -> No
         math.hypot(1.1 * 0.02 * 499e-5, 0.02 * (-499e-5 + 798e-5)), rel=5e-3
     )
     assert "was -166e-5 before linear_yaw_damping" in improved.text
-    unchanged = set(card.derivatives) - {"Nr", "Yr"}
+    assert improved.derivatives["Nru"] == pytest.approx(-166e-5 + 0.1 * bare_part, rel=1e-5)  # as N_r, which it equals
+    unchanged = set(card.derivatives) - {"Nr", "Yr", "Nru", "Yru"}
     assert all(improved.derivatives[name] == card.derivatives[name] for name in unchanged)
-    assert set(improved.uncertainty) == {"Nr", "Yr"}
+    assert set(improved.uncertainty) == {"Nr", "Yr", "Nru", "Yru"}
 
 
 def test_every_term_of_the_rudder_is_magnified_and_no_other() -> None:

@@ -125,6 +125,18 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
     assert np.abs(found).max(axis=(0, 1)).min() > 1e-3
 
 
+def test_a_start_from_which_the_motion_exceeds_all_bounds_counts_as_no_change(tmp_path: Path) -> None:
+    card, trials, _ = written(tmp_path, "model", 1)
+    replayer = Replayer(card, trials.driven_by, list(noise_of("model")))
+    p, record = replayer.model.parameter_values(), input_record(replayer, trials.trials[0])
+    start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
+    reach = np.where(np.arange(len(start)) == replayer.model.state_names.index("motion.r"), 1e9, 1e-4)
+    found = replayer._slopes_of_motion(record, np.zeros(0, dtype=np.intp), np.zeros(0), start, p, reach)
+    assert np.isnan(replayer.motion(record, start + 1e9 * (reach > 1), p)).any()
+    assert np.isfinite(found).all()
+    assert np.abs(found[..., replayer.model.state_names.index("motion.psi")]).max() > 0.5
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hertz", [1, 2])
 def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz: int) -> None:

@@ -11,6 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
@@ -237,6 +238,20 @@ def test_effects_with_little_gain_next_to_others_are_doubtful(force, drag, doubt
     search = search_of_four(force, drag)
     assert doubtful_effects(search, search.fits[0]) == tuple(NAMES[place] for place in doubtful)
     assert doubtful_effects(search, next(one for one in search.fits if len(one.hypothesis.effects) == 1)) == ()
+
+
+@pytest.mark.usefixtures("calm")
+def test_an_effect_that_swings_is_half_as_far_ahead_of_what_does_not(monkeypatch) -> None:
+    """Ahead by 15 it is given alone, unless its frequency can adapt to random forces."""
+    search = Search(CALM, (fit(-300, FORCE), fit(-285, DRAG), fit(0)), ())
+    steady = decide(search)
+    assert (steady.verdict, steady.alike) == (MISSING, ())
+    swings = {**EFFECTS, NAMES[FORCE]: replace(EFFECTS[NAMES[FORCE]], resonant=True)}
+    monkeypatch.setattr("tank2sim.gap.search.model_choice.EFFECTS", swings)
+    swinging = decide(search)
+    assert swinging.verdict == AMBIGUOUS and [one.hypothesis.effects for one in swinging.alike] == [(NAMES[DRAG],)]
+    odds = [one.confidence(NAMES[FORCE]) / one.confidence(NAMES[DRAG]) for one in (steady, swinging)]
+    assert odds[1] == pytest.approx(np.sqrt(odds[0]))
 
 
 @pytest.mark.usefixtures("calm")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 
 import tank2sim
-from tank2sim.cards import parse_card
+from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS, Effect, acting_variable, undisturbed_inputs
@@ -51,15 +52,18 @@ PARAMETERS_NAMED_ALIKE = {"loaded_rudder.py": ("loading",), "loading.py": ("trim
 
 def changed(name: str) -> set[str]:
     """Derivatives of the Mariner that an effect changes, found by values of quantities that are these derivatives."""
-    card = parse_card(mariner_text(), "ship.toml")
+    given = parse_card(mariner_text(), "ship.toml")
+    assert isinstance(given, ManoeuvringCard)
+    # Each derivative by its speed is there: a factor of none changes nothing.
+    card = replace(given, derivatives=dict.fromkeys(ALL_TERMS, 1e-4) | dict(given.derivatives))
     model = build(card)
     names = [term for term in ALL_TERMS if f"derivatives.{term}" in model]
     asked = [
         Quantity(name=f"asked.{term}", unit="1", description=term, value=model.symbol(f"derivatives.{term}"))
         for term in names
     ]
-    given = dict(to_si(key, value) for key, value in TYPICAL[name].items())
-    after = EFFECTS[name].apply(model.extend(*asked), given, card)
+    parameters = dict(to_si(key, value) for key, value in TYPICAL[name].items())
+    after = EFFECTS[name].apply(model.extend(*asked), parameters, card)
     at = state(6.5, 0.5, 0.01, 0.1)
     quantities = [f"asked.{term}" for term in names]
     pairs = zip(names, values(model.extend(*asked), quantities, at), values(after, quantities, at), strict=True)

@@ -43,11 +43,14 @@ def changed(card: ManoeuvringCard, **derivatives: float) -> Model:
 
 
 def bare_parts(card: ManoeuvringCard) -> dict[str, float]:
-    """Derivatives without the inertia of the ship: Y_r + m, N_r + m x_G of a card that holds them."""
+    """Derivatives without the inertia of the ship: Y_r + m, N_r + m x_G of a card that holds them, and as much of what
+    they have by speed; the Mariner's Y_ru, N_ru are its Y_r, N_r."""
     c = dict.fromkeys(ALL_TERMS, 0.0) | dict(card.derivatives)
     if card.model.yaw_rate_terms == "total":
+        assert (c["Yru"], c["Nru"]) == (c["Yr"], c["Nr"])
         c["Yr"] += MASS
         c["Nr"] += MASS * X_G
+        c["Yru"], c["Nru"] = c["Yr"], c["Nr"]
     return c
 
 
@@ -75,15 +78,15 @@ def test_turning_drag_slows_a_ship_that_drifts_outwards_in_its_turn() -> None:
     [
         ("added_yaw_inertia", ["Nrdot"]),
         ("added_sway_mass", ["Yvdot"]),
-        ("linear_yaw_damping", ["Yr", "Nr"]),
-        ("linear_sway_damping", ["Yv", "Nv"]),
+        ("linear_yaw_damping", ["Yr", "Nr", "Yru", "Nru", "Yruu", "Nruu"]),
+        ("linear_sway_damping", ["Yv", "Nv", "Yvu", "Nvu", "Yvuu", "Nvuu"]),
     ],
 )
 @pytest.mark.parametrize("text", [mariner_text(), HYDRODYNAMIC])
 def test_factors_multiply_the_hydrodynamic_part_only(name: str, derivatives: list[str], text: str) -> None:
     card = card_with(text=text)
     parts = bare_parts(card)
-    new = {key: card.derivatives[key] + 0.3 * parts[key] for key in derivatives}
+    new = {key: card.derivatives.get(key, 0.0) + 0.3 * parts[key] for key in derivatives}
     same({name: {"factor": 0.3}}, text, changed(card, **new))
 
 

@@ -38,11 +38,20 @@ def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCa
 def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
     """The hydrodynamic part of a derivative (prime): without the inertia of the ship that "total" cards put into it.
 
-    With ``yaw_rate_terms = "total"``, X_vr, X_rr, Y_r, N_r contain m, m x_G, -m, -m x_G of (3.1).
+    With ``yaw_rate_terms = "total"``, X_vr, X_rr, Y_r, N_r contain m, m x_G, -m, -m x_G of (3.1). Of the terms by speed
+    next to them, as Y_ru, the same share is taken as hydrodynamic, twice the whole at most (project choice: in the
+    Mariner's data Y_ru and N_ru equal Y_r and N_r).
     """
     symbol = model.symbol(f"derivatives.{name}")
     inertial = inertial_parts(model, model.symbol("ship.mass"), model.symbol("ship.x_G"), card)
-    return symbol - inertial[name] if name in inertial else symbol
+    base = name.rstrip("u")
+    if base not in inertial:
+        return symbol
+    part = model.symbol(f"derivatives.{base}") - inertial[base]
+    if name == base:
+        return part
+    whole = model.symbol(f"derivatives.{base}")
+    return symbol * ca.fmin(2.0, ca.fmax(-2.0, part / ca.if_else(whole == 0, 1.0, whole)))
 
 
 def inertial_parts(model: Model, mass: ca.SX, x_G: ca.SX, card: ManoeuvringCard) -> dict[str, ca.SX]:
@@ -54,14 +63,22 @@ def inertial_parts(model: Model, mass: ca.SX, x_G: ca.SX, card: ManoeuvringCard)
 
 
 def _magnified(names: Iterable[str]) -> EffectEquations:
-    """Equations that magnify derivatives by 1 + ``factor``."""
-    wanted = tuple(names)
+    """Equations that magnify derivatives by 1 + ``factor``, and their change by speed where the model has that."""
+    always = tuple(names)
 
     def equations(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
         factor = given["factor"]
-        return with_changes(model, {name: factor * hydrodynamic(model, name, card) for name in wanted}, card)
+        by_speed = [name for name in _by_speed(always) if f"derivatives.{name}" in model]
+        changes = {name: factor * hydrodynamic(model, name, card) for name in (*always, *by_speed)}
+        return with_changes(model, changes, card)
 
     return equations
+
+
+def _by_speed(names: Iterable[str]) -> tuple[str, ...]:
+    """Terms that are these derivatives times a change of speed: Nru of Nr. A polynomial in u - u_0 holds with them what
+    the same water does at another speed."""
+    return tuple(name for base in names for power in ("u", "uu") if (name := base + power) in ALL_TERMS)
 
 
 def _added(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
@@ -145,11 +162,16 @@ LINEAR_YAW_DAMPING = Effect(
     source="(3.5) of Krezelewski and Misiag: hydrodynamic parts of Yr and Nr",
     parameters=(
         EffectParameter(
-            "factor", "relative change of the hydrodynamic Yr and Nr", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)
+            "factor",
+            "relative change of the hydrodynamic Yr and Nr at all speeds",
+            -1.0,
+            5.0,
+            absent=0.0,
+            typical=(USUAL_CHANGE,),
         ),
     ),
     equations=_magnified(("Yr", "Nr")),
-    changes=("Yr", "Nr"),
+    changes=("Yr", "Nr", *_by_speed(("Yr", "Nr"))),
 )
 
 LINEAR_SWAY_DAMPING = Effect(
@@ -158,10 +180,12 @@ LINEAR_SWAY_DAMPING = Effect(
     description="The hull resists drifting sideways more (or less), at small drift too.",
     source="(3.5) of Krezelewski and Misiag: Yv and Nv",
     parameters=(
-        EffectParameter("factor", "relative change of Yv and Nv", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)),
+        EffectParameter(
+            "factor", "relative change of Yv and Nv at all speeds", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)
+        ),
     ),
     equations=_magnified(("Yv", "Nv")),
-    changes=("Yv", "Nv"),
+    changes=("Yv", "Nv", *_by_speed(("Yv", "Nv"))),
 )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.fit import CoefficientEstimates
@@ -21,8 +22,8 @@ FAR = 5.0
 moves one by two)."""
 
 FEW_TERMS = 2
-"""Derivatives at most that an effect changes which is named next to a refitted coefficient: more, and it is a change of
-the whole ship or rudder (project choice)."""
+"""Derivatives at most, apart from their changes by speed, that an effect changes which is named next to a refitted
+coefficient: more, and it is a change of the whole ship or rudder (project choice)."""
 
 
 def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> dict[str, Refitted]:
@@ -38,8 +39,9 @@ def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> di
     """
     found = {}
     for name, effect in EFFECTS.items():
-        moved = [entry for entry in coefficients if entry.name in effect.changes and entry.moved > FAR]
-        if moved and name not in named and len(effect.changes) <= FEW_TERMS:
+        terms = [term for term in effect.changes if known_term(term).u == 0]
+        moved = [entry for entry in coefficients if entry.name in terms and entry.moved > FAR]
+        if moved and name not in named and len(terms) <= FEW_TERMS:
             found[name] = max(moved, key=lambda coefficient: coefficient.moved)
     return found
 

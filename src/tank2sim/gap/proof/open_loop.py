@@ -122,6 +122,10 @@ _FOLLOWED = 50 * _NEAR
 """Misfit in noise units beyond which a model is wrong, and instants of orders do not explain what it misses, unless it
 is near the noise with them (project choice)."""
 
+_BEGUN = 5 * _NEAR
+"""Misfit in noise units of the beginning of a record beyond which its instants do not bring such a model near the noise
+(project choice)."""
+
 _SETTLED = 0.02
 """A step below this share of the trust in the first reading ends the search."""
 
@@ -206,10 +210,10 @@ class Replayer:
         start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
         rows = self._unsure_steps(record)
         if len(rows):
-            timed, begun, left = self._least_squares_instants(record, start, rows, sigma, p, near)
-            explained = _EXPLAINED * misfit if misfit < _FOLLOWED else 0.0
-            if left < max(min(_NEAR, misfit), explained):
-                return timed, begun
+            most, explained = (np.inf, _EXPLAINED) if misfit < _FOLLOWED else (_BEGUN, 0.0)
+            found = self._least_squares_instants(record, rows, sigma, p, near, most=most)
+            if found is not None and found[2] < max(min(_NEAR, misfit), explained * misfit):
+                return found[:2]
         return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
 
     def delayed_by_instants(self, record: InputRecord, given: Array) -> InputRecord:
@@ -246,21 +250,22 @@ class Replayer:
     def _least_squares_instants(
         self,
         record: InputRecord,
-        start: Array,
         rows: NDArray[np.intp],
         sigma: Array,
         p: Array,
         near: Array | None = None,
-    ) -> tuple[InputRecord, Array, float]:
+        *,
+        most: float = np.inf,
+    ) -> tuple[InputRecord, Array, float] | None:
         """The record with the instants of the steps at `rows`, the initial state, and their misfit.
 
         By least squares on the beginning of the record, then on twice as many steps, and so on: a small error at an
-        early step of an unstable ship is a large one later, where the motion is not nearly linear in it. A model that
-        misses the beginning by more than :data:`_FOLLOWED` is wrong: the record as it is, and inf.
+        early step of an unstable ship is a large one later, where the motion is not nearly linear in it. None where a
+        beginning is missed by more than `most`, or a motion exceeds all bounds.
         """
         middle = record.middle
         guess, spread = _first_state(self, record, sigma, p)
-        known, size = ~np.isnan(record.readings), len(start)
+        known, size = ~np.isnan(record.readings), len(guess)
         unknown = np.append(guess if near is None else near, np.full(len(rows), middle))
         reach = np.append(1e-4 * self._nominal, np.full(len(rows), _REACH))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
@@ -297,15 +302,15 @@ class Replayer:
             low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
             low[size:], high[size:] = middle - 0.5, middle + 0.5
             if not np.isfinite(misfit(unknown[free])).all():
-                return record, start, np.inf
+                return None
             scale = np.append(spread, np.full(count, 0.3))
             found = least_squares(
                 misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=3 * _ROUNDS
             )
             unknown[free] = found.x
             left = float(np.sqrt(np.mean(found.fun[: int(compared.sum())] ** 2)))
-            if not left < _FOLLOWED:
-                return record, start, np.inf
+            if not left < most:
+                return None
         return self._given_at(record, rows, unknown[size:]), unknown[:size], left
 
     def _slopes_of_motion(
@@ -318,7 +323,8 @@ class Replayer:
         reach: Array,
     ) -> Array:
         """Derivatives (m, ny, nx + len(rows)) of the compared readings in the initial state and in the instants of the
-        steps of the order at `rows`, by forward differences of `reach`; a step changes nothing before it."""
+        steps of the order at `rows`, by forward differences of `reach`; a step changes nothing before it, and a motion
+        that exceeds all bounds counts as one without change."""
         timed = self._given_at(record, rows, shares)
         states = self.states(timed, start, p)
         shown = self._readings(timed, states, p)
@@ -335,7 +341,7 @@ class Replayer:
             after = shown[begin // record.every :]
             change = (self.motion(rest, states[begin], p) - after) / step
             slopes[begin // record.every :, :, len(start) + place] = change
-        return slopes
+        return np.nan_to_num(slopes)
 
     def _unmoved_before(self, record: InputRecord, row: int) -> int:
         """The last compared row before a step of the order at `row` around which no order changes, or 0."""

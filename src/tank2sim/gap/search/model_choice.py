@@ -69,7 +69,8 @@ effects."""
 
 IN_WAVES = 2.0
 """Factor on the evidence that names need, and on :data:`TEMPER`, where waves were found (project choice): means over
-blocks do not follow them whole, and what remains is coloured."""
+blocks do not follow them whole, and what remains is coloured. The same where the best explanation has an effect that
+swings (roll): its frequency and damping adapt to the colour of random forces."""
 
 SUREST = 0.99
 """Largest probability of an effect: one outside the library may look the same (project choice)."""
@@ -239,17 +240,18 @@ def doubtful_effects(search: Search, best: ExplanationFit) -> tuple[str, ...]:
         lacking = effects - {*fit.hypothesis.effects}
         if len(lacking) == 1 and 1 < len(effects) == len(fit.hypothesis.effects) + 1:
             gains[lacking.pop()] = fit.score - best.score
-    return tuple(sorted((name for name in gains if gains[name] < _doubt(search) * DOUBTFUL), key=gains.__getitem__))
+    largest = _doubt(search, best) * DOUBTFUL
+    return tuple(sorted((name for name in gains if gains[name] < largest), key=gains.__getitem__))
 
 
 def _decision(search: Search, best: ExplanationFit, false_discovery: float) -> Decision:
     """What is said with an explanation: those that are as good, the probabilities of all, and the verdict."""
-    none = search.none
-    temper = _doubt(search) * TEMPER
+    none, doubt = search.none, _doubt(search, best)
+    temper = doubt * TEMPER
     scores = np.array([fit.score for fit in search.fits]) / temper
     weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
     probabilities = {fit.hypothesis.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
-    behind = _doubt(search) * ALIKE
+    behind = doubt * ALIKE
     unsure = {name for name in best.hypothesis.effects if _confidence(probabilities, name) < 1 - false_discovery}
     if unsure:
         behind = max(behind, -2 * temper * np.log(RIVAL))
@@ -270,8 +272,9 @@ def _decision(search: Search, best: ExplanationFit, false_discovery: float) -> D
     return Decision(OUTSIDE_LIBRARY if strange else verdict, best, alike, probabilities, strange)
 
 
-def _doubt(search: Search) -> float:
-    return IN_WAVES if search.likelihood.belief.waves else 1.0
+def _doubt(search: Search, best: ExplanationFit | None = None) -> float:
+    swings = best is not None and any(EFFECTS[name].resonant for name in best.hypothesis.effects)
+    return IN_WAVES if search.likelihood.belief.waves or swings else 1.0
 
 
 def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> float:
