@@ -60,6 +60,8 @@ def test_trials_that_got_worse_are_named() -> None:
         ([(90, math.inf), (80, math.inf)], False),
         ([(90, 10), (90, 90), (80, 80), (70, 70)], True),  # it acts in one trial alone
         ([(90, 90), (80, 80)], False),
+        ([(200, 1.2), (15, 1.1), (0.9, 1.4), (0.9, 1.3), (0.9, 11)], True),  # near the noise neither is nearer
+        ([(200, 1.2), (0.9, 9), (0.9, 11)], False),
     ],
 )
 def test_a_name_that_brings_no_simulation_nearer_closes_nothing(sizes, closed: bool) -> None:

@@ -31,6 +31,10 @@ MUCH = 3.0
 CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
+REMAINS = 1.5
+"""Misfit in noise units from which a gap remains, and is reported (project choice): the misfit beyond the noise is
+then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+
 ACTS_FROM = 0.3
 """Root mean square difference of two simulations, in noise units, from which an effect acts in a trial (project choice:
 far less than shows): a stall shows in hard turns alone."""
@@ -165,16 +169,19 @@ def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
     By the median ratio of misfits after and before, for one diverging simulation would dominate a mean: over all
-    signals of all trials in which the simulations differ by :data:`ACTS_FROM`, for an effect may act in few of them.
-    `limit` is the largest median.
+    signals of all trials in which the simulations differ by :data:`ACTS_FROM`, for an effect may act in few of them,
+    and that one of them misses by :data:`REMAINS`, for near the noise neither is closer. `limit` is the largest median.
     """
     rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
     if min(np.sqrt(np.mean(values**2)) for values in rms) < MUCH:
         return True
     shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
-    pairs = [(replay.misfit("before", name), replay.misfit("after", name)) for replay, name in shown]
-    ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
-    changed = [ratio for ratio, (replay, name) in zip(ratios, shown, strict=True) if _differs(replay, name)]
+    changed = [
+        1.0 if before == after else after / before if np.isfinite(before) else 0.0
+        for replay, name in shown
+        if max(before := replay.misfit("before", name), after := replay.misfit("after", name)) > REMAINS
+        and _differs(replay, name)
+    ]
     return bool(changed and np.median(changed) < limit)
 
 
@@ -201,10 +208,6 @@ def worse_trials(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str
     pairs = [(replay.name, replay.misfit("before"), replay.misfit("after")) for replay in passed]
     return tuple(name for name, before, after in pairs if after > before + tolerance * max(before, 1.0))
 
-
-REMAINS = 1.5
-"""Misfit in noise units from which a remaining gap is reported (project choice): the misfit beyond the noise is
-then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 _BETTER = 0.05
 """A black box follows better if its misfit is smaller by this share (project choice), as in :func:`worse_trials`."""
