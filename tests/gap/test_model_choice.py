@@ -20,6 +20,7 @@ from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import (
     ALIKE,
     DOUBTFUL,
+    DOUBTFUL_IF_RIGHT,
     EVIDENCE_NEEDED,
     SAME_KIND_SHARE,
     STANDARD_ERRORS,
@@ -238,6 +239,14 @@ def test_effects_with_little_gain_next_to_others_are_doubtful(force, drag, doubt
     search = search_of_four(force, drag)
     assert doubtful_effects(search, search.fits[0]) == tuple(NAMES[place] for place in doubtful)
     assert doubtful_effects(search, next(one for one in search.fits if len(one.hypothesis.effects) == 1)) == ()
+
+
+@pytest.mark.parametrize(("gain", "doubtful"), [(DOUBTFUL_IF_RIGHT - 1, True), (DOUBTFUL_IF_RIGHT + 1, False)])
+def test_an_effect_that_makes_the_card_right_is_less_doubtful(gain: float, doubtful: bool) -> None:
+    """Without it the coefficients are off by twice their standard errors: simulations are as close either way."""
+    whole, without = fit(-2000, DRAG, LAG, width=0.4), fit(-2000 + gain, LAG, width=2.0)
+    search = Search(CALM, (whole, without, fit(0)), ())
+    assert doubtful_effects(search, whole) == ((NAMES[DRAG],) if doubtful else ())
 
 
 @pytest.mark.usefixtures("calm")

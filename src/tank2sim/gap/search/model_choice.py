@@ -46,9 +46,10 @@ LESS_WRONG = 0.5
 """Share of the coefficients' width below which a larger explanation makes a card right that is else off by more than
 its standard errors (project choice)."""
 
-DOUBTFUL = 60.0
-"""Gain below which one of several effects is judged by simulation as well (project choice: names that were wrong gained
-up to 46 next to others in made-up trials)."""
+DOUBTFUL, DOUBTFUL_IF_RIGHT = 60.0, 25.0
+"""Gains below which one of several effects is judged by simulation as well (project choice: names that were wrong
+gained up to 46 next to others in made-up trials); the second for an effect that makes the card right, for coefficients
+that are far off follow the trials as closely in its place."""
 
 LIKELY = 0.5
 """An effect less probable than this is not named alone (project choice): all explanations with at least
@@ -230,18 +231,20 @@ def decide_for(search: Search, larger: ExplanationFit, best: ExplanationFit, fal
 
 
 def doubtful_effects(search: Search, best: ExplanationFit) -> tuple[str, ...]:
-    """Effects of an explanation without which it scores worse by less than :data:`DOUBTFUL`, the smallest gain first.
+    """Effects of an explanation without which it scores worse by less than :data:`DOUBTFUL`, or by less than
+    :data:`DOUBTFUL_IF_RIGHT` where they make the card right; the smallest gain first.
 
     Empty for a single effect.
     """
-    effects = {*best.hypothesis.effects}
+    effects, doubt = {*best.hypothesis.effects}, _doubt(search, best)
     gains = {}
     for fit in search.fits:
         lacking = effects - {*fit.hypothesis.effects}
         if len(lacking) == 1 and 1 < len(effects) == len(fit.hypothesis.effects) + 1:
-            gains[lacking.pop()] = fit.score - best.score
-    largest = _doubt(search, best) * DOUBTFUL
-    return tuple(sorted((name for name in gains if gains[name] < largest), key=gains.__getitem__))
+            gain, right = fit.score - best.score, makes_the_card_right(best, fit)
+            if gain < doubt * (DOUBTFUL_IF_RIGHT if right else DOUBTFUL):
+                gains[lacking.pop()] = gain
+    return tuple(sorted(gains, key=gains.__getitem__))
 
 
 def _decision(search: Search, best: ExplanationFit, false_discovery: float) -> Decision:
