@@ -47,10 +47,10 @@ def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
     base = name.rstrip("u")
     if base not in inertial:
         return symbol
-    part = model.symbol(f"derivatives.{base}") - inertial[base]
+    whole = model.symbol(f"derivatives.{base}")
+    part = whole - inertial[base]
     if name == base:
         return part
-    whole = model.symbol(f"derivatives.{base}")
     return symbol * ca.fmin(2.0, ca.fmax(-2.0, part / ca.if_else(whole == 0, 1.0, whole)))
 
 

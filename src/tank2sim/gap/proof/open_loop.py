@@ -308,10 +308,10 @@ class Replayer:
                 misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=3 * _ROUNDS
             )
             unknown[free] = found.x
-            left = float(np.sqrt(np.mean(found.fun[: int(compared.sum())] ** 2)))
-            if not left < most:
+            remaining = float(np.sqrt(np.mean(found.fun[: int(compared.sum())] ** 2)))
+            if not remaining < most:
                 return None
-        return self._given_at(record, rows, unknown[size:]), unknown[:size], left
+        return self._given_at(record, rows, unknown[size:]), unknown[:size], remaining
 
     def _slopes_of_motion(
         self,
