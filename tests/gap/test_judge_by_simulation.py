@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from tank2sim.gap import workflow
+from tank2sim.cards import read_card
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.proof.improvement import NamedEffects, Proof
+from tank2sim.gap.proof.judge import Judge
 from tank2sim.gap.result import MISSING, NO_EFFECT_MISSING, Passed
 from tank2sim.gap.search import model_choice
 from tank2sim.gap.search.explanations import Search
@@ -16,6 +19,7 @@ from tests.gap.made_scores import CALM, DRAG, FORCE, FOUR, LAG, fit
 from tests.gap.toy import NAMES
 
 NOISE = 0.1
+CARD = read_card("mariner")
 
 
 def replay(misfit: float) -> Passed:
@@ -27,8 +31,15 @@ def replay(misfit: float) -> Passed:
     )
 
 
-def judged_with(decision, misfit: float) -> workflow._Judged:
-    return workflow._Judged(decision, [], SimpleNamespace(results=[replay(misfit)]))
+class Prover:
+    """Gives each explanation a proof with a misfit that a function of its effects states."""
+
+    def __init__(self, misfit: Callable[[tuple[str, ...]], float]):
+        self.misfit = misfit
+
+    def prove(self, best: ExplanationFit) -> Proof:
+        results = [replay(self.misfit(best.hypothesis.effects))]
+        return Proof((), NamedEffects(), CARD, CARD, results)
 
 
 @pytest.mark.parametrize(
@@ -41,17 +52,16 @@ def test_an_effect_with_little_gain_stays_only_if_simulations_are_closer_with_it
     monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
     misfits = {DRAG: without_drag, FORCE: without_force}
 
-    def judged(card, trials, found, decision, replays):
-        lacks = [place for place in FOUR if NAMES[place] not in decision.best.hypothesis.effects]
-        return judged_with(decision, misfits[lacks[0]] if lacks else 1.0)
+    def misfit(effects: tuple[str, ...]) -> float:
+        lacks = [place for place in FOUR if NAMES[place] not in effects]
+        return misfits[lacks[0]] if lacks else 1.0
 
-    monkeypatch.setattr(workflow, "_prove_decision", judged)
     lost = {DRAG: 15.0, FORCE: 20.0}  # of a gain of 2000, and the card would be wrong without
     threes = [fit(-2000 + less, *(one for one in FOUR if one != gone), width=2.0) for gone, less in lost.items()]
     found = Search(CALM, (fit(-2000, *FOUR, width=0.3), *threes, fit(-1000, 0, width=2.0), fit(0, width=2.5)), ())
     whole = decide(found)
     assert len(whole.best.hypothesis.effects) == len(FOUR)
-    decision = workflow._with_fewer(None, None, found, whole, None, 0.5).decision
+    decision = Judge(Prover(misfit), 0.5).with_fewer(found, whole).decision
     assert {*decision.best.hypothesis.effects} == {NAMES[place] for place in named}
     assert decision.verdict == MISSING
 
@@ -70,15 +80,12 @@ def test_an_effect_that_scores_nearly_as_well_as_none_is_named_if_simulations_ar
     monkeypatch, reached: float, closer: float, width: float, named: bool
 ) -> None:
     monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
-    monkeypatch.setattr(
-        workflow, "_prove_decision", lambda card, trials, found, decision, _: judged_with(decision, closer)
-    )
-    monkeypatch.setattr(workflow, "_most_are_closer", lambda before, after: True)
     found = Search(CALM, (fit(0, width=1.5), fit(8, 0, width=width)), ())
     none = decide(found)
     assert none.verdict == NO_EFFECT_MISSING
-    found_more = workflow._with_more(None, None, found, judged_with(none, reached), None, 0.5)
+    judge = Judge(Prover(lambda effects: closer if effects else reached), 0.5)
+    found_more = judge.with_more(found, judge.with_fewer(found, none))
     decision = found_more.decision
     assert decision.best.hypothesis.effects == ((NAMES[0],) if named else ())
     assert decision.verdict == (MISSING if named else NO_EFFECT_MISSING)
-    assert found_more.proof.results[0].misfit("after") == pytest.approx(closer if named else reached)
+    assert found_more.proof.misfit == pytest.approx(closer if named else reached)

@@ -23,10 +23,11 @@ from tank2sim.gap.inference.hypothesis import Hypothesis, TrialSurroundings
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.outcome.surroundings import fit_common_surroundings, fit_surroundings, with_surroundings
+from tank2sim.gap.proof.judge_surroundings import probabilities_by_simulation
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import MISSING, Gap, Surroundings
 from tank2sim.gap.search.explanations import search
-from tank2sim.gap.workflow import GapOptions, _probabilities_by_simulation, run_gap_workflow
+from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.trials import window, with_signals
 
@@ -202,10 +203,10 @@ def test_probabilities_by_simulation_are_those_of_the_misfits_and_of_the_numbers
         return SimpleNamespace(results=[replay] * len(fitted.trials))
 
     passages = sum(trial.time_s[-1] - trial.time_s[0] for trial in fitted.trials) * 7.7175 / 160.93
-    same = _probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(10.0)})
+    same = probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(10.0)})
     # Two numbers to each of three trials, half of their logarithm each, over TEMPER = 3.
     assert np.log(same[()] / same["wind",]) == pytest.approx(6 * np.log(passages) / 2 / 3, rel=1e-3)
-    closer = _probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(2.0)})
+    closer = probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(2.0)})
     gained = np.log(closer["wind",] / closer[()]) + np.log(same[()] / same["wind",])
     assert gained == pytest.approx(passages * np.log(5.0) / 3, rel=1e-3)
 

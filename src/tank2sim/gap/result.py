@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -387,4 +387,10 @@ class Gap:
         trials = [replay for replay in self.passed if replay.held_out == held_out]
         if not trials or (version == "black_box" and not all(trial.black_box for trial in trials)):
             return None
-        return float(np.sqrt(np.mean([trial.misfit(version) ** 2 for trial in trials])))
+        return misfit_of(trials, version)
+
+
+def misfit_of(results: Sequence[Passed], version: str, *, held_out: bool | None = None) -> float:
+    """Root mean square of the misfits of trials, noise units; of all, or of those held out or fitted."""
+    chosen = [result.misfit(version) for result in results if held_out is None or result.held_out == held_out]
+    return float(np.sqrt(np.mean(np.square(chosen))))

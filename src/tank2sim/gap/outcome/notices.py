@@ -1,0 +1,103 @@
+"""What a user should know of a gap besides the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.inference.wave_band import WaveBand
+from tank2sim.gap.outcome.refit import effects_like
+from tank2sim.gap.proof.cross_check import MUCH, trial_consistency, worse_trials
+from tank2sim.gap.proof.judge import Judged
+from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY, misfit_of
+from tank2sim.gap.search.model_choice import Strange
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.structures import structure_that_adds
+
+DOUBT = 1e-3
+"""Probability below which trials that disagree about a parameter are reported."""
+
+
+def gap_notices(
+    card: ManoeuvringCard,
+    judged: Judged,
+    agreement: Mapping[str, Mapping[str, tuple[float, float]]],
+    trials: tuple[Measured, Measured],
+    waves: WaveBand | None,
+) -> tuple[str, ...]:
+    """What a user should know besides the verdict, one sentence each.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        As given.
+    judged : Judged
+    agreement : mapping
+        Variable of an effect to the name of a trial to its value and standard error by this trial alone.
+    trials : tuple of Measured
+        Fitted ones and those held out, as given.
+    waves : WaveBand, optional
+        Found in the fitted trials.
+    """
+    decision, proof, withheld = judged.decision, judged.proof, judged.withheld
+    named = {name for name, *_ in proof.named.estimated}
+    fitted_to_held = tuple(proof.named.by_trial) if trials[1].trials else ()
+    notices = [*trials[0].notices, *trials[1].notices]
+    notices += [_of_waves(waves)] if waves else []
+    notices += [judged.by_simulation] if judged.by_simulation else []
+    notices += [_in_words(strange) for strange in decision.strange]
+    notices += [
+        f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
+        for names in withheld
+    ]
+    if fitted_to_held:
+        notices.append(
+            f"{' and '.join(fitted_to_held)} of the trials held out: fitted to each of them, two numbers to a "
+            "record; all else is as the fitting trials have it"
+        )
+    if card.effects:
+        have = ", ".join(entry.name for entry in card.effects)
+        notices.append(f"{have}: kept as on the card, and not sought")
+    remaining = misfit_of(proof.results, "after")
+    if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
+        notices.append(
+            f"the trials are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
+            "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+        )
+        if structure := structure_that_adds(card, decision.best.hypothesis.effects):
+            notices.append(
+                f"identify with --structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
+                "trials together with the hull's derivatives, from the card as it was given"
+            )
+    notices += [
+        f"{name}: the same to these trials as {coefficient.name}, which was refitted by {coefficient.moved:.2g} of its "
+        "standard errors"
+        for name, coefficient in effects_like(proof.coefficients, named).items()
+    ]
+    if decision.verdict in (MISSING, AMBIGUOUS):
+        notices += [
+            f"{name}: the improved card follows it worse than the given one" for name in worse_trials(proof.results)
+        ]
+    for variable, values in agreement.items():
+        if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
+            notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
+    return tuple(dict.fromkeys(notices))
+
+
+def _of_waves(waves: WaveBand) -> str:
+    speed, rate = waves.motion["motion.v"], np.rad2deg(waves.motion["motion.r"])
+    return (
+        f"waves or a swell with a period of {waves.period_s:.3g} s move the ship in the fitted trials (standard "
+        f"deviation {speed:.2g} m/s in sway, {rate:.2g} deg/s in yaw): counted as noise, not as a missing effect; "
+        f"{' and '.join(name for name, effect in EFFECTS.items() if effect.resonant)}, which they hide, is not sought"
+    )
+
+
+def _in_words(strange: Strange) -> str:
+    when = f"from {strange.begin_s:.0f} to {strange.end_s:.0f} s"
+    if strange.kind == "period":
+        return f"all trials: an oscillation with a period of {strange.begin_s:.3g} s that nothing in the library causes"
+    return f"{strange.trial}: {when} a motion of the ship that nothing in the library explains"

@@ -1,0 +1,166 @@
+"""The card with named effects, with coefficients fitted together with them where this helps, and its replays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.likelihood import Likelihood
+from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
+from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
+from tank2sim.gap.outcome.refit import refit_coefficients
+from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
+from tank2sim.gap.proof.replay import TrialReplays
+from tank2sim.gap.result import Passed, Refitted, misfit_of
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+
+BETTER = 0.05
+"""Share by which the misfit of the fitted trials must fall for coefficients to be refitted together with an effect
+(project choice): less, and the given ones are kept."""
+
+BETTER_FROM = 1.1
+"""Misfit in noise units of the fitted trials from which a refit of the coefficients is tried (project choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedEffects:
+    """Effects with their parameters, and the winds and currents of single trials."""
+
+    estimated: Sequence[Found] = ()
+    by_trial: ByTrial = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """An improved card, and all trials replayed by it and by the given one.
+
+    Parameters
+    ----------
+    trials : tuple of Measured
+        Fitted ones and those held out, in the winds and currents that were found for them.
+    named : NamedEffects
+        With the winds and currents of the trials held out as well.
+    base, improved : ManoeuvringCard
+        Without the effects, coefficients refitted where this follows the fitted trials better, and with them.
+    results : list of Passed
+        Fitted trials first.
+    coefficients : tuple of Refitted
+        Those of the base that differ from the given card's.
+    effect_alone : mapping
+        Misfit of the effects without refitted coefficients, noise units: ``fit`` and ``holdout``; empty where the
+        coefficients are the given ones.
+    """
+
+    trials: tuple[Measured, Measured]
+    named: NamedEffects
+    base: ManoeuvringCard
+    improved: ManoeuvringCard
+    results: list[Passed]
+    coefficients: tuple[Refitted, ...] = ()
+    effect_alone: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def misfit(self) -> float:
+        """Of the fitted trials with the improved card, noise units."""
+        return misfit_of(self.results, "after", held_out=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Prover:
+    """Proofs of explanations, by replays of trials.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        As given.
+    trials : tuple of Measured
+        Fitted ones and those held out.
+    likelihood : Likelihood
+        Of the fitted ones.
+    replays : TrialReplays
+    """
+
+    card: ManoeuvringCard
+    trials: tuple[Measured, Measured]
+    likelihood: Likelihood
+    replays: TrialReplays
+
+    def prove(self, best: ExplanationFit, named: NamedEffects | None = None) -> Proof:
+        """The card with the effects of an explanation, and with coefficients fitted together with them if fitted trials
+        are then followed better by :data:`BETTER`; replays by both cards.
+
+        Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
+
+        Parameters
+        ----------
+        best : ExplanationFit
+        named : NamedEffects, optional
+            Effects in place of those that the explanation estimates.
+        """
+        card = self.card
+        named = self._as_written(best) if named is None else named
+        proof = self._replayed(card, card, named)
+        if proof.misfit <= BETTER_FROM:
+            return proof
+        refitted, base = refit_coefficients(card, self.likelihood.none.model, self.likelihood.coefficients_with(best))
+        joint = self._replayed(card, base, proof.named)
+        if joint.misfit >= (1 - BETTER) * proof.misfit or not most_are_closer(proof.results, joint.results):
+            return proof
+        keys = {"fit": False, "holdout": True} if self.trials[1].trials else {"fit": False}
+        alone = {key: misfit_of(proof.results, "after", held_out=held) for key, held in keys.items()}
+        return replace(joint, coefficients=refitted, effect_alone=alone if named.estimated else {})
+
+    def _as_written(self, best: ExplanationFit) -> NamedEffects:
+        """The effects of an explanation as they are written on a card."""
+        if not best.hypothesis.effects:
+            return NamedEffects()
+        by_formula = self.likelihood.by_formula(best)
+        return NamedEffects(estimates(by_formula), surroundings_by_trial(by_formula, self.likelihood.motion.names))
+
+    def _replayed(self, card: ManoeuvringCard, base: ManoeuvringCard, named: NamedEffects) -> Proof:
+        """All trials by the given card and by a base with effects, in the winds and currents that were found."""
+        improved = add_effects_to_card(base, named.estimated)
+        trials, named = self._in_surroundings(improved, named)
+        sensors = sensor_faults(named.estimated)
+        results: list[Passed] = []
+        for group, held_out in zip(trials, (False, True), strict=True):
+            if group.trials:
+                results += self.replays.by_cards(card, improved, group, held_out, corrected(group, sensors))
+        return Proof(trials, named, base, improved, results)
+
+    def _in_surroundings(
+        self, card: ManoeuvringCard, named: NamedEffects
+    ) -> tuple[tuple[Measured, Measured], NamedEffects]:
+        """The trials in the winds and currents that were found for them, and those, with the ones of the trials held
+        out."""
+        if not named.by_trial:
+            return self.trials, named
+        fitted, held = self.trials
+        found = fit_surroundings(card, held, tuple(named.by_trial), self.replays.noise) if held.trials else {}
+        every = {name: {**values, **found.get(name, {})} for name, values in named.by_trial.items()}
+        return (with_surroundings(fitted, every), with_surroundings(held, every)), replace(named, by_trial=every)
+
+
+def most_are_closer(before: Sequence[Passed], after: Sequence[Passed]) -> bool:
+    """Whether at least half of the fitted trials are followed no worse: coefficients hold in all of them, and must not
+    follow what happened in one."""
+    pairs = [pair for pair in zip(before, after, strict=True) if not pair[0].held_out]
+    return bool(np.median([new.misfit("after") / old.misfit("after") for old, new in pairs]) <= 1.0)
+
+
+def sensor_faults(estimated: Sequence[Found]) -> list[Found]:
+    """Those of some effects that falsify what is measured, not what the ship does."""
+    return [effect for effect in estimated if EFFECTS[effect[0]].acts_on == "sensor"]
+
+
+def corrected(group: Measured, sensors: Sequence[Found]) -> Measured | None:
+    """Trials without the faults of their sensors; None without faults."""
+    if not sensors:
+        return None
+    return replace(group, trials=tuple(correct_sensor_faults(trial, sensors) for trial in group.trials))

@@ -1,0 +1,160 @@
+"""Winds and currents of single trials that free-running simulations name where scores from instant to instant do not.
+
+A weak force that lasts turns a ship within minutes and is not seen from instant to instant, where random forces of the
+same size explain it as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import softmax
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
+from tank2sim.gap.outcome.surroundings import CommonSurroundings, fit_common_surroundings
+from tank2sim.gap.proof.cross_check import MUCH, closes_gap
+from tank2sim.gap.proof.improvement import NamedEffects, Proof, Prover
+from tank2sim.gap.proof.judge import CLEARLY, Judged
+from tank2sim.gap.result import AMBIGUOUS, MISSING, Surroundings, misfit_of
+from tank2sim.gap.search.explanations import Search
+from tank2sim.gap.search.model_choice import LIKELY, TEMPER
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+
+PREDICTS = 0.5
+"""Share of the misfit of the second half of a trial that a wind or current fitted to its first half may leave, as the
+median over the trials, where it is named by simulation alone (project choice): two numbers to a trial imitate much
+else, without predicting what comes."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Simulated:
+    """A wind or current of each trial by free-running simulations.
+
+    Parameters
+    ----------
+    fit : ExplanationFit
+        With the values of the simulations.
+    proof : Proof
+    predicted : float
+        Share of the misfit of the second half of a trial that remains with what was fitted to its first half, median.
+    """
+
+    fit: ExplanationFit
+    proof: Proof
+    predicted: float
+
+    @property
+    def misfit(self) -> float:
+        """Of all trials, noise units."""
+        return misfit_of(self.proof.results, "after")
+
+
+def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Sequence[str]) -> Judged:
+    """The decision, or in its place a wind or current of each trial that simulations follow much more closely with.
+
+    Where the trials are still missed by far (:data:`.cross_check.MUCH`), each wind or current that was not recorded is
+    fitted to the free-running simulations. It is named if less than :data:`.judge.CLEARLY` of the misfit of the
+    decision is left, and if the first half of the trials predicts the second (:data:`PREDICTS`).
+
+    Parameters
+    ----------
+    prover : Prover
+    search : Search
+    judged : Judged
+    names : sequence of str
+        Effects that are sought.
+    """
+    reached = misfit_of(judged.proof.results, "after")
+    if reached <= MUCH or any(EFFECTS[name].surroundings for name, *_ in judged.proof.named.estimated):
+        return judged
+    tried = {name: one for name, one in _simulated(prover, search, names).items() if one.misfit < CLEARLY * reached}
+    if not tried:
+        return judged
+    best, *others = sorted(tried, key=lambda name: tried[name].misfit)
+    found = tried[best]
+    proofs: dict[tuple[str, ...], Proof] = {(): judged.proof}
+    proofs |= {(name,): one.proof for name, one in tried.items()}
+    alike = tuple(tried[name].fit for name in others if CLEARLY * tried[name].misfit < found.misfit)
+    decision = replace(
+        judged.decision,
+        verdict=AMBIGUOUS if alike else MISSING,
+        best=found.fit,
+        alike=alike,
+        probabilities=probabilities_by_simulation(prover.card, prover.trials[0], proofs),
+    )
+    if not alike and decision.confidence(best) < LIKELY:
+        return judged
+    by_simulation = (
+        f"{best}: named by free-running simulations, not from instant to instant; fitted to the first half of each "
+        f"trial, it leaves {found.predicted:.0%} of the misfit of the second half (median)"
+    )
+    return Judged(decision, found.proof, judged.withheld, by_simulation)
+
+
+def _simulated(prover: Prover, search: Search, names: Sequence[str]) -> dict[str, _Simulated]:
+    """Each wind or current that was not recorded, fitted to the simulations, where it predicts and closes the gap."""
+    fits = {fit.hypothesis.effects: fit for fit in reversed(search.fits)}
+    recorded = search.none.hypothesis.recorded
+    sought = [name for name in names if EFFECTS[name].surroundings and name not in recorded and (name,) in fits]
+    at_sea = [add_effects_to_card(prover.card, [(name, at_rest(name), {})]) for name in sought]
+    fitted, replays = prover.trials[0], prover.replays
+    each = map if replays.executor is None else replays.executor.map
+    arguments = at_sea, [fitted] * len(sought), sought, [dict(replays.noise)] * len(sought)
+    found = {}
+    for name, common in zip(sought, each(fit_common_surroundings, *arguments), strict=True):
+        predicted = float(np.median(common.predicted))
+        if predicted < PREDICTS:
+            fit = fits[name,]
+            named = NamedEffects([(name, common.values, common.errors)], {name: common.by_trial})
+            proof = prover.prove(fit, named)
+            if closes_gap(proof.results, CLEARLY):
+                found[name] = _Simulated(_at(fit, common, search.likelihood.motion.names), proof, predicted)
+    return found
+
+
+def _at(fit: ExplanationFit, common: CommonSurroundings, trials: Sequence[str]) -> ExplanationFit:
+    """A fit with the wind or current that simulations gave in the place of its own."""
+    parts = {
+        name: one.speed_mps * np.array([np.cos(one.direction_rad), np.sin(one.direction_rad)])
+        for name, one in common.by_trial.items()
+    }
+    mean = Surroundings.of_parts(np.mean(list(parts.values()), axis=0), np.zeros(2))
+    same = {"speed_mps": mean.speed_mps, "direction_rad": mean.direction_rad, **common.values}
+    theta = [
+        same.get(one.parameter.name, value) if one.run is None else parts[trials[one.run]][one.axis]
+        for one, value in zip(fit.hypothesis.estimated, fit.theta, strict=True)
+    ]
+    return replace(fit, theta=np.array(theta))
+
+
+def probabilities_by_simulation(
+    card: ManoeuvringCard, fitted: Measured, proofs: Mapping[tuple[str, ...], Proof]
+) -> dict[tuple[str, ...], float]:
+    """Probability of each explanation by the misfits of the fitted trials.
+
+    Their errors are of an unknown size and independent once in a passage of L/u0; an explanation has two numbers to a
+    trial, or none, which cost what Schwarz's criterion asks.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        For L/u0.
+    fitted : Measured
+        T trials.
+    proofs : mapping
+        Names of the winds and currents of an explanation to the replays with it, of the fitted trials first.
+    """
+    passage = card.ship.length_m / card.model.speed_mps
+    readings = np.array([(trial.time_s[-1] - trial.time_s[0]) / passage for trial in fitted.trials])
+    scores = []
+    for effects, proof in proofs.items():
+        misfits = np.array([result.misfit("after") for result in proof.results if not result.held_out])
+        numbers = 2 * len(fitted.trials) * len(effects)
+        scores.append(2 * readings @ np.log(np.maximum(misfits, 1.0)) + numbers * np.log(np.sum(readings)))
+    logs = -0.5 * np.array(scores) / TEMPER
+    return dict(zip(proofs, map(float, softmax(logs)), strict=True))
