@@ -243,22 +243,23 @@ class Likelihood:
         return Likelihood(moved, self.none, self.coefficients, self.belief, self.scale, self.without)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
-        """An explanation with the parameters that fit the measurements best without form errors.
+        """An explanation at its best without form errors, as a simulation uses its formulas.
 
-        A simulation uses the formula without form errors. The standard errors remain those with form errors.
+        The covariance of its parameters remains that with form errors.
         """
-        return replace(fit, theta=self._strict(fit)[1].theta)
+        return replace(
+            self._strict().at_best(fit.hypothesis, fit.theta, [fit.logs], BY_FORMULA), covariance=fit.covariance
+        )
 
-    def _strict(self, fit: ExplanationFit) -> tuple[Likelihood, ExplanationFit]:
-        """The likelihood without form errors, and an explanation at its best there."""
+    def _strict(self) -> Likelihood:
+        """The likelihood without form errors."""
         strict = copy(self)
         strict._forms = None
-        return strict, strict.at_best(fit.hypothesis, fit.theta, [fit.logs], BY_FORMULA)
+        return strict
 
-    def coefficients_with(self, fit: ExplanationFit) -> CoefficientEstimates:
-        """The card's coefficients that fit the measurements best together with an explanation, without form errors."""
-        strict, found = self._strict(fit)
-        seen, columns = strict._seen(found)
+    def coefficients_with(self, found: ExplanationFit) -> CoefficientEstimates:
+        """The card's coefficients that fit the measurements best together with an explanation of :meth:`by_formula`."""
+        seen, columns = self._strict()._seen(found)
         flat = seen.whiten(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])
         k, causes = columns.parameter_count, len(self.coefficients.mixing.T)
         weight = np.concatenate([found.hypothesis.prior[1], np.ones(flat.shape[1] - 1 - k)])

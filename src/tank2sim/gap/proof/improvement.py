@@ -103,25 +103,20 @@ class Prover:
         named : NamedEffects, optional
             Effects in place of those that the explanation estimates.
         """
-        card = self.card
-        named = self._as_written(best) if named is None else named
+        card, likelihood = self.card, self.likelihood
+        found = likelihood.by_formula(best)
+        if named is None:
+            named = NamedEffects(estimates(found), surroundings_by_trial(found, likelihood.motion.names))
         proof = self._replayed(card, card, named)
         if proof.misfit <= BETTER_FROM:
             return proof
-        refitted, base = refit_coefficients(card, self.likelihood.none.model, self.likelihood.coefficients_with(best))
+        refitted, base = refit_coefficients(card, likelihood.none.model, likelihood.coefficients_with(found))
         joint = self._replayed(card, base, proof.named)
         if joint.misfit >= (1 - BETTER) * proof.misfit or not most_are_closer(proof.results, joint.results):
             return proof
         keys = {"fit": False, "holdout": True} if self.trials[1].trials else {"fit": False}
         alone = {key: misfit_of(proof.results, "after", held_out=held) for key, held in keys.items()}
         return replace(joint, coefficients=refitted, effect_alone=alone if named.estimated else {})
-
-    def _as_written(self, best: ExplanationFit) -> NamedEffects:
-        """The effects of an explanation as they are written on a card."""
-        if not best.hypothesis.effects:
-            return NamedEffects()
-        by_formula = self.likelihood.by_formula(best)
-        return NamedEffects(estimates(by_formula), surroundings_by_trial(by_formula, self.likelihood.motion.names))
 
     def _replayed(self, card: ManoeuvringCard, base: ManoeuvringCard, named: NamedEffects) -> Proof:
         """All trials by the given card and by a base with effects, in the winds and currents that were found."""
