@@ -122,8 +122,11 @@ class CommonSurroundings:
 
 def fit_common_surroundings(
     card: ManoeuvringCard, measured: Measured, effect: str, noise: Mapping[str, float]
-) -> CommonSurroundings:
+) -> CommonSurroundings | None:
     """One effect of the surroundings with the coefficients of its forces, which are the same in all trials.
+
+    None where, with the usual coefficients, what is fitted to the first half of a trial makes the second half worse in
+    most of them: that would not be a wind or current.
 
     By least squares of the free-running simulations of all trials together. A trial weighs as many independent
     readings as its errors hold, in units of their own size; the coefficients are normal beforehand with the spreads of
@@ -158,7 +161,14 @@ def fit_common_surroundings(
     def parts(at: Array, place: int) -> Array:
         return at[len(names) + 2 * place :][:2]
 
-    at = np.concatenate([centre, *(trial.parts(model.parameter_values()) for trial in trials)])
+    def predicted(at: Array) -> Array:
+        p, absent = parameters(at), parameters(np.array(gone))
+        return np.array([trial.predicted(parts(at, place), p, absent) for place, trial in enumerate(trials)])
+
+    gone = [value if one.absent is None else one.absent for one, value in zip(shared, centre, strict=True)]
+    at = np.concatenate([centre, *(trial.parts(parameters(centre)) for trial in trials)])
+    if np.median(predicted(at)) >= 1:
+        return None
     weights = np.ones(len(trials))
 
     def residuals(at: Array) -> Array:
@@ -195,9 +205,6 @@ def fit_common_surroundings(
         if moved < _SETTLED:
             break
     errors = np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac)))
-    p = parameters(at)
-    gone = [value if one.absent is None else one.absent for one, value in zip(shared, centre, strict=True)]
-    absent = parameters(np.array(gone))
     return CommonSurroundings(
         effect,
         dict(zip(names, map(float, at), strict=False)),
@@ -206,7 +213,7 @@ def fit_common_surroundings(
             trial.name: Surroundings.of_parts(parts(at, place), parts(errors, place))
             for place, trial in enumerate(trials)
         },
-        np.array([trial.predicted(parts(at, place), p, absent) for place, trial in enumerate(trials)]),
+        predicted(at),
     )
 
 

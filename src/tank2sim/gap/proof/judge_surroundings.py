@@ -107,13 +107,13 @@ def _simulated(prover: Prover, search: Search, names: Sequence[str]) -> dict[str
     arguments = at_sea, [fitted] * len(sought), sought, [dict(replays.noise)] * len(sought)
     found = {}
     for name, common in zip(sought, each(fit_common_surroundings, *arguments), strict=True):
-        predicted = float(np.median(common.predicted))
-        if predicted < PREDICTS:
-            fit = fits[name,]
-            named = NamedEffects([(name, common.values, common.errors)], {name: common.by_trial})
-            proof = prover.prove(fit, named)
-            if closes_gap(proof.results, CLEARLY):
-                found[name] = _Simulated(_at(fit, common, search.likelihood.motion.names), proof, predicted)
+        if common is None or (predicted := float(np.median(common.predicted))) >= PREDICTS:
+            continue
+        fit = fits[name,]
+        named = NamedEffects([(name, common.values, common.errors)], {name: common.by_trial})
+        proof = prover.prove(fit, named)
+        if closes_gap(proof.results, CLEARLY):
+            found[name] = _Simulated(_at(fit, common, search.likelihood.motion.names), proof, predicted)
     return found
 
 
