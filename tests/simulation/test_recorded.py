@@ -203,6 +203,17 @@ def test_an_order_alone_is_executed_at_its_step(model):
     assert what.rudder_rate_radps is None
 
 
+def test_a_turn_by_its_order_alone_is_repeated_from_the_rudder_before_the_order(model):
+    """Not with the rudder over at once: 10 s at 3 deg/s, half of which count, are some 20 m of advance."""
+    whole = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 12.0), 240.0)
+    signals = {name: values for name, values in whole.signals.items() if name != "delta_rad"}
+    order = np.where(whole.time_s >= 12.0, np.deg2rad(30), 0.0)
+    what = recorded(replace(whole, signals={**signals, "delta_order_rad": order}), model)
+    assert what.start["initial.rudder_angle"] == 0.0
+    again = repeat(what, Integrator(model)).figures
+    assert again["advance_m"] == pytest.approx(what.figures["advance_m"], abs=1.0)
+
+
 @pytest.mark.parametrize("kind", ["turn", "zigzag"])
 def test_position_and_heading_are_enough(model, kind):
     """As a satellite receiver gives them, once a second."""

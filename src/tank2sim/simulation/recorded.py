@@ -29,7 +29,7 @@ from tank2sim.records.trials import Trial
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, rudder_of
+from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, rudder_before
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -172,7 +172,7 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
-    start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder_of(trial)))
+    start["initial.rudder_angle"] = rudder_before(trial, first)
     inputs = _fed(trial, model)
     if isinstance(manoeuvre, Turn):
         reading = _turn_reading_errors(track, float(values["ship.length"]))

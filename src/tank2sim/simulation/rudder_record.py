@@ -89,6 +89,15 @@ def rudder_of(trial: Trial) -> Array:
     return _held_order(trial.time_s, *order)
 
 
+def rudder_before(trial: Trial, held: HeldAngle) -> float:
+    """The rudder's angle at an execute, rad; the order of the row before where only orders are known, for an order
+    stands at once and the rudder follows."""
+    rudder = rudder_of(trial)
+    if held.rate is None:
+        return float(rudder[max(int(np.searchsorted(trial.time_s, held.execute_s)) - 1, 0)])
+    return float(np.interp(held.execute_s, trial.time_s, rudder))
+
+
 def _known(trial: Trial, name: str) -> tuple[Array, Array] | None:
     """Times and values (m,) of the readings of a signal; None if there are none."""
     values = trial.signals.get(name)
