@@ -52,7 +52,12 @@ def test_trials_that_got_worse_are_named() -> None:
     [
         ([(90, 1), (80, 2)], True),
         ([(90, 89), (80, 81)], False),  # nothing is any nearer
-        ([(2.0, 2.0), (1.5, 1.5)], True),  # noise is most of it
+        ([(1.1, 1.15), (1.0, 1.0)], True),  # all of it is noise
+        ([(2.0, 2.0), (1.5, 1.5)], False),
+        ([(1.66, 1.66)], False),
+        ([(2.56, 3.7)], False),
+        ([(2.56, 1.4)], True),
+        ([(700, 2000), (10, 8), (10, 8)], False),  # most are closer, and all together further away
         ([(90, 89), (90, 10), (90, 10)], True),  # one trial has something more
         ([(90, 10), (90, 89), (90, 91)], False),
         ([(math.inf, 5), (math.inf, 4)], True),  # a simulation that ran away is caught

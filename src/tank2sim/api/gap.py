@@ -385,7 +385,7 @@ def find_gap(
     ship = nonlinear_card(as_ship(card).card)
     options = gap_options(effects, without, max_effects, workers, false_discovery)
     with _workers(executor, workers) as pool:
-        fitted, held = fitted_and_held(trials, holdout, ship)
+        fitted, held = fitted_and_held(trials, holdout, ship, report_unused=False)  # a search uses them
         fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
         return GapResult(run_workflow(ship, fitted, held, options, progress, pool), fitted, held)
 

@@ -178,8 +178,12 @@ def _files_and_records(given: TrialPaths) -> list[TrialRecord | Path]:
     return found
 
 
-def fitted_and_held(trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCard) -> tuple[Measured, Measured]:
+def fitted_and_held(
+    trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCard, *, report_unused: bool = True
+) -> tuple[Measured, Measured]:
     """Trials to be fitted and those of `holdout`, at the size of the card's ship.
+
+    `report_unused`: whether a notice says that a wind or depth was measured which no effect of the card uses.
 
     Raises
     ------
@@ -192,7 +196,8 @@ def fitted_and_held(trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCa
     from tank2sim.identification.trials.problem.signatures import fitted_as
     from tank2sim.records.same_record import refuse_copies
 
-    fitted, held = measured(trials_of(trials), card), measured(trials_of(holdout), card)
+    groups = (trials_of(trials), trials_of(holdout))
+    fitted, held = (measured(group, card, report_unused=report_unused) for group in groups)
     if not fitted.trials:
         raise InputError("trials", "", "is empty", "give a file of a trial or a folder with trials")
     for trial in held.trials:

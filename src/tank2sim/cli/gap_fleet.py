@@ -157,7 +157,7 @@ def _read(course: _Course) -> Iterator[ShipTask]:
     for ship in course.wanted:
         try:
             card = nonlinear_card(read_card(ship.card))
-            yield ShipTask(ship, card, *fitted_and_held(ship.trials, ship.holdout, card))
+            yield ShipTask(ship, card, *fitted_and_held(ship.trials, ship.holdout, card, report_unused=False))
         except InputError as error:
             course.faults[ship.name] = str(error)
 

@@ -126,7 +126,8 @@ def run_gap_workflow(
     Raises
     ------
     InputError
-        A trial is too short or measures too little, or a requested effect cannot be tried on this card.
+        A trial is too short or measures too little, a requested effect cannot be tried on this card, or the card's
+        forces along the measured motion are not finite.
     """
     options = options or GapOptions()
     given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
@@ -135,7 +136,12 @@ def run_gap_workflow(
         fitted, held = _without_heel(fitted), _without_heel(held)
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
-        gap, trials = _search_once(card, (fitted, held), options, progress, pool)
+        try:
+            gap, trials = _search_once(card, (fitted, held), options, progress, pool)
+        except FloatingPointError as error:
+            problem = f"gives no finite forces along the motion of the trials ({error})"
+            remedy = "check the units of its numbers and of the trials' columns"
+            raise InputError(card.source, "", problem, remedy) from None
         without = gap.base
         while _seeks_more(gap, options):
             named = tuple(effect.name for effect in gap.effects)
@@ -147,7 +153,10 @@ def run_gap_workflow(
             simpler = [name for effect in known for name in EFFECTS[effect].includes]
             excluded = (*options.without, *known, *simpler)
             more = replace(options, effects=wanted, without=excluded, max_effects=most)
-            further, found_trials = _search_once(gap.improved, trials, more, progress, pool, without)
+            try:
+                further, found_trials = _search_once(gap.improved, trials, more, progress, pool, without)
+            except FloatingPointError:
+                break
             if not _adds(gap, further, 1 - options.false_discovery):
                 break
             both = combine_passes(gap, further)

@@ -94,6 +94,28 @@ def test_wind_that_the_card_cannot_take_is_reported(tmp_path: Path, card: Manoeu
     rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
     one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
     assert any("wind was measured" in notice for notice in measured([one], card).notices)
+    assert not measured([one], card, report_unused=False).notices
+
+
+@pytest.mark.parametrize(
+    ("rpm", "speed", "refused"), [(84.0, 7.7, False), (1.4, 7.7, True), (5040.0, 7.7, True), (3.0, 3.6, False)]
+)
+def test_revolutions_of_another_unit_than_the_cards_are_refused(
+    tmp_path: Path, card: ManoeuvringCard, rpm: float, speed: float, refused: bool
+) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},{speed + 0.001 * t},{rpm + 0.001 * t}\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,n_rpm", rows)
+    text = (
+        card.text if "[propulsion]" in card.text else card.text + "\n[propulsion]\nnominal_rpm = 84.0\nXnn = 0.0005\n"
+    )
+    driven = parse_card(text, "ship.toml")
+    assert isinstance(driven, ManoeuvringCard)
+    if refused:
+        with pytest.raises(InputError, match=r"rpm") as raised:
+            measured([one], driven)
+        assert raised.value.place == "column of the revolutions"
+    else:
+        assert len(measured([one], driven).trials) == 1
 
 
 def test_wind_is_reported_to_be_unused_by_the_effects_that_a_card_has_and_not_by_how_many(

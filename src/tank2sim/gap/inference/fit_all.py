@@ -173,11 +173,15 @@ def thetas_of(fit: ExplanationFit) -> dict[str, Array]:
 
 
 def _fit(likelihood: Likelihood, hypotheses: HypothesisCache, proposal: Proposal) -> ExplanationFit:
-    effects = proposal.effects
+    """The fit of a proposal; with an infinite score where its forces along the measured motion are not finite."""
+    effects, starts = proposal.effects, proposal.starts
     theta = np.concatenate([np.zeros(0), *(proposal.thetas[effect] for effect in effects)])
-    return likelihood.at_best(
-        hypotheses(*effects, each=proposal.each), theta, proposal.starts, proposal.rounds, proposal.limit
-    )
+    hypothesis = hypotheses(*effects, each=proposal.each)
+    try:
+        return likelihood.at_best(hypothesis, theta, starts, proposal.rounds, proposal.limit)
+    except FloatingPointError:
+        nothing = np.zeros(len(likelihood.coefficients.names))
+        return ExplanationFit(hypothesis, theta, np.zeros((len(theta), len(theta))), starts[0], np.inf, nothing)
 
 
 _LIKELIHOODS: dict[str, tuple[Likelihood, HypothesisCache]] = {}

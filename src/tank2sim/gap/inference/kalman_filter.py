@@ -101,12 +101,13 @@ def linear_filter(by_state: Array, reading: Array, known: _Truths, block_s: floa
     """
     A = by_state * block_s / 2**DOUBLINGS
     eye = np.eye(6)
-    square = A @ A
-    transition = eye + A + square / 2 + square @ A / 6
-    spreading = eye + A / 2 + square / 6
-    for _ in range(DOUBLINGS):
-        spreading = 0.5 * (spreading + transition @ spreading)
-        transition = transition @ transition
+    with np.errstate(over="ignore", invalid="ignore"):  # forces without bounds are refused by the likelihood
+        square = A @ A
+        transition = eye + A + square / 2 + square @ A / 6
+        spreading = eye + A / 2 + square / 6
+        for _ in range(DOUBLINGS):
+            spreading = 0.5 * (spreading + transition @ spreading)
+            transition = transition @ transition
     return Linear(
         np.ascontiguousarray(transition),
         np.ascontiguousarray(spreading),

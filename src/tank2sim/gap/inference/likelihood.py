@@ -307,6 +307,11 @@ class Likelihood:
             Number of iterations on the noise (L-BFGS) after each solution for the parameters.
         limit : float
             With a score above this at the best of the given noises, the noise is not estimated.
+
+        Raises
+        ------
+        FloatingPointError
+            The model's forces along the measured motion are not finite at `theta`.
         """
         fit = ExplanationFit(hypothesis, theta, np.zeros((len(theta), len(theta))), starts[0], np.inf, np.zeros(0))
         for turn, count in enumerate(rounds):
@@ -340,9 +345,17 @@ class Likelihood:
         low, high = hypothesis.bounds
         seen = self._observer(linear, fit)
         best: ExplanationFit | None = None
+        move = np.zeros(len(theta))
         for _ in range(steps if len(theta) else 1):
             at = replace(fit, theta=theta)
-            solved = self._solved(at, seen, self.columns(hypothesis, theta, coefficients))
+            try:
+                solved = self._solved(at, seen, self.columns(hypothesis, theta, coefficients))
+            except FloatingPointError:
+                if best is None:
+                    raise
+                move = 0.3 * move
+                theta = np.clip(best.theta + move, low, high)
+                continue
             found = replace(
                 at,
                 covariance=solved.covariance,
@@ -482,7 +495,10 @@ class Likelihood:
 
     def _solved(self, fit: ExplanationFit, seen: Observer, columns: FilterColumns, *, free: bool = False) -> _Solved:
         """Least squares over the parameters' and coefficients' columns, the parameters within their bounds; the cost of
-        the residual is at the parameters of `fit`, or at the solution if `free`. The columns are without its width."""
+        the residual is at the parameters of `fit`, or at the solution if `free`. The columns are without its width.
+
+        Raises FloatingPointError where the model's forces along the measured motion are not finite.
+        """
         hypothesis, theta = fit.hypothesis, fit.theta
         whitened = seen.whiten(columns.driving, columns.shown)
         flat = whitened.reshape(-1, whitened.shape[-1])
@@ -492,6 +508,8 @@ class Likelihood:
         mean, precision = hypothesis.prior
         weight = np.diag(np.concatenate([precision, np.ones(gram.shape[0] - 1 - k)]))
         normal = gram[1:, 1:] + weight
+        if not np.isfinite(gram).all():
+            raise FloatingPointError(f"{', '.join(hypothesis.effects) or 'the card'}: forces are not finite")
         pull = -gram[1:, 0] - np.concatenate([precision * (theta - mean), np.zeros(gram.shape[0] - 1 - k)])
         size = np.sqrt(np.diag(normal))
         size[size == 0] = 1.0  # the shape of an absent effect has no column

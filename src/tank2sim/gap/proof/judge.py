@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.proof.cross_check import MUCH, closes_gap
+from tank2sim.gap.proof.cross_check import MUCH, NEAR_NOISE, closes_gap
 from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, most_are_closer
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Passed, misfit_of
 from tank2sim.gap.search.explanations import Search
@@ -22,10 +22,6 @@ from tank2sim.gap.search.model_choice import (
 
 TRIES = 4
 """Explanations that are simulated at most, one after the other (project choice)."""
-
-NEAR_NOISE = 1.2
-"""Misfit in noise units of the fitted trials up to which a name is not compared with coefficients alone (project
-choice): many coefficients follow a few trials a little better than they should."""
 
 DECISIVE = 40.0
 """Difference of the scores of "none" and of a name (-2 log probability) from which simulations with coefficients alone
@@ -123,8 +119,8 @@ class Judge:
         """The same, or a decision for one effect more, which scores as well and is followed more closely.
 
         That is, the fitted trials are missed by less than :data:`CLEARLY` of what they were, where this is not near the
-        noise (:data:`NEAR_NOISE`); or by :data:`.improvement.BETTER` less, where the coefficients of the card would
-        else be off by more than their standard errors.
+        noise (:data:`.cross_check.NEAR_NOISE`); or by :data:`.improvement.BETTER` less, where the coefficients of the
+        card would else be off by more than their standard errors.
         """
         decision, reached = judged.decision, judged.proof.misfit
         if decision.verdict == OUTSIDE_LIBRARY:

@@ -114,6 +114,11 @@ def search(
         Effects to try; by default all that can be tried.
     most : int
         Effects together, at least 1.
+
+    Raises
+    ------
+    FloatingPointError
+        Forces along the measured motion are not finite with the best explanation.
     """
     hypotheses = HypothesisCache(likelihood.none, likelihood.motion)
     believed = likelihood.belief.logs

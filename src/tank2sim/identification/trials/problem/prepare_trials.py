@@ -28,6 +28,11 @@ FARTHEST_FROUDE = 2.5
 """A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
 
 
+FARTHEST_REVOLUTIONS = 10.0
+"""A trial whose largest revolutions differ from the card's nominal ones by more than this factor, although the ship is
+near the card's speed, has them in another unit (project choice; of revolutions a second and a minute it is 60)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Trials at the size of the ship, and captive tests of a model of it where there are any.
@@ -49,7 +54,7 @@ class Measured:
     captive: CaptiveRuns | None = None
 
 
-def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
+def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unused: bool = True) -> Measured:
     """Read trials, make the audit's safe repairs, and scale them to the card's ship.
 
     Parameters
@@ -58,13 +63,15 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
         Files, or trials as they were read.
     card : ManoeuvringCard
         Of the ship.
+    report_unused : bool
+        Whether a notice says that a wind or depth was measured which no effect of the card uses.
 
     Raises
     ------
     InputError
         A file has an error, the audit finds a fault that it cannot repair, two trials share a name or a record, a trial
-        is of another size without stating its scale, or the rudder's angle is known in some trials and only its order
-        in others.
+        is of another size without stating its scale, its revolutions and the card's are of different units, or the
+        rudder's angle is known in some trials and only its order in others.
     """
     trials, notices = [], []
     for item in given:
@@ -76,8 +83,10 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
             notices.append(f"{path.name}: {finding.column}: {finding.what}; {done}: {finding.likely_truth}")
         if not set(RUDDERS) & set(trial.signals):
             raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
-        notices += _unused(trial, card)
+        notices += _unused(trial, card) if report_unused else []
+        notices += _gaps_of_rudder(trial)
         scaled, factor = at_size_of(trial, card)
+        _refuse_other_revolutions(scaled, card)
         if factor != 1:
             notices.append(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long")
         trials.append(scaled)
@@ -103,7 +112,7 @@ def _refuse_open(finding: Finding) -> None:
 
 
 def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
-    """Notices of the parts of a trial that are not used."""
+    """Notices of the signals of a trial that are not used."""
     notices = []
     for name, effect in EFFECTS.items():
         signals = set(effect.measured_as.values())
@@ -111,13 +120,32 @@ def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
             notices.append(
                 f"{trial.path.name}: {name} was measured, and the card has no effect {name!r} that would use it"
             )
+    return notices
+
+
+def _gaps_of_rudder(trial: Trial) -> list[str]:
+    """A notice of rows without a rudder."""
     rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
     empty = 0 if rudder is None else int(np.isnan(rudder).sum())
-    if empty:
-        notices.append(
-            f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings"
+    if not empty:
+        return []
+    return [f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings"]
+
+
+def _refuse_other_revolutions(trial: Trial, card: ManoeuvringCard) -> None:
+    """Refuse a trial whose revolutions are of another unit than the card's, at a speed near the card's."""
+    nominal = card.propulsion.nominal_radps if card.propulsion else None
+    revolutions, speed = trial.signals.get("n_radps"), approach_speed(trial)
+    if not nominal or revolutions is None or speed is None or np.isnan(revolutions).all():
+        return
+    largest = float(np.nanmax(np.abs(revolutions)))
+    near = 0.5 < speed / card.model.speed_mps < 2.0
+    if near and largest > 0 and abs(math.log(largest / nominal)) > math.log(FARTHEST_REVOLUTIONS):
+        rpm = 30 / math.pi
+        problem = (
+            f"reaches {largest * rpm:.3g} rpm at {speed:.3g} m/s, and the card's nominal_rpm is {nominal * rpm:.3g}"
         )
-    return notices
+        raise InputError(trial.path, "column of the revolutions", problem, "give both in revolutions a minute")
 
 
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
