@@ -190,6 +190,8 @@ def _explore(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
     if len(best.hypothesis.effects) < min(most, 2):
         _fit_more(fitting, best, every)
     fitting.fit(_proposals(fitting, proposed, starts, least=1, limit=best.score + _FAR))
+    if (now := fitting.best()).hypothesis.effects != best.hypothesis.effects and len(now.hypothesis.effects) < most:
+        _fit_more(fitting, now, every)
     if not fitting.has(2) or fitting.best(2).score > fitting.best(1).score - WORTH:
         return
     pair = fitting.best(2)

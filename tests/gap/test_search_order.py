@@ -1,0 +1,62 @@
+"""Which explanations a search asks for, on scores typed by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from tank2sim.gap.search import explanations
+from tank2sim.gap.search.screening import Screened
+from tests.gap.made_scores import DRAG, fit
+from tests.gap.toy import NAMES
+
+
+class Fitting:
+    """Explanations whose scores are typed, found when they are asked for."""
+
+    def __init__(self, scores: dict[tuple[int, ...], float], known: tuple[tuple[int, ...], ...]):
+        self.scores, self.likelihood = scores, SimpleNamespace(belief=SimpleNamespace(logs=None, waves=None))
+        self.found = {fit(scores[places], *places).hypothesis.effects: fit(scores[places], *places) for places in known}
+
+    def best(self, count: int | None = None):
+        fits = [one for one in self.found.values() if count is None or len(one.hypothesis.effects) == count]
+        return min(fits, key=lambda one: one.score)
+
+    def has(self, count: int) -> bool:
+        return any(len(effects) == count for effects in self.found)
+
+    def fit(self, proposals) -> None:
+        for proposal in proposals:
+            places = tuple(NAMES.index(name) for name in proposal.effects)
+            self.found[proposal.effects] = fit(self.scores[places], *places)
+
+
+@pytest.mark.parametrize("first", [(0, DRAG), (DRAG,)])
+def test_more_is_sought_next_to_a_single_effect_that_takes_the_place_of_the_best(monkeypatch, first) -> None:
+    """Else the two others of three effects are never tried where a wrong pair was best first."""
+    scores = {(): 0.0, (0, DRAG): -500.0, (DRAG,): -400.0, (0,): -600.0}
+    fitting = Fitting(scores, ((), first))
+    asked: list[tuple[str, ...]] = []
+
+    class Screen:
+        def __init__(self, *given) -> None: ...
+
+        def singles(self):
+            return [Screened({NAMES[0]: None}, 600.0)]
+
+        def pairs(self):
+            return []
+
+    monkeypatch.setattr(explanations, "Screen", Screen)
+    monkeypatch.setattr(
+        explanations,
+        "_proposals",
+        lambda fitting, screened, *_, **__: [SimpleNamespace(effects=tuple(one.thetas)) for one in screened],
+    )
+    monkeypatch.setattr(explanations, "_fit_more", lambda fitting, best, every: asked.append(best.hypothesis.effects))
+    monkeypatch.setattr(explanations, "_on_top_of", lambda *given: [])
+    monkeypatch.setattr(explanations, "thetas_of", lambda one: {})
+    explanations._explore(fitting, (), 4)
+    assert asked[-1] == (NAMES[0],)
+    assert ((NAMES[DRAG],) in asked) == (first == (DRAG,))
