@@ -12,9 +12,9 @@ from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
 from tank2sim.gap.inference.prior import likelihood_from_card
-from tank2sim.gap.search.detection_limit import SIZES, SURE, could_hide
+from tank2sim.gap.search.detection_limit import SIZES, SURE, _beyond_rest, could_hide
 from tank2sim.gap.search.explanations import Search
-from tank2sim.gap.search.screening import variants
+from tank2sim.gap.search.screening import resized, variants
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.identification.trials import made_up_ship
 
@@ -60,6 +60,17 @@ def test_what_could_hide_goes_with_the_root_of_what_is_enough(card) -> None:
             assert higher[name][parameter] >= 0.99 * much / little * size, name  # louder noises hide more of more
             assert higher[name][parameter] < 1.6 * much / little * size, name
     assert set(limits["current"]) == {"speed_mps"} and set(limits) == set(HIDDEN)
+
+
+def test_half_a_small_wind_adds_half_the_force_beyond_still_air(card) -> None:
+    """Still air slows a ship without any wind: that does not show a wind."""
+    likelihood = judged(card)
+    variant = variants(likelihood, Hypothesis(card, "angle", ["wind"]))[0]
+    small, half = (
+        np.linalg.norm(_beyond_rest(likelihood, resized(likelihood, variant, np.array([share]))).driving)
+        for share in (0.1, 0.05)
+    )
+    assert 1.8 < small / half < 2.2
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import norm
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
@@ -58,7 +59,9 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
     """
     likelihood = search.likelihood
     sized = [
-        variant for variant in search.variants if variant.amplitudes and variant.effect not in best.hypothesis.effects
+        _beyond_rest(likelihood, variant)
+        for variant in search.variants
+        if variant.amplitudes and variant.effect not in best.hypothesis.effects
     ]
     for _ in range(_ROUNDS):
         shares = _shares(likelihood, [best], sized, enough)
@@ -83,7 +86,20 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
 
 def _at_its_size(likelihood: Likelihood, variant: Variant, shares: Array) -> Variant:
     """The variant at the size at which it shows, if that differs from its own."""
-    return resized(likelihood, variant, shares) if np.any(np.abs(np.log(shares)) > np.log(_NEAR)) else variant
+    if np.all(np.abs(np.log(shares)) <= np.log(_NEAR)):
+        return variant
+    return _beyond_rest(likelihood, resized(likelihood, variant, shares))
+
+
+def _beyond_rest(likelihood: Likelihood, variant: Variant) -> Variant:
+    """The variant without what it adds where its wind or current is none: still air slows a ship as well."""
+    if not EFFECTS[variant.effect].surroundings:
+        return variant
+    at_rest = variant.theta.copy()
+    for place in variant.amplitudes:
+        at_rest[place] = variant.hypothesis.estimated[place].parameter.absent
+    driving, shown = likelihood.added(variant.hypothesis, at_rest)
+    return replace(variant, driving=variant.driving - driving[..., None], shown=variant.shown - shown[..., None])
 
 
 def _louder(likelihood: Likelihood, best: ExplanationFit) -> Iterator[ExplanationFit]:
