@@ -391,6 +391,15 @@ class Gap:
 
 
 def misfit_of(results: Sequence[Passed], version: str, *, held_out: bool | None = None) -> float:
-    """Root mean square of the misfits of trials, noise units; of all, or of those held out or fitted."""
+    """Root mean square of the misfits of trials, noise units.
+
+    Parameters
+    ----------
+    results : sequence of Passed
+    version : str
+        As in :meth:`Passed.misfit`.
+    held_out : bool, optional
+        Of the trials held out, or of the fitted ones; by default of all.
+    """
     chosen = [result.misfit(version) for result in results if held_out is None or result.held_out == held_out]
     return float(np.sqrt(np.mean(np.square(chosen))))

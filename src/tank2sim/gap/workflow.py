@@ -282,6 +282,8 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
 def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
     """The results that follow from the decision."""
     card, (fitted, held), replays = prover.card, prover.trials, prover.replays
+    without = found.likelihood.without
+    given = card if without is None else without.card  # before an earlier search
     decision, proof = _with_verdict_of_coefficients(judged.decision, judged.proof), judged.proof
     estimated = proof.named.estimated
     box = _begin_black_box(card, proof, replays)
@@ -317,7 +319,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         could_hide=hidden,
         agreement=agreement,
         next_test=_next(card, found, decision, replays.noise),
-        notices=gap_notices(card, replace(judged, decision=decision), agreement, prover.trials, waves),
+        notices=gap_notices(given, replace(judged, decision=decision), agreement, prover.trials, waves),
     )
 
 

@@ -90,8 +90,8 @@ def rudder_of(trial: Trial) -> Array:
 
 
 def rudder_before(trial: Trial, held: HeldAngle) -> float:
-    """The rudder's angle at an execute, rad; the order of the row before where only orders are known, for an order
-    stands at once and the rudder follows."""
+    """The rudder's angle at an execute, rad; where only orders are known, the order of the row before: the rudder moves
+    after its order."""
     rudder = rudder_of(trial)
     if held.rate is None:
         return float(rudder[max(int(np.searchsorted(trial.time_s, held.execute_s)) - 1, 0)])

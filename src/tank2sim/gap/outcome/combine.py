@@ -41,9 +41,9 @@ def combine_passes(first: Gap, further: Gap) -> Gap:
         base=further.base if further.coefficients else first.base,
         effects=(*(_updated(effect, refitted) for effect in first.effects), *further.effects),
         coefficients=coefficients or first.coefficients,
-        effect_alone={**further.effect_alone, **first.effect_alone},
+        effect_alone={},  # of all effects together without coefficients no simulation was made
         alternatives=tuple(alternatives),
-        rivals=first.rivals,
+        rivals=tuple(replace(rival, effects=(*named, *rival.effects)) for rival in further.rivals),
         where=first.where,
         equation=first.equation,
         passed=tuple(_joined(*pair) for pair in zip(first.passed, further.passed, strict=True)),
@@ -87,7 +87,8 @@ def _of_names(first: Gap, further: Gap) -> list[str]:
     names = (" and ".join(effect.name for effect in gap.effects) for gap in (first, further))
     before, after = names
     return [
-        f"{after}: found on the card improved by {before}, which left more than noise; rivals are those of {before}"
+        f"{after}: found on the card improved by {before}, which left more than noise; explanations were compared next "
+        f"to {before}, whose probability is that of the first search"
     ]
 
 

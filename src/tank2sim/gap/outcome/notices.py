@@ -64,7 +64,7 @@ def gap_notices(
     remaining = misfit_of(proof.results, "after")
     if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
         notices.append(
-            f"the trials are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
+            f"all trials together are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
             "coefficients that are off, or something more that is missing; the standard errors do not cover it"
         )
         if structure := structure_that_adds(card, decision.best.hypothesis.effects):

@@ -222,12 +222,33 @@ _BETTER = 0.05
 """A black box follows better if its misfit is smaller by this share (project choice), as in :func:`worse_trials`."""
 
 
-def proof_cautions(gap: Gap) -> tuple[str, ...]:
-    """Objections to a name: the remaining share of the gap, and a mere refit that follows better.
+IMPOSSIBLE = 10.0
+"""Standard errors of the given card beyond which a coefficient is not off by chance (project choice: those of cards
+whose errors are true move by up to 4)."""
 
-    Both are of the held-out trials, or of the fitting ones where none was held out. The share that remains is the
-    root of the mean square beyond the noise after, over that before.
+
+def proof_cautions(gap: Gap) -> tuple[str, ...]:
+    """Objections to a verdict: coefficients further off than their errors allow, the remaining share of the gap, and a
+    mere refit that follows better.
+
+    The last two are of a name, by the held-out trials, or by the fitting ones where none was held out. The share that
+    remains is the root of the mean square beyond the noise after, over that before.
     """
+    return (*_impossible_coefficients(gap), *_cautions_of_name(gap))
+
+
+def _impossible_coefficients(gap: Gap) -> tuple[str, ...]:
+    farthest = max(gap.coefficients, key=lambda coefficient: coefficient.moved, default=None)
+    if farthest is None or farthest.moved < IMPOSSIBLE:
+        return ()
+    return (
+        f"{farthest.name} is {farthest.moved:.0f} of its standard errors from the given card: the card may be of "
+        "another ship or loading, have a number or sign in another unit or convention, or state errors that are too "
+        "small; what is named may stand for that",
+    )
+
+
+def _cautions_of_name(gap: Gap) -> tuple[str, ...]:
     held = any(replay.held_out for replay in gap.passed)
     before, after, box = (gap.misfit(version, held_out=held) for version in ("before", "after", "black_box"))
     if gap.verdict not in (MISSING, AMBIGUOUS) or not gap.effects or before is None or after is None:

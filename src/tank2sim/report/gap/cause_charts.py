@@ -165,8 +165,8 @@ def _explained(lacking: Json) -> alt.LayerChart:
     return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
 
 
-_LINES = "split(replace(datum.label, ' + ', '|+ '), '|')"
-"""Labels of two effects in two lines."""
+_LINES = r"split(replace(datum.label, / \+ /g, '|+ '), '|')"
+"""Labels of several effects with a line for each: a narrow page has no room for more."""
 
 
 def _bars(
@@ -180,13 +180,12 @@ def _bars(
     x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **scale_options))
     ticks = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
     x = x.axis(**({"values": ticks} if kind == "symlog" else {"tickCount": 4}))
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelExpr=_LINES, labelLimit=200, ticks=False))
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelExpr=_LINES, labelLimit=150, ticks=False))
     base = Chart(data(rows)).encode(x=x, y=y)
     bars = base.mark_bar(height=11, opacity=0.75, clip=True)
     texts = base.mark_text(align="left", dx=5, fontSize=10.5, style="reference").encode(text="text:N")
-    return alt.layer(bars, texts).properties(
-        width=width, height=(32 if any(" + " in name for name in names) else 22) * max(1, len(rows))
-    )
+    lines = max((name.count(" + ") + 1 for name in names), default=1)
+    return alt.layer(bars, texts).properties(width=width, height=(10 + 12 * lines) * max(1, len(rows)))
 
 
 def rival_chart(found: Json, *, title: str = "") -> alt.LayerChart | None:

@@ -31,7 +31,6 @@ from tank2sim.report.gap.text import (
     as_percent,
     effect_in_words,
     effects_of,
-    found_in_words,
     meaning,
     or_nan,
     parameter_cells,
@@ -39,6 +38,7 @@ from tank2sim.report.gap.text import (
     sizes_of_candidates,
     trial_name,
     verdict_context,
+    verdict_in_words,
     with_error,
 )
 from tank2sim.report.kit.json_values import Json
@@ -87,7 +87,6 @@ def gap_page(found: Json) -> Page:
     sections = [
         PageSection(
             heading="What was found",
-            text="\n\n".join(f"Caution: {caution}." for caution in found["cautions"]),
             tables=[*_parameters(found), *_by_trial(found)],
             charts=drawn("worst_tracks"),
         ),
@@ -134,7 +133,7 @@ def gap_page(found: Json) -> Page:
     return Page(
         title=found["ship"],
         subtitle=subtitle,
-        verdict=found_in_words(found),
+        verdict=verdict_in_words(found),
         figures=_key_figures(found),
         sections=shown,
     )

@@ -21,6 +21,9 @@ GOOD = 1.5
 then about as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 
+AS_LIKELY_AS_NOT = 0.5
+"""Probability from which an effect that is not named is mentioned (project choice)."""
+
 MOVED = 3
 """Coefficients that are named in the verdict: those that moved most (project choice)."""
 
@@ -69,6 +72,9 @@ def probabilities_in_words(found: Json) -> list[str]:
     each = "; ".join(f"{effect_in_words(effect['name'])} {as_percent(effect['confidence'])}" for effect in effects)
     names = [effect["name"] for effect in effects]
     messages = [f"probability that the effect is there, alone or with another one: {each}"]
+    if more := _unnamed(found):
+        likely = "; ".join(f"{effect_in_words(name)} {as_percent(share)}" for name, share in more.items())
+        messages.append(f"there may be more, without the evidence that a name needs: {likely}")
     whole = next((rival for rival in found["rivals"] if set(rival["effects"]) == set(names)), None)
     if whole is not None:
         alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _joined(names)
@@ -88,6 +94,14 @@ def sizes_of_candidates(found: Json) -> list[Json]:
     known = {effect["name"] for effect in found["effects"]}
     unknown = dict.fromkeys(name for text in found["alternatives"] for name in effects_of(text) if name not in known)
     return [{"name": name, **sizes[name], "confidence": _sure(found, name)} for name in unknown if name in sizes]
+
+
+def _unnamed(found: Json) -> dict[str, float]:
+    """Effects that are neither named nor candidates, and that are as probably there as not, with their probability."""
+    known = {effect["name"] for effect in found["effects"]}
+    known |= {name for text in found["alternatives"] for name in effects_of(text)}
+    every = dict.fromkeys(name for rival in found["rivals"] for name in rival["effects"] if name not in known)
+    return {name: share for name in every if (share := _sure(found, name)) >= AS_LIKELY_AS_NOT}
 
 
 def _sure(found: Json, name: str) -> float:
@@ -124,7 +138,9 @@ def found_in_words(found: Json) -> str:
         candidates = [*named, *map(effects_of, found["alternatives"])]
         names = ", or ".join(dict.fromkeys(map(_joined, candidates)))
         missing = "Something is" if all(candidates) else "Something may be"
-        return f"{missing} missing, but these data do not distinguish several explanations: {names}."
+        sentence = f"{missing} missing, but these data do not distinguish several explanations: {names}."
+        first = [f"The improved card has {_joined(named[0])}."] if named and len(candidates) > 1 else []
+        return " ".join([sentence, *first, *_refitted(found)])
     if verdict == COEFFICIENTS:
         return " ".join(["The coefficients of the card explain the gap: no effect is missing.", *_refitted(found)])
     if verdict == NO_EFFECT_MISSING:
@@ -148,7 +164,8 @@ def _refitted(found: Json) -> list[str]:
     }
     most = sorted(sizes, key=sizes.__getitem__, reverse=True)[:MOVED]
     moved = ", ".join(f"{name} by {sizes[name]:.1f}" for name in most)
-    company = " with it" if found["effects"] else ""
+    several = len(found["effects"]) > 1
+    company = (" with them" if several else " with it") if found["effects"] else ""
     words = (
         f"{len(coefficients)} coefficients of the card were fitted{company}: "
         f"most moved {moved} of their standard errors"
@@ -157,7 +174,8 @@ def _refitted(found: Json) -> list[str]:
     if alone:
         key = "holdout" if alone.get("holdout") is not None else "fit"
         group = "held-out" if key == "holdout" else "fitting"
-        words += f"; with the effect alone the misfit of the {group} trials would be {noises(as_number(alone[key]))}"
+        effects = "effects" if several else "effect"
+        words += f"; with the {effects} alone the misfit of the {group} trials would be {noises(as_number(alone[key]))}"
     return [f"{words}."]
 
 
@@ -181,7 +199,8 @@ def verdict_context(found: Json) -> list[str]:
         names = "; ".join(_joined(effects_of(text)) for text in found["alternatives"])
         messages.append(f"What else it could be: {names}. These data cannot distinguish them.")
     elif found["effects"] and verdict == MISSING:
-        messages.append("What else it could be: none of the explanations without it comes near.")
+        company = "it" if len(found["effects"]) == 1 else "each of them"
+        messages.append(f"What else it could be: none of the explanations without {company} comes near.")
     if verdict != NO_EFFECT_MISSING and equation:
         messages.append(f"The gap is in {_EQUATIONS.get(equation, equation)}.")
     return messages
