@@ -173,6 +173,24 @@ def test_the_current_of_a_trial_is_found_together_with_its_heading(tmp_path: Pat
 
 
 @pytest.mark.slow
+def test_the_error_of_a_trials_wind_holds_that_of_the_coefficients_of_its_forces(windy: tuple) -> None:
+    """A force goes with the coefficient and the square of the wind: 20 % of the one are 10 % of the other."""
+    _, card, fitted, _ = windy
+    coefficients = {"surge_coefficient": 0.8, "sway_coefficient": 0.8, "yaw_coefficient": 0.1}
+    usual, errors = {**at_rest("wind"), **coefficients}, {name: 0.2 * value for name, value in coefficients.items()}
+    turn = replace(fitted, trials=tuple(trial for trial in fitted.trials if trial.name == "turn35_stbd"))
+    known, unsure = (
+        fit_surroundings(add_effects_to_card(card, [("wind", usual, given)]), turn, ("wind",), NOISE)["wind"][
+            "turn35_stbd"
+        ]
+        for given in ({}, errors)
+    )
+    assert unsure.speed_mps == pytest.approx(known.speed_mps)
+    added = np.sqrt(unsure.speed_error_mps**2 - known.speed_error_mps**2)
+    assert 0.03 < added / known.speed_mps < 0.2
+
+
+@pytest.mark.slow
 def test_the_winds_of_all_trials_and_their_coefficients_are_found_from_replays(windy: tuple) -> None:
     made, card, fitted, _ = windy
     with_wind = add_effects_to_card(card, [("wind", at_rest("wind"), {})])

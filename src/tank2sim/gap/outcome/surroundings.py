@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -91,7 +91,7 @@ def fit_surroundings(
     model = _with_parts_as_states(known.model, effects, trials[0].typical)
     replayer = Replayer(card, measured.driven_by, known.seen, model)
     for trial in trials:
-        for name, surroundings in _of_trial(trial, replayer, effects).items():
+        for name, surroundings in _of_trial(card, trial, replayer, effects).items():
             found[name][trial.name] = surroundings
     return found
 
@@ -327,9 +327,15 @@ class _Trial:
         return math.sqrt(left / without) if without > 0 else 1.0
 
 
-def _of_trial(trial: _Trial, replayer: Replayer, effects: Sequence[str]) -> dict[str, Surroundings]:
+def _of_trial(
+    card: ManoeuvringCard, trial: _Trial, replayer: Replayer, effects: Sequence[str]
+) -> dict[str, Surroundings]:
     """Together with the initial state and the instants of the orders: a heading that is a little off moves the track
-    as a current across it does. Their errors are those of readings that are independent once in a passage of L/u0."""
+    as a current across it does.
+
+    Their errors are those of readings that are independent once in a passage of L/u0, and of the coefficients of the
+    forces, which are taken as independent: a force that is too small asks for more wind.
+    """
     model = replayer.model
     p, record, sigma = model.parameter_values(), trial.still, trial.sigma
     near = replayer.guess_initial_state(record, sigma, p)
@@ -337,7 +343,7 @@ def _of_trial(trial: _Trial, replayer: Replayer, effects: Sequence[str]) -> dict
     record, start = replayer.fit_record(record, sigma, p, near)
     parts, known = start[-len(trial.typical) :], ~np.isnan(record.readings)
 
-    def away(start: Array) -> Array:
+    def away(start: Array, p: Array = p) -> Array:
         residual: Array = ((replayer.motion(record, start, p) - record.readings) / sigma)[known]
         return residual
 
@@ -345,9 +351,30 @@ def _of_trial(trial: _Trial, replayer: Replayer, effects: Sequence[str]) -> dict
     slopes = difference_slopes(away, start, away(start), _STEP * nominal) * nominal
     covariance = np.linalg.inv(slopes.T @ slopes + np.eye(len(start)))  # in nominal sizes, their spread beforehand
     size = max(float(np.mean(away(start) ** 2)), 1.0) * max(trial.passage, 1.0)
-    errors = (np.sqrt(size * np.diag(covariance)) * nominal)[-len(parts) :]
+    by_errors = -covariance @ slopes.T @ _slopes_in_errors(card, effects, model, away, start)
+    variances = size * np.diag(covariance) + np.sum(by_errors**2, axis=1)
+    errors = (np.sqrt(variances) * nominal)[-len(parts) :]
     pairs = zip(effects, parts.reshape(-1, 2), errors.reshape(-1, 2), strict=True)
     return {name: Surroundings.of_parts(part, error) for name, part, error in pairs}
+
+
+def _slopes_in_errors(
+    card: ManoeuvringCard,
+    effects: Sequence[str],
+    model: Model,
+    away: Callable[[Array, Array], Array],
+    start: Array,
+) -> Array:
+    """Change of `away` (count, k) by one standard error of each of the k coefficients of the effects' forces."""
+    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    columns = []
+    for entry in (entry for entry in card.effects if entry.name in effects):
+        names = EFFECTS[entry.name].model_names()
+        for key, error in entry.uncertainty.items():
+            if names.get(key) in values and error > 0:
+                moved = model.parameter_values({names[key]: values[names[key]] + error})
+                columns.append(np.nan_to_num(away(start, moved) - away(start, model.parameter_values())))
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(away(start, model.parameter_values())), 0))
 
 
 def _with_parts_as_states(model: Model, effects: Sequence[str], typical: Array) -> Model:
