@@ -167,6 +167,14 @@ def test_cautions_are_among_the_notices() -> None:
     assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
 
 
+@pytest.mark.parametrize(("current", "cautions"), [(0.01, 0), (5.0, 1)])
+def test_no_missing_effect_says_little_where_most_would_not_show(current: float, cautions: int) -> None:
+    """A current of 5 m/s is far above any; one of 1 cm/s is not."""
+    hidden = {"current": {"speed_mps": current}, "gyro_bias": {"rate_radps": 1e-9}}
+    assert len(written(replace(made_up.nothing(), could_hide=hidden))["cautions"]) == cautions
+    assert not written(replace(made_up.missing(), could_hide=hidden))["cautions"]
+
+
 def test_replays_are_thinned_in_the_units_of_their_columns_with_every_extreme() -> None:
     trial = made_up.passed("long", 8.0, 1.0)
     count, place = 5000, 1234

@@ -14,6 +14,7 @@ from tank2sim.files import plain_json
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.gap.outcome.lacking import missing_as_json
+from tank2sim.gap.outcome.usual_sizes import hidden_effects_caution
 from tank2sim.gap.proof.cross_check import proof_cautions
 from tank2sim.gap.result import Gap, Named, NextTest, Passed, Refitted
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
@@ -47,7 +48,7 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, A
         Name of a trial to that of its file; by default ``<name>.csv``, of the trial format.
     """
     names = {replay.name: (files or {}).get(replay.name, f"{replay.name}.csv") for replay in gap.passed}
-    cautions = proof_cautions(gap)
+    cautions = (*proof_cautions(gap), *hidden_effects_caution(gap))
     found: dict[str, Any] = plain_json(
         {
             "ship": gap.card.ship.name,

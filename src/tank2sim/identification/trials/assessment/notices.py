@@ -23,6 +23,11 @@ WORSE = 1.05
 """An error that grew by less than this factor counts as unchanged (project choice)."""
 
 
+LACKING = 3.0
+"""Factor on the card's standard errors from which a missing effect is the likelier reason (project choice: three
+standard errors are rare by chance)."""
+
+
 def remarks(result: Identification) -> tuple[str, ...]:
     """All notices, as sentences."""
     return (
@@ -59,7 +64,15 @@ def _widened(scale: Mapping[str, float]) -> list[str]:
     wide = [f"{group} {factor:.3g} times" for group, factor in sorted(scale.items()) if factor > 1.05]
     if not wide:
         return []
-    return [f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; --trust-card keeps them"]
+    found = [
+        f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; --trust-card keeps them"
+    ]
+    if max(scale.values()) > LACKING:
+        found.append(
+            "coefficients so far from the card may stand for an effect that it lacks: tank2sim gap, with these trials "
+            "and the card as it was given, finds which"
+        )
+    return found
 
 
 def _worse(result: Identification) -> list[str]:
