@@ -16,6 +16,7 @@ from tank2sim.gap.outcome.export import (
     in_file_units,
     signal_display_name,
 )
+from tank2sim.gap.result import Named, Refitted
 from tank2sim.units import to_si
 from tests.gap import made_up
 
@@ -165,6 +166,21 @@ def test_cautions_are_among_the_notices() -> None:
     poor = replace(gap, passed=(made_up.passed("turn35", 9.0, 5.0),))
     first, second, *_ = written(poor)["notices"]
     assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
+
+
+@pytest.mark.parametrize(
+    ("factor", "moved", "cautions"), [(0.3, 3.0, 0), (3.0, 3.0, 1), (0.3, 18.0, 1), (3.0, 18.0, 2)]
+)
+def test_sizes_at_a_bound_and_coefficients_far_beyond_their_errors_are_cautioned_against(
+    factor: float, moved: float, cautions: int
+) -> None:
+    """A card in other units is explained by names that are sure and impossible."""
+    (parameter,) = EFFECTS["rudder_effectiveness"].parameters
+    assert parameter.maximum == 3.0
+    effect = Named("rudder_effectiveness", {"factor": factor}, {"factor": 0.1}, 0.99)
+    coefficient = Refitted("Nv", -0.01 - moved * 1e-4, 1e-4, -0.01, 1e-4)
+    gap = replace(made_up.missing(), effects=(effect,), coefficients=(coefficient,))
+    assert len(written(gap)["cautions"]) == cautions
 
 
 @pytest.mark.parametrize(("current", "cautions"), [(0.01, 0), (5.0, 1)])

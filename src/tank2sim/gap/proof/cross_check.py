@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import revised
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, downhill, input_record
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -227,14 +228,18 @@ IMPOSSIBLE = 10.0
 whose errors are true move by up to 4)."""
 
 
+NEAR_A_BOUND = 1e-4
+"""Share of the range of a parameter within which it lies at a bound (project choice: a search ends there exactly)."""
+
+
 def proof_cautions(gap: Gap) -> tuple[str, ...]:
-    """Objections to a verdict: coefficients further off than their errors allow, the remaining share of the gap, and a
-    mere refit that follows better.
+    """Objections to a verdict: coefficients further off than their errors allow, sizes at the bound of what is
+    possible, the remaining share of the gap, and a mere refit that follows better.
 
     The last two are of a name, by the held-out trials, or by the fitting ones where none was held out. The share that
     remains is the root of the mean square beyond the noise after, over that before.
     """
-    return (*_impossible_coefficients(gap), *_cautions_of_name(gap))
+    return (*_impossible_coefficients(gap), *_impossible_sizes(gap), *_cautions_of_name(gap))
 
 
 def _impossible_coefficients(gap: Gap) -> tuple[str, ...]:
@@ -246,6 +251,23 @@ def _impossible_coefficients(gap: Gap) -> tuple[str, ...]:
         "another ship or loading, have a number or sign in another unit or convention, or state errors that are too "
         "small; what is named may stand for that",
     )
+
+
+def _impossible_sizes(gap: Gap) -> tuple[str, ...]:
+    """Amplitudes at a bound of their parameter."""
+    found = []
+    for effect in gap.effects:
+        for parameter in EFFECTS[effect.name].parameters:
+            value = effect.parameters.get(parameter.name)
+            bounds = parameter.lowest(gap.card), parameter.maximum
+            if value is None or parameter.absent is None or parameter.absent in bounds:
+                continue
+            if min(abs(value - bound) for bound in bounds) < NEAR_A_BOUND * (bounds[1] - bounds[0]):
+                found.append(
+                    f"{parameter.name} of {effect.name} lies at the bound of what is possible: the card may be of "
+                    "another ship or have numbers in other units"
+                )
+    return tuple(found)
 
 
 def _cautions_of_name(gap: Gap) -> tuple[str, ...]:

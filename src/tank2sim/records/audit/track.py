@@ -252,7 +252,8 @@ def _lesser(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Com
 
 def _antenna(trial: Trial, lever: WeakFit, clock: WeakFit | None) -> Finding:
     forward, starboard = (float(value) for value in lever.values[4:6])
-    truth = f"the antenna is {forward:.3g} m before and {starboard:.3g} m to starboard of the origin"
+    along, across = "before" if forward >= 0 else "abaft", "starboard" if starboard >= 0 else "port"
+    truth = f"the antenna is {abs(forward):.3g} m {along} and {abs(starboard):.3g} m to {across} of the origin"
     evidence = {
         "forward_m": forward,
         "starboard_m": starboard,
