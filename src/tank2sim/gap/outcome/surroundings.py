@@ -366,15 +366,16 @@ def _slopes_in_errors(
     start: Array,
 ) -> Array:
     """Change of `away` (count, k) by one standard error of each of the k coefficients of the effects' forces."""
-    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    columns = []
+    p = model.parameter_values()
+    now, values = away(start, p), dict(zip(model.parameter_names, p, strict=True))
+    columns = [np.zeros((len(now), 0))]
     for entry in (entry for entry in card.effects if entry.name in effects):
         names = EFFECTS[entry.name].model_names()
         for key, error in entry.uncertainty.items():
-            if names.get(key) in values and error > 0:
+            if names.get(key) in values:
                 moved = model.parameter_values({names[key]: values[names[key]] + error})
-                columns.append(np.nan_to_num(away(start, moved) - away(start, model.parameter_values())))
-    return np.stack(columns, axis=-1) if columns else np.zeros((len(away(start, model.parameter_values())), 0))
+                columns.append(np.nan_to_num(away(start, moved) - now)[:, None])
+    return np.concatenate(columns, axis=1)
 
 
 def _with_parts_as_states(model: Model, effects: Sequence[str], typical: Array) -> Model:
