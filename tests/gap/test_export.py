@@ -16,7 +16,8 @@ from tank2sim.gap.outcome.export import (
     in_file_units,
     signal_display_name,
 )
-from tank2sim.gap.result import Named, Refitted
+from tank2sim.gap.result import Acting, Named, Refitted
+from tank2sim.report.gap.text import place_of_cause, verdict_in_words
 from tank2sim.units import to_si
 from tests.gap import made_up
 
@@ -159,6 +160,18 @@ def test_no_force_is_told_of_where_none_is_missing() -> None:
     gap = made_up.missing()
     assert written(gap)["missing_force"] is None
     assert written(replace(gap, effects=(), equation="sway"))["missing_force"]["equation"] == "Y"
+
+
+def test_what_no_effect_explains_has_its_place_and_size_in_newton() -> None:
+    passages = (Acting("turn35", "yaw", 10.0, 20.0, 5.0, 3e6), Acting("zigzag", "sway", 0.0, 9.0, 4.0, 2e4))
+    gap = replace(made_up.outside(), missing_force=replace(made_up.force(), passages=passages))
+    found = written(gap)
+    forces = [interval for interval in found["acting"] if interval["equation"] in {"yaw", "sway"}]
+    moment, force = forces
+    assert moment["moment_Nm"] == 3e6 and force["force_N"] == 2e4
+    said = place_of_cause({**found, "acting": forces})
+    assert "from 10 s to 20 s of turn35" in said and "3000 kN m" in said
+    assert said in verdict_in_words({**found, "acting": forces})
 
 
 def test_cautions_are_among_the_notices() -> None:

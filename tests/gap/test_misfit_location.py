@@ -206,5 +206,7 @@ def test_a_force_is_at_work_where_its_square_is_above_half_of_its_mean_square(lo
     force = np.zeros((200, 3))
     force[:, 1] = np.where(time < 100, 1.2, low)
     (found,) = _at_work(np.array(["a"] * 200, dtype=object), time, force, np.full((200, 3), 0.05))
+    inside = (time >= found.t_start_s) & (time <= found.t_end_s)
+    assert found.force == pytest.approx(np.sqrt(np.mean(force[inside, 1] ** 2)))
     assert found.equation == "sway" and found.t_start_s == pytest.approx(0.0, abs=5)
     assert found.t_end_s == pytest.approx(199.0 if whole else 99.0, abs=5)

@@ -22,7 +22,6 @@ from tank2sim.cards.derived import derived_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin
-from tank2sim.gap.diagnosis.error_intervals import acting
 from tank2sim.gap.fleet.search import nonlinear_card
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.inference.fit_all import StageReport
@@ -36,7 +35,7 @@ from tank2sim.gap.outcome.export import (
 )
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.surroundings import with_surroundings
-from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
+from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY, Gap
 from tank2sim.gap.search.model_choice import SUREST
 from tank2sim.gap.workflow import MOST_EFFECTS, GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
@@ -169,7 +168,7 @@ class GapResult(Result):
     @property
     def headline(self) -> tuple[str, ...]:
         """The verdict, its probabilities, and what these data cannot distinguish."""
-        from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words
+        from tank2sim.report.gap.text import place_of_cause, probabilities_in_words, verdict_in_words
 
         gap = self.gap
         lines = [f"{gap.card.ship.name}: {verdict_in_words(self._results)}", *probabilities_in_words(self._results)]
@@ -183,11 +182,8 @@ class GapResult(Result):
                 f"most of the misfit arises in {signal} of {place.trial}, {place.t_start_s:.4g} s to "
                 f"{place.t_end_s:.4g} s ({100 * place.share:.0f} %)"
             )
-        for part in acting(gap)[:1]:
-            lines.append(
-                f"the cause acts most in {part.equation} of {part.trial}, {part.t_start_s:.4g} s to "
-                f"{part.t_end_s:.4g} s ({part.size:.2g} standard errors)"
-            )
+        if self._results["acting"] and gap.verdict != OUTSIDE_LIBRARY:
+            lines.append(f"the cause acts most in {place_of_cause(self._results)}")
         if gap.next_test:
             lines.append(f"next test: {gap.next_test.manoeuvre}. {gap.next_test.why}")
         return tuple(lines)

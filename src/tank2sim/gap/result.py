@@ -159,6 +159,8 @@ class Acting:
         In the trial's own time, s.
     size : float
         Root mean square of the missing quantity, in its standard errors.
+    force : float, optional
+        Root mean square of a force, N, or of a moment, N m; None of ``track`` and ``heading``.
     """
 
     trial: str
@@ -166,6 +168,7 @@ class Acting:
     t_start_s: float
     t_end_s: float
     size: float
+    force: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

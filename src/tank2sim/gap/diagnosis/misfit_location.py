@@ -239,7 +239,8 @@ def _at_work(trials: NDArray[np.object_], time_s: Array, force: Array, errors: A
             for begin, end, excess in exceedance_intervals(active, limit=CLEAR, width=_SHORT):
                 size = math.sqrt(1 + excess / (end - begin))
                 times = time_s[rows[[begin, end - 1]]]
-                found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size))
+                rms = float(np.sqrt(np.nanmean(force[rows[begin:end], axis] ** 2)))
+                found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size, rms))
     return by_significance(found)
 
 
@@ -273,8 +274,8 @@ def effect_passages(trials: Sequence[str], time_s: Array, force: Array, errors: 
             for begin, end in zip(edges[::2], edges[1::2], strict=True):
                 part = rows[begin:end]
                 size = float(np.sqrt(np.mean(square[part] / errors[part, axis] ** 2)))
-                times = time_s[part[[0, -1]]]
-                found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size))
+                times, rms = time_s[part[[0, -1]]], float(np.sqrt(np.mean(square[part])))
+                found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size, rms))
     return by_significance(found)
 
 

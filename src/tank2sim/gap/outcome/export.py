@@ -179,17 +179,25 @@ def _where(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
     ]
 
 
+_FORCE_KEYS = {"surge": "force_N", "sway": "force_N", "yaw": "moment_Nm"}
+"""Key of the root mean square of what is missing in an equation."""
+
+
 def _acting(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
-    return [
-        {
-            "trial": names.get(interval.trial, f"{interval.trial}.csv"),
-            "equation": interval.equation,
-            "t_start_s": _time(interval.t_start_s),
-            "t_end_s": _time(interval.t_end_s),
-            "standard_errors": _finite(interval.size),
-        }
-        for interval in acting(gap)[:_MOST_PASSAGES]
-    ]
+    found: list[dict[str, object]] = []
+    for interval in acting(gap)[:_MOST_PASSAGES]:
+        force = {_FORCE_KEYS[interval.equation]: _finite(interval.force)} if interval.equation in _FORCE_KEYS else {}
+        found.append(
+            {
+                "trial": names.get(interval.trial, f"{interval.trial}.csv"),
+                "equation": interval.equation,
+                "t_start_s": _time(interval.t_start_s),
+                "t_end_s": _time(interval.t_end_s),
+                "standard_errors": _finite(interval.size),
+                **force,
+            }
+        )
+    return found
 
 
 def _figures(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:

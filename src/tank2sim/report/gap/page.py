@@ -27,6 +27,7 @@ from tank2sim.report.gap.charts import (
     worst_tracks,
 )
 from tank2sim.report.gap.text import (
+    EQUATION_WORDS,
     GOOD,
     as_percent,
     effect_in_words,
@@ -34,6 +35,7 @@ from tank2sim.report.gap.text import (
     meaning,
     or_nan,
     parameter_cells,
+    place_of_cause,
     set_misfit,
     sizes_of_candidates,
     trial_name,
@@ -363,12 +365,7 @@ def _acting_text(found: Json) -> str:
     if not found["acting"]:
         none = "the records do not contradict each other" if earth_bound else "no force exceeds its error"
         return f"At what moments the cause acts cannot be said: {none}." + without
-    first = found["acting"][0]
-    begin, end = or_nan(first["t_start_s"]), or_nan(first["t_end_s"])
-    text = (
-        f"The cause acts most in {_ACTING.get(first['equation'], first['equation'])}, from "
-        f"{begin:.0f} s to {end:.0f} s of {trial_name(first['trial'])}."
-    )
+    text = f"The cause acts most in {place_of_cause(found)}."
     return text + without
 
 
@@ -376,7 +373,7 @@ def _passages(found: Json) -> list[PageTable]:
     rows: list[list[Cell]] = [
         [
             trial_name(passage["trial"]),
-            _ACTING.get(passage["equation"], passage["equation"]),
+            EQUATION_WORDS.get(passage["equation"], passage["equation"]),
             *(passage[key] for key in ("t_start_s", "t_end_s", "standard_errors")),
         ]
         for passage in found["acting"][:_MOST_PASSAGES]
@@ -392,13 +389,6 @@ def _passages(found: Json) -> list[PageTable]:
 _MOST_PASSAGES = 12
 """Passages in a table (project choice)."""
 
-_ACTING = {
-    "surge": "the force ahead",
-    "sway": "the force to the side",
-    "yaw": "the turning moment",
-    "track": "the motion over the ground",
-    "heading": "heading against yaw rate",
-}
 _NO_FORCE = (
     " No force is missing, and none is shown: what counts is by how much the records of position, heading and velocity "
     "contradict each other, whatever the hull does."

@@ -147,10 +147,35 @@ def found_in_words(found: Json) -> str:
         good = after is None or after <= GOOD
         remainder = "" if good else ", which is more than noise, but no effect explains the rest better than none"
         return f"No missing effect shows in these data{': the card as given' + follows + remainder if follows else ''}."
-    return (
+    sentence = (
         "Something is missing that no effect of the library explains: what is left has a pattern of its own, "
         "and no name is given although some effect always fits a little."
     )
+    return " ".join([sentence, *([f"It acts most in {place_of_cause(found)}."] if found["acting"] else [])])
+
+
+EQUATION_WORDS = {
+    "surge": "the force ahead",
+    "sway": "the force to the side",
+    "yaw": "the turning moment",
+    "track": "the motion over the ground",
+    "heading": "heading against yaw rate",
+}
+"""Words of the equations in which a model is wrong."""
+
+
+def place_of_cause(found: Json) -> str:
+    """The equation, time and trial in which what is missing acts most, and its size; of a JSON that has one."""
+    first = found["acting"][0]
+    begin, end = or_nan(first["t_start_s"]), or_nan(first["t_end_s"])
+    sizes = [
+        f"{format_number(or_nan(first[key]) / 1e3, 3)} {unit}"
+        for key, unit in (("force_N", "kN"), ("moment_Nm", "kN m"))
+        if key in first
+    ]
+    sizes.append(f"{or_nan(first['standard_errors']):.2g} standard errors")
+    words = EQUATION_WORDS.get(first["equation"], first["equation"])
+    return f"{words}, from {begin:.0f} s to {end:.0f} s of {trial_name(first['trial'])} (rms {', '.join(sizes)})"
 
 
 def _refitted(found: Json) -> list[str]:
