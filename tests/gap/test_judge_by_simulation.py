@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ import pytest
 from tank2sim.cards import read_card
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.proof.improvement import NamedEffects, Proof
-from tank2sim.gap.proof.judge import Judge
-from tank2sim.gap.result import MISSING, NO_EFFECT_MISSING, Passed
+from tank2sim.gap.proof.judge import Judge, Judged
+from tank2sim.gap.result import MISSING, NO_EFFECT_MISSING, Passed, Refitted
 from tank2sim.gap.search import model_choice
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import decide
@@ -32,14 +33,20 @@ def replay(misfit: float) -> Passed:
 
 
 class Prover:
-    """Gives each explanation a proof with a misfit that a function of its effects states."""
+    """Gives each explanation a proof with the misfit, and the change of a coefficient in its standard errors, of its
+    effects."""
 
-    def __init__(self, misfit: Callable[[tuple[str, ...]], float]):
-        self.misfit = misfit
+    def __init__(
+        self,
+        misfit: Callable[[tuple[str, ...]], float],
+        moved: Callable[[tuple[str, ...]], float] = lambda effects: 0.0,
+    ):
+        self.misfit, self.moved = misfit, moved
 
     def prove(self, best: ExplanationFit) -> Proof:
-        results = [replay(self.misfit(best.hypothesis.effects))]
-        return Proof((), NamedEffects(), CARD, CARD, results)
+        effects = best.hypothesis.effects
+        coefficient = Refitted("Nv", self.moved(effects), 0.1, 0.0, 1.0)
+        return Proof((), NamedEffects(), CARD, CARD, [replay(self.misfit(effects))], (coefficient,))
 
 
 @pytest.mark.parametrize(
@@ -89,3 +96,29 @@ def test_an_effect_that_scores_nearly_as_well_as_none_is_named_if_simulations_ar
     assert decision.best.hypothesis.effects == ((NAMES[0],) if named else ())
     assert decision.verdict == (MISSING if named else NO_EFFECT_MISSING)
     assert found_more.proof.misfit == pytest.approx(closer if named else reached)
+
+
+@pytest.mark.parametrize(("moved", "gain", "named"), [(9.0, 40.0, True), (3.0, 40.0, False), (9.0, 5.0, False)])
+def test_an_effect_is_named_whose_place_a_coefficient_far_off_would_take(
+    monkeypatch, moved: float, gain: float, named: bool
+) -> None:
+    """Simulations are as close with the coefficient, which is nine of its standard errors off."""
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    smaller = fit(-500, LAG, width=2.5)
+    found = Search(CALM, (fit(-500 - gain, FORCE, LAG, width=0.7), smaller, fit(0, width=2.5)), ())
+    force = NAMES[FORCE]
+    judge = Judge(Prover(lambda effects: 1.0, lambda effects: 1.0 if force in effects else moved), 0.5)
+    judged = judge.with_more(found, Judged(replace(decide(found), best=smaller), judge.prover.prove(smaller)))
+    assert (force in judged.decision.best.hypothesis.effects) == named
+
+
+@pytest.mark.parametrize(("moved", "stays"), [(9.0, True), (3.0, False)])
+def test_a_doubtful_effect_stays_whose_place_a_coefficient_far_off_would_take(
+    monkeypatch, moved: float, stays: bool
+) -> None:
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    found = Search(CALM, (fit(-540, FORCE, LAG), fit(-500, LAG), fit(-50, FORCE), fit(0)), ())
+    force = NAMES[FORCE]
+    judge = Judge(Prover(lambda effects: 1.0, lambda effects: 1.0 if force in effects else moved), 0.5)
+    judged = judge.with_fewer(found, decide(found))
+    assert (force in judged.decision.best.hypothesis.effects) == stays

@@ -203,15 +203,28 @@ def test_an_order_alone_is_executed_at_its_step(model):
     assert what.rudder_rate_radps is None
 
 
-def test_a_turn_by_its_order_alone_is_repeated_from_the_rudder_before_the_order(model):
-    """Not with the rudder over at once: 10 s at 3 deg/s, half of which count, are some 20 m of advance."""
+@pytest.mark.parametrize("begin_s", [0.0, 12.0])
+def test_a_turn_by_its_order_alone_is_repeated_from_the_rudder_before_the_order(model, begin_s):
+    """Not with the rudder over at once, also where the record begins at the execute: 10 s at 3 deg/s, half of which
+    count, are some 20 m of advance."""
     whole = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 12.0), 240.0)
-    signals = {name: values for name, values in whole.signals.items() if name != "delta_rad"}
-    order = np.where(whole.time_s >= 12.0, np.deg2rad(30), 0.0)
-    what = recorded(replace(whole, signals={**signals, "delta_order_rad": order}), model)
+    rows = whole.time_s >= begin_s - 1e-9
+    order = np.where(whole.time_s >= 12.0 - 1e-9, np.deg2rad(30), 0.0)
+    signals = {name: values[rows] for name, values in {**whole.signals, "delta_order_rad": order}.items()}
+    del signals["delta_rad"]
+    what = recorded(replace(whole, time_s=whole.time_s[rows], signals=signals), model)
     assert what.start["initial.rudder_angle"] == 0.0
     again = repeat(what, Integrator(model)).figures
     assert again["advance_m"] == pytest.approx(what.figures["advance_m"], abs=1.0)
+
+
+def test_a_record_that_begins_in_a_turn_begins_with_the_rudder_over(model):
+    whole = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 2.0), 240.0)
+    rows = whole.time_s >= 40.0
+    signals = {name: values[rows] for name, values in whole.signals.items() if name != "delta_rad"}
+    signals["delta_order_rad"] = np.full(np.count_nonzero(rows), np.deg2rad(30))
+    what = recorded(replace(whole, time_s=whole.time_s[rows], signals=signals), model)
+    assert what.start["initial.rudder_angle"] == pytest.approx(np.deg2rad(30))
 
 
 @pytest.mark.parametrize("kind", ["turn", "zigzag"])

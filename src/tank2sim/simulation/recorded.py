@@ -137,6 +137,10 @@ class Recorded:
         return f"zigzag {rudder:.3g}/{math.degrees(self.manoeuvre.heading):.3g}, reversed {late}"
 
 
+TURNS_AT_EXECUTE = 0.2
+"""Share of the largest yaw rate of a record above which the ship turns at its execute (project choice)."""
+
+
 def recorded(trial: Trial, model: Model) -> Recorded | None:
     """Recognise a turning circle or a zigzag in a trial; None if it is neither.
 
@@ -172,7 +176,9 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
-    start["initial.rudder_angle"] = rudder_before(trial, first)
+    rates = np.abs(smooth["r_radps"])
+    turning = bool(np.interp(first.execute_s, trial.time_s, rates) > TURNS_AT_EXECUTE * rates.max())
+    start["initial.rudder_angle"] = rudder_before(trial, first, turning=turning)
     inputs = _fed(trial, model)
     if isinstance(manoeuvre, Turn):
         reading = _turn_reading_errors(track, float(values["ship.length"]))

@@ -89,13 +89,17 @@ def rudder_of(trial: Trial) -> Array:
     return _held_order(trial.time_s, *order)
 
 
-def rudder_before(trial: Trial, held: HeldAngle) -> float:
-    """The rudder's angle at an execute, rad; where only orders are known, the order of the row before: the rudder moves
-    after its order."""
+def rudder_before(trial: Trial, held: HeldAngle, *, turning: bool) -> float:
+    """The rudder's angle at an execute, rad.
+
+    Where only orders are known, it is the order of the row before, for the rudder moves after its order; in a record
+    that begins at the execute amidships, unless the ship is `turning` there.
+    """
     rudder = rudder_of(trial)
-    if held.rate is None:
-        return float(rudder[max(int(np.searchsorted(trial.time_s, held.execute_s)) - 1, 0)])
-    return float(np.interp(held.execute_s, trial.time_s, rudder))
+    if held.rate is not None:
+        return float(np.interp(held.execute_s, trial.time_s, rudder))
+    row = int(np.searchsorted(trial.time_s, held.execute_s))
+    return float(rudder[row - 1]) if row else float(rudder[0]) * turning
 
 
 def _known(trial: Trial, name: str) -> tuple[Array, Array] | None:

@@ -70,6 +70,11 @@ class Proof:
         """Of the fitted trials with the improved card, noise units."""
         return misfit_of(self.results, "after", held_out=False)
 
+    @property
+    def farthest(self) -> float:
+        """Largest change of a coefficient, in standard errors of the given card."""
+        return max((coefficient.moved for coefficient in self.coefficients), default=0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Prover:

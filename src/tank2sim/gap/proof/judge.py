@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.outcome.refit import FAR
 from tank2sim.gap.proof.cross_check import MUCH, NEAR_NOISE, closes_gap
 from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, most_are_closer
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Passed, misfit_of
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import (
+    EVIDENCE_NEEDED,
     Decision,
     decide,
     decide_for,
@@ -105,13 +107,17 @@ class Judge:
         return self._without_name(search, decision, tuple(withheld))
 
     def with_fewer(self, search: Search, decision: Decision) -> Judged:
-        """The decision, with its proof, without its doubtful effects that bring the fitted trials no closer."""
+        """The decision, with its proof, without its doubtful effects that bring the fitted trials no closer.
+
+        An effect stays without which a coefficient would be far off (:data:`.refit.FAR`): that takes its place.
+        """
         judged = self._proved(decision)
         for name in doubtful_effects(search, decision.best):
             fewer = decide_without(search, decision, name, self.false_discovery)
             if fewer is not decision:
                 of_fewer = self.with_fewer(search, fewer)
-                if of_fewer.proof.misfit <= judged.proof.misfit:
+                far = of_fewer.proof.farthest > max(FAR, judged.proof.farthest)
+                if of_fewer.proof.misfit <= judged.proof.misfit and not far:
                     return of_fewer
         return judged
 
@@ -120,7 +126,8 @@ class Judge:
 
         That is, the fitted trials are missed by less than :data:`CLEARLY` of what they were, where this is not near the
         noise (:data:`.cross_check.NEAR_NOISE`); or by :data:`.improvement.BETTER` less, where the coefficients of the
-        card would else be off by more than their standard errors.
+        card would else be off by more than their standard errors; or by no more, where one of them would else be far
+        off (:data:`.refit.FAR`) and the score is better by :data:`.model_choice.EVIDENCE_NEEDED`.
         """
         decision, reached = judged.decision, judged.proof.misfit
         if decision.verdict == OUTSIDE_LIBRARY:
@@ -134,6 +141,9 @@ class Judge:
                 continue
             of_more = self._proved(more)
             closer = of_more.proof.misfit < limit * reached
+            if limit > CLEARLY and larger.score < decision.best.score - EVIDENCE_NEEDED:
+                far = judged.proof.farthest > max(FAR, of_more.proof.farthest)
+                closer |= far and of_more.proof.misfit <= reached
             if closer and most_are_closer(judged.proof.results, of_more.proof.results):
                 return of_more
         return judged
