@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from tank2sim import make_report
+from tank2sim.api.gap import gap_options
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
+from tank2sim.errors import InputError
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap, Named
 from tank2sim.identification.trials.problem.signatures import fitted_as
@@ -331,3 +333,10 @@ def test_an_improved_card_goes_all_the_way_to_a_checked_fmu(name: str, tmp_path:
     ):
         result = tank2sim(*arguments, cwd=tmp_path)
         assert result.returncode == 0, (arguments, result.stdout, result.stderr)
+
+
+@pytest.mark.parametrize(("given", "option"), [({"effects": "wind"}, "--effects"), ({"workers": 0}, "--workers")])
+def test_an_option_of_the_wrong_kind_is_refused_by_its_name(given: dict, option: str) -> None:
+    with pytest.raises(InputError) as raised:
+        gap_options(**given)
+    assert raised.value.source == option

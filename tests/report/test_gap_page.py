@@ -13,7 +13,7 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_L
 from tank2sim.report.gap.cause_charts import agreement_chart, rival_chart
 from tank2sim.report.gap.charts import gap_tracks, misfit_chart, shown_places, signal_misfit
 from tank2sim.report.gap.page import gap_charts, gap_page
-from tank2sim.report.gap.text import verdict_in_words, with_error
+from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words, with_error
 from tank2sim.report.kit.before_after import in_noise
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import Verdict, render_page
@@ -82,6 +82,13 @@ def test_ambiguity_names_each_explanation_once() -> None:
     assert "The improved card has current." in words_of(gap)
     reported = tables_of(page_of(gap))["Effects that these data cannot distinguish"].rows
     assert [row[0] for row in reported] == ["current", "wind", "rudder bias"]
+
+
+@pytest.mark.parametrize(("after", "whole"), [(1.0, True), (16.0, False)])
+def test_an_explanation_is_all_that_is_missing_only_where_the_trials_are_followed(after: float, whole: bool) -> None:
+    gap = replace(made_up.missing(), passed=(made_up.passed("turn35", 90.0, after),))
+    lines = probabilities_in_words(json.loads(json.dumps(gap_as_json(gap))))
+    assert sum("all that is missing" in line for line in lines) == whole
 
 
 def test_nothing_missing_says_how_well_the_card_follows() -> None:

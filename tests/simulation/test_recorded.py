@@ -227,6 +227,16 @@ def test_a_record_that_begins_in_a_turn_begins_with_the_rudder_over(model):
     assert what.start["initial.rudder_angle"] == pytest.approx(np.deg2rad(30))
 
 
+def test_the_rudder_of_a_zigzag_moves_at_the_rate_of_its_reversals(model):
+    """In the first movement, half as long, a noisy angle shows another rate."""
+    trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 300.0)
+    rudder = trial.signals["delta_rad"].copy()
+    early = (trial.time_s > 12.0) & (trial.time_s < 19.0)
+    rudder[early] = np.deg2rad(20) * (trial.time_s[early] - 12.0) / 10.0  # at 2 deg/s, then a jump
+    what = recorded(replace(trial, signals={**trial.signals, "delta_rad": rudder}), model)
+    assert what.rudder_rate_radps == pytest.approx(RATE, rel=0.05)
+
+
 @pytest.mark.parametrize("kind", ["turn", "zigzag"])
 def test_position_and_heading_are_enough(model, kind):
     """As a satellite receiver gives them, once a second."""

@@ -419,9 +419,13 @@ def gap_options(
         As of :func:`find_gap`.
     """
     for option, names in (("--effects", effects), ("--without", without)):
+        if isinstance(names, str):
+            raise InputError(option, "", f"is the text {names!r}", f"give a list of names: [{names!r}]")
         for name in names:
             if EFFECTS.get(name) is None:
                 raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
+    if workers is not None and workers < 1:
+        raise InputError("--workers", "", f"is {workers}", "give 1 or more")
     if not 1 <= max_effects <= MOST_EFFECTS:
         raise InputError("--max-effects", "", f"is {max_effects}", f"give 1 to {MOST_EFFECTS}")
     if not SUREST_WRONG <= false_discovery <= 0.5:

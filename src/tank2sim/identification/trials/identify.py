@@ -421,7 +421,9 @@ def _estimate_and_choice(
 
 def _choice(problem: Problem, in_pieces: Estimate, trials: Measured, options: IdentificationOptions) -> MethodChoice:
     if not at_sea(trials.trials):
-        reason = "no trial has a geographic position or a velocity over the ground: of a basin, without gusts and waves"
+        reason = (
+            "no trial has a geographic position or a velocity over the ground, by which it would be known to be at sea"
+        )
         return MethodChoice("output_error", reason)
     for given, words in (
         (trials.captive is not None, "captive tests are fitted together with the trials"),

@@ -9,6 +9,7 @@ from pathlib import PurePath
 import numpy as np
 
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.proof.cross_check import MUCH
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
 from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.kit.json_values import Json
@@ -65,7 +66,10 @@ def verdict_in_words(found: Json) -> str:
 
 
 def probabilities_in_words(found: Json) -> list[str]:
-    """What each probability is of: an effect, in whatever company, and one explanation as a whole."""
+    """What each probability is of: an effect, in whatever company, and one explanation as a whole.
+
+    Not the last where the trials are still missed by far: something more is missing then.
+    """
     effects = found["effects"]
     if not effects:
         return []
@@ -76,7 +80,8 @@ def probabilities_in_words(found: Json) -> list[str]:
         likely = "; ".join(f"{effect_in_words(name)} {as_percent(share)}" for name, share in more.items())
         messages.append(f"there may be more, without the evidence that a name needs: {likely}")
     whole = next((rival for rival in found["rivals"] if set(rival["effects"]) == set(names)), None)
-    if whole is not None:
+    after = set_misfit(found, "after", held_out=False)
+    if whole is not None and (after is None or after <= MUCH):
         alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _joined(names)
         messages.append(
             f"probability that {alone} is all that is missing, among the explanations compared: "
