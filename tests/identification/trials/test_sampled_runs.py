@@ -61,6 +61,16 @@ def test_an_order_holds_until_the_next(by_order):
     assert command(by_order, run)[-1] == command(by_order, run)[-2]
 
 
+def test_an_order_was_given_half_a_row_before_the_one_that_shows_it(by_order):
+    t = np.arange(0.0, 40.0)
+    trial = record(t, delta_order_rad=np.where(t >= 10.0, 0.3, 0.0), r_radps=0 * t)
+    late, before = (
+        prepare(by_order, trial, ("motion.r",), step_s=0.25, orders_before=earlier) for earlier in (False, True)
+    )
+    for run, begin in ((late, 10.0), (before, 9.5)):
+        np.testing.assert_allclose(command(by_order, run), np.where(run.times >= begin - 1e-9, 0.3, 0.0), atol=1e-9)
+
+
 def test_the_measured_angle_goes_before_the_order(by_angle):
     t = np.arange(0, 20, 0.1)
     both = record(t, delta_rad=np.full_like(t, 0.2), delta_order_rad=np.full_like(t, 0.3), r_radps=t)

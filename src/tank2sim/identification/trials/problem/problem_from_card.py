@@ -287,7 +287,7 @@ def problem_from_card(
     seen = seen_in(model, trials)
     if not seen:
         raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
-    prepared = [prepare(model, trial, seen) for trial in trials]
+    prepared = [prepare(model, trial, seen, orders_before=True) for trial in trials]
     runs = tuple(prepared) if whole else tuple(part for run in prepared for part in _parts(card, model, run))
     if not runs:
         low, high = card.model.speed_range_mps

@@ -88,13 +88,17 @@ class SampledRun:
         )
 
 
-def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None) -> SampledRun:
+def prepare(
+    model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None, orders_before: bool = False
+) -> SampledRun:
     """A trial on equal steps, for a model driven by the trial's rudder signal
     (:func:`.problem_from_card.driven_model`).
 
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
     of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
     holds until the next and enters with its mean over the step; a measured angle is taken as straight between samples.
+    With `orders_before` an order was given half a sampling step before the first row that shows it, as it was on
+    average where a record asks for the order once a row.
 
     Raises
     ------
@@ -118,7 +122,8 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
         held = (name == "rudder.command" and "delta_rad" not in trial.signals) or any(
             signal in trial.signals for signal in (_ordered_signal(name), _ordered_azimuth(name))
         )
-        inputs[:, model.input_names.index(name)] = _means(trial.time_s, values, grid, step, held=held)
+        given = trial.time_s - (0.5 * sampling if orders_before and held else 0.0)
+        inputs[:, model.input_names.index(name)] = _means(given, values, grid, step, held=held)
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
     measured = np.full((count, len(seen)), np.nan)
     for place, name in enumerate(seen):
@@ -205,6 +210,8 @@ def _means(time: Array, values: Array, grid: Array, step: float, *, held: bool) 
     known = ~np.isnan(values)
     time, values = time[known], values[known]
     edges = np.append(grid, grid[-1] + step)
+    if held:
+        time, values = np.append(time, max(time[-1], edges[-1]) + step), np.append(values, values[-1])
     if not held and len(time) < len(edges):  # straight lines go on within a row
         fine = np.union1d(time, edges)
         time, values = fine, np.interp(fine, time, values)
