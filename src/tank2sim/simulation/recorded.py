@@ -184,10 +184,10 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
         reading = _turn_reading_errors(track, float(values["ship.length"]))
     else:
         reading = {f"overshoot_{number}_deg": errors["course_rad"] for number in (1, 2)}
-    of_reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
-    # The first movement of a zigzag is half as long as the others, and its rate half as certain.
-    zigzags = isinstance(manoeuvre, Zigzag) and first.rate is not None and of_reversals
-    rate = float(np.median(of_reversals)) if zigzags else first.rate
+    rate = first.rate
+    reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
+    if isinstance(manoeuvre, Zigzag) and reversals:  # the first movement is half as long, and its rate half as certain
+        rate = float(np.median(reversals))
     return Recorded(trial, manoeuvre, first.execute_s, end, rate, start, inputs, figures, errors, reading)
 
 

@@ -249,7 +249,7 @@ def _impossible_coefficients(gap: Gap) -> tuple[str, ...]:
     return (
         f"{farthest.name} is {farthest.moved:.0f} of its standard errors from the given card: the card may be of "
         "another ship or loading, have a number or sign in another unit or convention, or state errors that are too "
-        "small; what is named may stand for that",
+        "small; what is named may be due to that",
     )
 
 

@@ -14,7 +14,7 @@ from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
-from tank2sim.gap.outcome.refit import refit_coefficients
+from tank2sim.gap.outcome.refit import FAR, refit_coefficients
 from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import Passed, Refitted, misfit_of
@@ -74,6 +74,10 @@ class Proof:
     def farthest(self) -> float:
         """Largest change of a coefficient, in standard errors of the given card."""
         return max((coefficient.moved for coefficient in self.coefficients), default=0.0)
+
+    def is_farther_off(self, other: Proof) -> bool:
+        """Whether a coefficient is far off (:data:`.refit.FAR`), and farther than with another proof's effects."""
+        return self.farthest > max(FAR, other.farthest)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.outcome.refit import FAR
 from tank2sim.gap.proof.cross_check import MUCH, NEAR_NOISE, closes_gap
 from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, most_are_closer
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Passed, misfit_of
@@ -116,7 +115,7 @@ class Judge:
             fewer = decide_without(search, decision, name, self.false_discovery)
             if fewer is not decision:
                 of_fewer = self.with_fewer(search, fewer)
-                far = of_fewer.proof.farthest > max(FAR, judged.proof.farthest)
+                far = of_fewer.proof.is_farther_off(judged.proof)
                 if of_fewer.proof.misfit <= judged.proof.misfit and not far:
                     return of_fewer
         return judged
@@ -142,8 +141,7 @@ class Judge:
             of_more = self._proved(more)
             closer = of_more.proof.misfit < limit * reached
             if limit > CLEARLY and larger.score < decision.best.score - EVIDENCE_NEEDED:
-                far = judged.proof.farthest > max(FAR, of_more.proof.farthest)
-                closer |= far and of_more.proof.misfit <= reached
+                closer |= judged.proof.is_farther_off(of_more.proof) and of_more.proof.misfit <= reached
             if closer and most_are_closer(judged.proof.results, of_more.proof.results):
                 return of_more
         return judged

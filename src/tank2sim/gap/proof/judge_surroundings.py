@@ -72,13 +72,14 @@ def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Se
     reached = misfit_of(judged.proof.results, "after")
     if reached <= MUCH or any(EFFECTS[name].surroundings for name, *_ in judged.proof.named.estimated):
         return judged
-    tried = {name: one for name, one in _simulated(prover, search, names).items() if one.misfit < CLEARLY * reached}
+    simulated = _simulated(prover, search, names)
+    tried = {name: found for name, found in simulated.items() if found.misfit < CLEARLY * reached}
     if not tried:
         return judged
     best, *others = sorted(tried, key=lambda name: tried[name].misfit)
     found = tried[best]
     proofs: dict[tuple[str, ...], Proof] = {(): judged.proof}
-    proofs |= {(name,): one.proof for name, one in tried.items()}
+    proofs |= {(name,): found.proof for name, found in tried.items()}
     alike = tuple(tried[name].fit for name in others if CLEARLY * tried[name].misfit < found.misfit)
     decision = replace(
         judged.decision,
@@ -118,16 +119,16 @@ def _simulated(prover: Prover, search: Search, names: Sequence[str]) -> dict[str
 
 
 def _at(fit: ExplanationFit, common: CommonSurroundings, trials: Sequence[str]) -> ExplanationFit:
-    """A fit with the wind or current that simulations gave in the place of its own."""
+    """A fit with the wind or current that simulations gave in the place of its parameters."""
     parts = {
-        name: one.speed_mps * np.array([np.cos(one.direction_rad), np.sin(one.direction_rad)])
-        for name, one in common.by_trial.items()
+        name: at.speed_mps * np.array([np.cos(at.direction_rad), np.sin(at.direction_rad)])
+        for name, at in common.by_trial.items()
     }
     mean = Surroundings.of_parts(np.mean(list(parts.values()), axis=0), np.zeros(2))
     same = {"speed_mps": mean.speed_mps, "direction_rad": mean.direction_rad, **common.values}
     theta = [
-        same.get(one.parameter.name, value) if one.run is None else parts[trials[one.run]][one.axis]
-        for one, value in zip(fit.hypothesis.estimated, fit.theta, strict=True)
+        same.get(estimate.parameter.name, value) if estimate.run is None else parts[trials[estimate.run]][estimate.axis]
+        for estimate, value in zip(fit.hypothesis.estimated, fit.theta, strict=True)
     ]
     return replace(fit, theta=np.array(theta))
 

@@ -69,7 +69,7 @@ def _widened(scale: Mapping[str, float]) -> list[str]:
     ]
     if max(scale.values()) > LACKING:
         found.append(
-            "coefficients so far from the card may stand for an effect that it lacks: tank2sim gap, with these trials "
+            "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these trials "
             "and the card as it was given, finds which"
         )
     return found
