@@ -267,7 +267,7 @@ def _show(gap: Gap, seconds: float) -> None:
         when = f"{place.t_start_s:.0f} to {place.t_end_s:.0f} s"
         print(f"   most of the misfit: {place.signal} of {place.trial}, {when} ({place.share:.0%}); {gap.equation}")
     for notice in gap.notices:
-        if "nothing in the library" in notice or "do not agree" in notice or "worse" in notice:
+        if "no tried effect" in notice or "do not agree" in notice or "worse" in notice:
             print(f"   {notice}")
 
 

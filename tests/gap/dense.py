@@ -83,7 +83,7 @@ class Dense:
             H[k * ny : (k + 1) * ny, k * nz + 9 : k * nz + slow] = np.eye(ny)
         self.H = H[self.known]
         self.shape = blocks, nz
-        white = np.tile(noise.white, blocks)[self.known]
+        white = np.sqrt(what.noise_shares[run]) * np.tile(noise.white, blocks)[self.known]
         seen = self.H @ self.z_by_noise
         self.covariance = seen @ seen.T + np.diag(white**2)
         self.of_driving = self.H @ self.z_by_driving

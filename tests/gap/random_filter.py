@@ -18,7 +18,7 @@ def problem(seed: int, *, gaps: bool = True) -> tuple[Linear, NoiseLevels, np.ra
         known[1, BLOCKS - 2 :] = False  # a run that is shorter
     by_state = 0.2 * rng.standard_normal((RUNS, BLOCKS - 1, 6, 6))
     reading = rng.standard_normal((RUNS, BLOCKS, NY, 6))
-    what = linear_filter(by_state, reading, known, BLOCK_S, rng.uniform(0.5, 2.0, 6))
+    what = linear_filter(by_state, reading, known, BLOCK_S, rng.uniform(0.5, 2.0, 6), np.array([0.4, 2.5]))
     sizes = [rng.uniform(0.3, 1.5, count) for count in (NY, NY, 3)]
     times = [rng.uniform(1.0, 20.0, count) for count in (NY, 3)]
     return what, NoiseLevels(sizes[0], sizes[1], times[0], sizes[2], times[1]), rng

@@ -162,6 +162,18 @@ def test_noise_is_that_of_a_mean_over_the_readings_in_a_block(model: Model, step
         assert motion.noise[place] == pytest.approx(0.1 * WAVES[name] / np.sqrt(motion.fine * readings), rel=0.1)
 
 
+def test_of_trials_that_sample_differently_each_has_the_noise_of_its_means(model: Model) -> None:
+    """0.6 s hold 24 readings or 1, of which the block of one step is the mean."""
+    steps = (0.025, 0.6)
+    trials = [record(wave, name=str(step), step=step, noise=0.1, duration=600.0) for step in steps]
+    motion = batch_trials(model, trials, SHIP_TIME)
+    assert motion.averaged == pytest.approx([24, 1])
+    for run, readings in enumerate(motion.averaged):
+        for place, name in enumerate(order_of(motion)):
+            expected = 0.1 * WAVES[name] / np.sqrt(motion.fine * readings)
+            assert motion.noise[place] * np.sqrt(motion.noise_shares[run]) == pytest.approx(expected, rel=0.15), name
+
+
 def test_a_signal_without_noise_still_has_one(model: Model) -> None:
     trial = record(ramp)
     still = Trial(trial.path, trial.time_s, {**trial.signals, "v_mps": np.zeros(len(trial.time_s))})

@@ -85,7 +85,8 @@ def test_logarithms_of_the_noise_go_there_and_back() -> None:
 
 def still(A: np.ndarray, h: float) -> Linear:
     """One block of a motion with slopes A, read in all its states."""
-    return linear_filter(A[None, None], np.tile(np.eye(6), (1, 2, 1, 1)), np.ones((1, 2, 6), dtype=bool), h, np.ones(6))
+    known = np.ones((1, 2, 6), dtype=bool)
+    return linear_filter(A[None, None], np.tile(np.eye(6), (1, 2, 1, 1)), known, h, np.ones(6), np.ones(1))
 
 
 def test_transition_and_spreading_are_the_exponential_and_its_integral_to_third_order() -> None:

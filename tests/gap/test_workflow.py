@@ -152,7 +152,7 @@ def test_where_nothing_is_hidden_nothing_is_named_out_of_the_whole_library(tmp_p
 def test_what_no_effect_makes_is_said_to_be_outside_the_library(outsider: str, tmp_path: Path) -> None:
     case = hidden(tmp_path, outsider)
     assert case.gap.verdict == OUTSIDE_LIBRARY and case.named == set()
-    assert any("nothing in the library" in notice for notice in case.gap.notices)
+    assert any("no tried effect" in notice for notice in case.gap.notices)
     assert case.gap.improved == case.gap.card
 
 

@@ -194,13 +194,19 @@ def test_the_step_of_an_order_is_the_execute_and_the_gear_has_a_dead_time(model,
     np.testing.assert_allclose(again["execute_times_s"][:2], figures["execute_times_s"][:2], atol=0.3)
 
 
-def test_an_order_alone_is_executed_at_its_step(model):
-    trial = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 12.0), 240.0)
-    order = np.where(trial.time_s >= 12.0, np.deg2rad(30), 0.0)[::5]
-    signals = {name: values[::5] for name, values in trial.signals.items() if name != "delta_rad"}
-    what = recorded(replace(trial, time_s=trial.time_s[::5], signals={**signals, "delta_order_rad": order}), model)
-    assert what.begin_s == 12.0
+def test_an_order_alone_was_given_between_the_last_row_without_it_and_the_first_with_it(model):
+    """At 12.6 s, in rows of 1 s: 12.5 +- 0.29 s."""
+    trial = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 12.6), 240.0)
+    order = np.where(trial.time_s >= 12.6, np.deg2rad(30), 0.0)[::10]
+    signals = {name: values[::10] for name, values in trial.signals.items() if name != "delta_rad"}
+    what = recorded(replace(trial, time_s=trial.time_s[::10], signals={**signals, "delta_order_rad": order}), model)
+    assert what.begin_s == pytest.approx(12.5)
     assert what.rudder_rate_radps is None
+    point = 0.01 * dict(zip(model.parameter_names, model.parameter_values(), strict=True))["ship.length"]
+    zero = recorded(trial, model).reading_errors["advance_m"]
+    assert zero > point
+    late = math.sqrt(what.reading_errors["advance_m"] ** 2 - zero**2)
+    assert late == pytest.approx(SPEED / math.sqrt(12), rel=0.1)
 
 
 @pytest.mark.parametrize("begin_s", [0.0, 12.0])
@@ -218,21 +224,40 @@ def test_a_turn_by_its_order_alone_is_repeated_from_the_rudder_before_the_order(
     assert again["advance_m"] == pytest.approx(what.figures["advance_m"], abs=1.0)
 
 
-def test_a_record_that_begins_in_a_turn_begins_with_the_rudder_over(model):
-    whole = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 2.0), 240.0)
-    rows = whole.time_s >= 40.0
-    signals = {name: values[rows] for name, values in whole.signals.items() if name != "delta_rad"}
-    signals["delta_order_rad"] = np.full(np.count_nonzero(rows), np.deg2rad(30))
-    what = recorded(replace(whole, time_s=whole.time_s[rows], signals=signals), model)
-    assert what.start["initial.rudder_angle"] == pytest.approx(np.deg2rad(30))
+@pytest.mark.parametrize("kind", ["turn", "zigzag"])
+def test_a_record_that_begins_in_a_manoeuvre_has_no_figures(model, kind):
+    steered = controller(np.deg2rad(20), np.deg2rad(10), 0.0, begin=2.0)
+    whole = sail(steered if kind == "zigzag" else lambda t, turned, before: np.deg2rad(30) * (t >= 2.0), 240.0)
+    assert recorded(whole, model) is not None
+    rows = whole.time_s >= 9.0
+    for rudder in ("delta_rad", "delta_order_rad"):
+        signals = {name: values[rows] for name, values in whole.signals.items() if name != "delta_rad"}
+        signals[rudder] = whole.signals["delta_rad"][rows]
+        assert recorded(replace(whole, time_s=whole.time_s[rows], signals=signals), model) is None
+
+
+def test_a_rudder_that_is_held_at_other_angles_in_between_makes_no_zigzag(model):
+    """As random steps do: the reversals are those of a zigzag, and a third of the time the rudder is at 8 deg."""
+    plain = controller(np.deg2rad(20), np.deg2rad(10), 0.0)
+    state = {"before": 0.0, "since": 0.0}
+
+    def stepped(t, turned, before):
+        order = plain(t, turned, before)
+        if order != state["before"]:
+            state.update(before=order, since=t)
+        return 0.4 * order if order and t - state["since"] < 12.0 else order
+
+    trial = sail(stepped, 300.0)
+    assert recorded(sail(plain, 300.0), model) is not None
+    assert recorded(trial, model) is None
 
 
 def test_the_rudder_of_a_zigzag_moves_at_the_rate_of_its_reversals(model):
     """In the first movement, half as long, a noisy angle shows another rate."""
     trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 300.0)
     rudder = trial.signals["delta_rad"].copy()
-    early = (trial.time_s > 12.0) & (trial.time_s < 19.0)
-    rudder[early] = np.deg2rad(20) * (trial.time_s[early] - 12.0) / 10.0  # at 2 deg/s, then a jump
+    early = (trial.time_s > 12.0) & (trial.time_s < 22.0)
+    rudder[early] = np.deg2rad(20) * (trial.time_s[early] - 12.0) / 10.0  # at 2 deg/s
     what = recorded(replace(trial, signals={**trial.signals, "delta_rad": rudder}), model)
     assert what.rudder_rate_radps == pytest.approx(RATE, rel=0.05)
 

@@ -29,7 +29,7 @@ from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from
 from tank2sim.gap.outcome.combine import combine_passes, without_effect
 from tank2sim.gap.outcome.improve_card import Found, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
-from tank2sim.gap.outcome.notices import gap_notices
+from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
 from tank2sim.gap.proof.cross_check import MUCH, REMAINS, BlackBox, black_box, closes_gap
 from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, corrected, sensor_faults
 from tank2sim.gap.proof.judge import Judge, Judged
@@ -162,7 +162,8 @@ def run_gap_workflow(
             both = combine_passes(gap, further)
             smaller = _smaller(card, (fitted, held), (gap, both), options, pool)
             gap, trials = smaller or (both, found_trials)
-        return replace(gap, notices=(*lowered_bound_notice(given, card), *gap.notices))
+        tried = of_tried_effects(_names(card, fitted, options), candidate_explanations(card, fitted.driven_by))
+        return replace(gap, notices=(*lowered_bound_notice(given, card), *tried, *gap.notices))
 
 
 def _without_heel(group: Measured) -> Measured:
@@ -369,12 +370,11 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
         for name, value in trial.noise.items()
         if name in OBSERVED_SIGNALS
     }
-    readings = motion.fine * motion.averaged
     waves = found.likelihood.belief.waves
     in_waves = waves.motion if waves else {}
     sizes = {}
     for place, name in enumerate(motion.seen):
-        sigma = float(np.sqrt(noise.white[place] ** 2 * readings + noise.slow[place] ** 2))
+        sigma = float(np.sqrt(noise.white[place] ** 2 * motion.readings + noise.slow[place] ** 2))
         size, origin = (stated[name], "stated") if name in stated else (sigma, "estimated")
         sizes[name] = float(np.hypot(size, in_waves.get(name, 0.0))), origin
     return sizes

@@ -120,6 +120,11 @@ def fault_of(trial: Trial) -> str:
     return ""
 
 
+ROWS_TO_SHOW_AN_ORDER = 0.5
+"""Mean time from an order to the first row that shows it, in rows, of a record that asks for the order once a row; it
+is evenly distributed between 0 and 1."""
+
+
 def sampling_step(trial: Trial) -> float:
     """Median of the time between rows, s."""
     return float(np.median(np.diff(trial.time_s)))

@@ -13,9 +13,7 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.signal import savgol_coeffs, savgol_filter
-from scipy.stats import t as student
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -25,16 +23,14 @@ from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.steering_gear import UNSTATED_LAG
 from tank2sim.records.audit.noise import white_noise
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, rudder_before
+from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, holds_other_angles, rudder_before
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
-
-NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
-"""Headings at which zigzags are reversed (ITTC 7.5-04-02-01, and the modified ones of SIMMAN)."""
+from tank2sim.simulation.zigzag_reversals import COURSE_ERROR, FittedZigzag, fitted_zigzag
 
 STATES = {
     "u_mps": "motion.u",
@@ -58,27 +54,9 @@ FED = {
 SMOOTHING = 0.3
 """Smoothing time of recorded signals for figures, L/u0 (project choice: below the time of any peak)."""
 
-COURSE_ERROR = math.radians(0.25)
-"""Standard error of a zigzag's course from the heading of its approach, in addition to the scatter of that heading: the
-courses of MARIN's zigzags differ by 0.1 to 0.2 deg from the first headings of their records (project choice)."""
-
 POINT_ERROR = 0.01
 """Standard error of the place of the measured point along the ship, in ship lengths: antennas and model origins are
 stated to a per cent of the length at best (project choice)."""
-
-LAG = 0.1
-"""Prior scale of the lags of helmsmen and controllers, in L/u0: HSVA's are 0.06, MARIN's 0.02, those
-of the 3 m Esso Osaka 0.03. It matters only with too few reversals for the lag (project choice)."""
-
-CONFIDENT = 0.975
-"""Level of agreement of a nominal heading with the reversals: their two-sided interval of 95 %."""
-
-NO_LAG = 1e-6
-"""Share of its scale below which a lag counts as zero: the residual of a search that ends at its bound."""
-
-ASTRAY = 0.2
-"""Largest scatter of the reversal headings of a zigzag, as a share of the nominal heading: some 10 % by helmsmen of the
-3 m Esso Osaka in wind (project choice)."""
 
 HALF_TURNS = 2.0
 """Duration of a simulated turn over the time of the measured one to 180 deg."""
@@ -106,10 +84,10 @@ class Recorded:
     figures : Figures
         As measured.
     errors : dict
-        Standard errors of the joint fit of a zigzag's reversals: ``heading_rad``, ``course_rad``, ``lag_s``.
+        Standard errors of the joint fit of a zigzag's reversals (:func:`.fitted_zigzag`).
     reading_errors : dict
-        Standard errors with which figures can be read off the record, by what is uncertain of the measured point and of
-        the heading's zero: m for distances of turns, rad for overshoots.
+        Standard errors of figures by what is uncertain of the measured point, of the heading's zero and of the time of a
+        turn's order: m for distances of turns, rad for overshoots, s for times of zigzags.
     """
 
     trial: Trial
@@ -137,12 +115,19 @@ class Recorded:
         return f"zigzag {rudder:.3g}/{math.degrees(self.manoeuvre.heading):.3g}, reversed {late}"
 
 
-TURNS_AT_EXECUTE = 0.2
-"""Share of the largest yaw rate of a record above which the ship turns at its execute (project choice)."""
+TURNS_AT_EXECUTE = 0.1
+"""Share of the largest yaw rate of a record above which the ship turns at its execute: 0.07 at most in the trials of the
+3 m Esso Osaka, 0.04 in those of HSVA and MARIN (project choice)."""
+
+_ABOVE_NOISE = 3.0
+"""Standard deviations by which a yaw rate exceeds its noise (project choice: one reading in 370)."""
 
 
 def recorded(trial: Trial, model: Model) -> Recorded | None:
     """Recognise a turning circle or a zigzag in a trial; None if it is neither.
+
+    Both begin on a straight course. A record that begins in a manoeuvre has no figures, and a rudder that is held at
+    other angles in between makes no zigzag.
 
     Parameters
     ----------
@@ -159,15 +144,18 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     if smooth is None:
         return None
     first = held[0]
+    if _turning(trial, first, smooth["r_radps"], ship_time):
+        return None
     turned = np.abs(smooth["psi_rad"] - np.interp(first.execute_s, trial.time_s, smooth["psi_rad"]))
     inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
     manoeuvre: Turn | Zigzag | None = None
-    errors: dict[str, float] = {}
+    zigzag: FittedZigzag | None = None
     wait = float(np.median([angle.moves_s - angle.execute_s for angle in held]))
     if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in pairwise(held)):
-        found = _zigzag(trial.time_s, held, smooth, _heading_noise(trial, ship_time), ship_time)
-        if found is not None:
-            manoeuvre, errors = replace(found[0], wait_s=wait), found[1]
+        noise = _smoothed_noise(trial, "psi_rad", ship_time)
+        if not holds_other_angles(trial, held):
+            zigzag = fitted_zigzag(trial.time_s, held, smooth, noise, ship_time)
+        manoeuvre = replace(zigzag.manoeuvre, wait_s=wait) if zigzag else None
         end = float(trial.time_s[-1])
     elif turned[inside].max(initial=0.0) > math.radians(120):
         manoeuvre, end = Turn(first.angle, first.moves_s - first.execute_s), first.end_s
@@ -176,14 +164,13 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
-    rates = np.abs(smooth["r_radps"])
-    turning = bool(np.interp(first.execute_s, trial.time_s, rates) > TURNS_AT_EXECUTE * rates.max())
-    start["initial.rudder_angle"] = rudder_before(trial, first, turning=turning)
+    start["initial.rudder_angle"] = rudder_before(trial, first)
     inputs = _fed(trial, model)
-    if isinstance(manoeuvre, Turn):
-        reading = _turn_reading_errors(track, float(values["ship.length"]))
+    if zigzag:
+        errors, reading = zigzag.errors, zigzag.reading_errors
     else:
-        reading = {f"overshoot_{number}_deg": errors["course_rad"] for number in (1, 2)}
+        errors = {}
+        reading = _turn_reading_errors(track, float(values["ship.length"]), _order_error(trial, first))
     rate = first.rate
     reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
     if isinstance(manoeuvre, Zigzag) and reversals:  # the first movement is half as long, and its rate half as certain
@@ -191,20 +178,35 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     return Recorded(trial, manoeuvre, first.execute_s, end, rate, start, inputs, figures, errors, reading)
 
 
-def _turn_reading_errors(track: Trajectory, length: float) -> dict[str, float]:
+def _turning(trial: Trial, first: HeldAngle, rates: Array, ship_time: float) -> bool:
+    """True if the ship turns at the first execute, by her smoothed yaw rates (n,), rad/s, beyond their noise."""
+    noise = _smoothed_noise(trial, "r_radps", ship_time) if "r_radps" in trial.signals else 0.0
+    rate = abs(float(np.interp(first.execute_s, trial.time_s, rates)))
+    return rate > max(TURNS_AT_EXECUTE * float(np.max(np.abs(rates))), _ABOVE_NOISE * noise)
+
+
+def _order_error(trial: Trial, held: HeldAngle) -> float:
+    """Standard error of the time of an order, s: that of a uniform distribution over a row where only orders are
+    known."""
+    return 0.0 if held.rate is not None else sampling_step(trial) / math.sqrt(12)
+
+
+def _turn_reading_errors(track: Trajectory, length: float, order_error: float) -> dict[str, float]:
     """Standard errors of a turn's distances, m.
 
     A point p ahead of the place that is taken for it changes the advance by -p and the transfer by p (heading 90 deg),
     and the tactical diameter by nothing (180 deg). With a heading's zero off by e the axes turn: a distance changes by
-    e times the one across it, where it is read.
+    e times the one across it, where it is read. With an order given e later (s, standard error `order_error`) the
+    advance is shorter by e times the speed ahead.
     """
     psi, x, y = (track[f"motion.{name}"] - track[f"motion.{name}"][0] for name in ("psi", "x", "y"))
     course = track["motion.psi"][0]
     ahead, side = x * math.cos(course) + y * math.sin(course), y * math.cos(course) - x * math.sin(course)
     turned = np.maximum.accumulate(np.abs(psi))
     point, errors = POINT_ERROR * length, {}
+    late = order_error * float(track["motion.u"][0])
     for name, angle, across, shift in (
-        ("advance_m", 90.0, side, point),
+        ("advance_m", 90.0, side, math.hypot(point, late)),
         ("transfer_m", 90.0, ahead, point),
         ("tactical_diameter_m", 180.0, ahead, 0.0),
     ):
@@ -268,158 +270,11 @@ def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float
     )
 
 
-def _zigzag(
-    time: Array, held: list[HeldAngle], smooth: dict[str, Array], noise: float, ship_time: float
-) -> tuple[Zigzag, dict[str, float]] | None:
-    """Rudder, nominal heading, course and lag of a zigzag, and their standard errors; None if it is not a zigzag.
-
-    At each reversal k, ordered at t_k, the heading `lag` s earlier was that of the reversal: psi(t_k - lag) = course +
-    s_k nominal, s_k = 1 while the rudder was to starboard. Course, nominal heading and lag are fitted to all reversals
-    together by least squares, with the approach's heading as another reading of the course, and :data:`LAG` as prior of
-    the lag. The nominal heading is then that of a usual zigzag, if one agrees. `noise` is the standard deviation of the
-    smoothed heading, rad.
-    """
-    times = np.array([each_angle.execute_s for each_angle in held[1:]])
-    sides = np.array([math.copysign(1.0, each_angle.angle) for each_angle in held[:-1]])
-    if np.min(sides * np.interp(times, time, smooth["r_radps"])) <= 0:
-        return None
-    approach = _approach(time, held[0], smooth)
-    reversals = _Reversals(time, smooth["psi_rad"], times, sides, approach, LAG * ship_time)
-    found = _usual(reversals, math.hypot(noise, _dating_noise(time, times, smooth)), round(_degrees(held)))
-    if found is None:
-        return None
-    free, fitted = found
-    first, second = (float(np.median([held_angle.angle for held_angle in held[side::2]])) for side in (0, 1))
-    errors = {"heading_rad": free.errors[1], "course_rad": fitted.errors[0], "lag_s": fitted.errors[-1]}
-    return Zigzag(first, fitted.nominal, fitted.lag, fitted.course, opposite=second), errors
-
-
-def _degrees(held: list[HeldAngle]) -> float:
-    """Rudder of a zigzag, deg."""
-    return math.degrees(float(np.median([abs(held_angle.angle) for held_angle in held])))
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """Course, nominal heading and lag; their standard errors (without that of a given nominal heading); the
-    weighted sum of squares, and the sum of squares of the reversals alone, rad2."""
-
-    course: float
-    nominal: float
-    lag: float
-    errors: tuple[float, ...]
-    cost: float
-    squares: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Reversals:
-    """Least-squares problem of the reversals of a zigzag.
-
-    Parameters
-    ----------
-    time, heading : array (n,)
-        s, rad.
-    times, sides : array (k,)
-        Time of each reversal's order, and the side of the rudder before it.
-    approach : (float, float)
-        Course by the approach, and its standard error, rad.
-    lag_scale : float
-        Prior scale of lags, s.
-    """
-
-    time: Array
-    heading: Array
-    times: Array
-    sides: Array
-    approach: tuple[float, float]
-    lag_scale: float
-
-    def fit(self, noise: float, nominal: float | None = None) -> _Fit:
-        """The least-squares fit for a standard deviation of the reversal headings, rad; with a given `nominal` one."""
-        course, error = self.approach
-
-        def off(at: Array, heading: float) -> Array:
-            before = np.interp(self.times - at[-1], self.time, self.heading)
-            return np.asarray(before - at[0] - self.sides * heading, dtype=np.float64)
-
-        def residuals(at: Array) -> Array:
-            heading = at[1] if nominal is None else nominal
-            return np.concatenate([off(at, heading) / noise, [(at[0] - course) / error, at[-1] / self.lag_scale]])
-
-        reached = float(np.mean(self.sides * (np.interp(self.times, self.time, self.heading) - course)))
-        start, scale = np.array([course, reached, 0.1 * self.lag_scale]), np.array([0.01, 0.01, 1.0])
-        lowest = np.array([-np.inf, -np.inf, 0.0])
-        keep = [0, 1, 2] if nominal is None else [0, 2]
-        found = least_squares(residuals, start[keep], bounds=(lowest[keep], np.inf), x_scale=scale[keep])
-        heading = float(found.x[1]) if nominal is None else nominal
-        errors = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
-        lag = float(found.x[-1])
-        lag = lag if lag > NO_LAG * self.lag_scale else 0.0
-        squares = float(np.sum(off(found.x, heading) ** 2))
-        return _Fit(float(found.x[0]), heading, lag, tuple(map(float, errors)), 2 * float(found.cost), squares)
-
-
-def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, _Fit] | None:
-    """The free fit, and that with the nominal heading of an agreeing usual zigzag; None if it is not a zigzag.
-
-    The candidates are, in this order, the rudder's angle (10/10, 20/20), the usual headings, and whole degrees; if none
-    agrees, the free fit is kept. With more than three reversals their scatter gives the tolerance (Student's t); with
-    three or fewer it is the residual with the nominal heading.
-    """
-    count = len(reversals.times)
-    spare = count - 3
-    free = reversals.fit(noise)
-    if spare > 0:
-        noise = max(noise, math.sqrt(free.squares / spare))
-        free = reversals.fit(noise)
-    limit = float(student.ppf(CONFIDENT, spare if spare > 0 else np.inf)) ** 2
-    whole = math.floor(math.degrees(free.nominal))
-    choices: tuple[tuple[int, ...], ...] = (
-        (rudder_deg,),
-        NOMINAL_HEADINGS_DEG,
-        (whole, whole + 1) if count > 1 else (),
-    )
-    for angles in choices:
-        agreeing = []
-        for angle in (math.radians(angle) for angle in angles if angle > 0):
-            fitted = reversals.fit(noise, angle)
-            if count == 3:
-                fitted = reversals.fit(max(noise, math.sqrt(fitted.squares)), angle)
-            if fitted.cost - free.cost <= limit and _keeps_to(reversals, fitted):
-                agreeing.append(fitted)
-        if agreeing:
-            return free, min(agreeing, key=lambda agreed: agreed.cost)
-    return (free, free) if count > 1 and _keeps_to(reversals, free) else None
-
-
-def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
-    """True if the reversals are those of a zigzag (:data:`ASTRAY`); a single one needs a known course."""
-    scatter = math.sqrt(fitted.squares / len(reversals.times))
-    if len(reversals.times) == 1:
-        scatter = reversals.approach[1]
-    return scatter <= ASTRAY * fitted.nominal
-
-
-def _heading_noise(trial: Trial, ship_time: float) -> float:
-    """Standard deviation of the heading's noise after smoothing, rad."""
+def _smoothed_noise(trial: Trial, name: str, ship_time: float) -> float:
+    """Standard deviation of a signal's noise after smoothing, SI."""
     window = _window(trial.time_s, ship_time)
     gain = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
-    return math.sqrt(gain) * trial.noise.get("psi_rad", white_noise(trial.signals["psi_rad"]))
-
-
-def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[float, float]:
-    """Mean heading before the first execute, and its standard error as the course, rad."""
-    until = max(2, int(np.searchsorted(time, first.execute_s)))
-    heading = smooth["psi_rad"][:until]
-    wandered = max(float(np.std(heading)), 0.5 * abs(float(heading[-1] - heading[0])))
-    return float(np.mean(heading)), math.hypot(COURSE_ERROR, wandered)
-
-
-def _dating_noise(time: Array, times: Array, smooth: dict[str, Array]) -> float:
-    """Standard deviation of the headings at reversals because of their time resolution of a sample, rad."""
-    rate = float(np.sqrt(np.mean(np.interp(times, time, smooth["r_radps"]) ** 2)))
-    return rate * float(np.median(np.diff(time))) / math.sqrt(12)
+    return math.sqrt(gain) * trial.noise.get(name, white_noise(trial.signals[name]))
 
 
 def _trajectory(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
 
 Places = NDArray[np.int64]
 
@@ -22,6 +22,14 @@ _HELD = 0.05
 """A rudder is held when it stays within a share STEADY of an angle for a share HELD of the longest such time: project
 choices. In the approaches of the 3 m Esso Osaka it stays for at most 2 % of that, at the first angle of zigzags of the
 KVLCC2 for at least 13 % (35/5)."""
+
+_OVER = 0.8
+"""Share of the usual largest angle from which a rudder is over (project choice: above the zigzag's other angles)."""
+
+_BAND, _BETWEEN = 0.1, 0.3
+"""A rudder is held between two angles if it is within a BAND (a share of the usual largest angle) for a share BETWEEN of
+the median time for which it is over: project choices. A rudder that moves through it takes a twentieth of the time from
+side to side."""
 
 STEEPER = 3.0
 """Factor by which a moving rudder does not accelerate: gears have constant or falling rates (project choice)."""
@@ -46,7 +54,8 @@ class HeldAngle:
     angle : float
         The angle reached, rad, positive to starboard.
     execute_s : float
-        Time of the order: its step where the record has it, else the start of the rudder's motion.
+        Time of the order where the record has it, before the first row that shows it
+        (:data:`.ROWS_TO_SHOW_AN_ORDER`), else the start of the rudder's motion.
     moves_s : float
         Start of the rudder's motion; the execute where only the order is known.
     rate : float or None
@@ -89,17 +98,33 @@ def rudder_of(trial: Trial) -> Array:
     return _held_order(trial.time_s, *order)
 
 
-def rudder_before(trial: Trial, held: HeldAngle, *, turning: bool) -> float:
+def holds_other_angles(trial: Trial, held: list[HeldAngle]) -> bool:
+    """True if the rudder is held at another angle between two of its `held` angles, or between two times of one."""
+    time, rudder = trial.time_s, rudder_of(trial)
+    size = _usual_largest(rudder)
+    over = np.abs(rudder) > _OVER * size
+    begins = [held[0].moves_s, *(held_angle.end_s for held_angle in held[:-1])]
+    stretches = [(time > begin) & (time <= held_angle.end_s) for begin, held_angle in zip(begins, held, strict=True)]
+    usual_time = float(np.median([np.count_nonzero(over & stretch) for stretch in stretches]))
+    for stretch in stretches:
+        angles = np.sort(rudder[stretch & ~over])
+        near = np.searchsorted(angles, angles + _BAND * size, side="right") - np.arange(len(angles))
+        if np.max(near, initial=0) > _BETWEEN * usual_time:
+            return True
+    return False
+
+
+def rudder_before(trial: Trial, held: HeldAngle) -> float:
     """The rudder's angle at an execute, rad.
 
-    Where only orders are known, it is the order of the row before, for the rudder moves after its order; in a record
-    that begins at the execute amidships, unless the ship is `turning` there.
+    Where only orders are known, it is the order of the row before, for the rudder moves after its order; amidships in a
+    record that begins at the execute.
     """
     rudder = rudder_of(trial)
     if held.rate is not None:
         return float(np.interp(held.execute_s, trial.time_s, rudder))
     row = int(np.searchsorted(trial.time_s, held.execute_s))
-    return float(rudder[row - 1]) if row else float(rudder[0]) * turning
+    return float(rudder[row - 1]) if row else 0.0
 
 
 def _known(trial: Trial, name: str) -> tuple[Array, Array] | None:
@@ -149,7 +174,8 @@ def _of_order(trial: Trial) -> list[HeldAngle]:
         )
         way = math.copysign(1.0, angle - previous) * (order[before : int(group[0]) + 1] - previous)
         still = np.flatnonzero(way < LEAVING * abs(angle - previous))
-        execute = float(time[min(before + int(still[-1]) + 1, int(group[0]))] if len(still) else time[before])
+        shown = float(time[min(before + int(still[-1]) + 1, int(group[0]))] if len(still) else time[before])
+        execute = max(shown - ROWS_TO_SHOW_AN_ORDER * sampling_step(trial), float(time[0]))
         found.append(HeldAngle(angle, execute, execute, None, float(time[group[-1]])))
         before = int(group[-1])
     return found
@@ -177,16 +203,21 @@ def _begins(time: Array, rudder: Array, origin: float, angle: float) -> tuple[fl
     return most - 0.7 * whole / rate, rate
 
 
+def _usual_largest(rudder: Array) -> float:
+    """Largest angle of a rudder (n,) without the 5 % beyond it, rad."""
+    return float(np.percentile(np.abs(rudder), 95))
+
+
 def _held(rudder: Array) -> list[Places]:
     """Samples of each held angle, with alternating sides.
 
     The rudder of the approach may reach the angles of the manoeuvre, but is never constant: samples before the first
     held angle belong to the approach.
     """
-    size = float(np.percentile(np.abs(rudder), 95))
+    size = _usual_largest(rudder)
     if size < _LEAST_RUDDER:
         return []
-    side = np.where(np.abs(rudder) > 0.8 * size, np.sign(rudder), 0)
+    side = np.where(np.abs(rudder) > _OVER * size, np.sign(rudder), 0)
     places = np.flatnonzero(side)
     parts = np.split(places, np.flatnonzero((np.diff(side[places]) != 0) | (np.diff(places) > 1)) + 1)
     runs = [part for part in parts if len(part) >= 3]

@@ -37,6 +37,24 @@ def trial_of(card, name: str, manoeuvre, seed: int = 0) -> Trial:
     return Trial(Path(f"{name}.csv"), times, signals, noise=NOISE)
 
 
+def read_once_a_second(trial: Trial, offset: float) -> Trial:
+    """The rudder's order in place of its angle, in rows a second apart that begin `offset` after one of the trial.
+
+    The order is the sign of the rudder's motion: it changes where the rudder begins to move.
+    """
+    times = np.arange(trial.time_s[0] + 1.0 + offset, trial.time_s[-1], 1.0)
+    angle, size = trial.signals["delta_rad"], np.max(np.abs(trial.signals["delta_rad"]))
+    moves = np.abs(np.diff(angle)) > 1e-4
+    order = np.zeros(len(angle))
+    for row in range(1, len(angle)):
+        order[row] = math.copysign(size, angle[row] - angle[row - 1]) if moves[row - 1] else order[row - 1]
+    shown = order[np.searchsorted(trial.time_s, times, side="right") - 1]
+    signals = {
+        name: np.interp(times, trial.time_s, values) for name, values in trial.signals.items() if name != "delta_rad"
+    }
+    return replace(trial, time_s=times, signals={**signals, "delta_order_rad": shown})
+
+
 @pytest.fixture(scope="module")
 def trials(mariner_card):
     manoeuvres = {"turn": Turn(math.radians(20)), "zigzag": Zigzag(math.radians(20), math.radians(20))}
@@ -71,11 +89,30 @@ def test_without_members_nothing_is_known_of_the_inputs_and_no_figure_is_judged(
     )
 
 
+@pytest.mark.parametrize("once_a_second", [False, True])
+def test_the_errors_of_an_exact_card_are_as_large_as_the_uncertainty_of_the_data(mariner_card, once_a_second) -> None:
+    """Where only orders are known, once a second, the ship goes 2 m on average before the row that shows the order."""
+    ratios = []
+    manoeuvres = {"turn": Turn(math.radians(20)), "zigzag": Zigzag(math.radians(20), math.radians(20))}
+    for seed, offset in enumerate((0.1, 0.35, 0.6, 0.85)):
+        records = [trial_of(mariner_card, name, manoeuvre, seed) for name, manoeuvre in manoeuvres.items()]
+        if once_a_second:
+            records = [read_once_a_second(record, offset) for record in records]
+        ratios += [figure.error / figure.data for figure in validate_card(mariner_card, records, 0).figures]
+    assert len(ratios) == 36
+    assert 0.3 < np.sqrt(np.mean(np.square(ratios))) < 1.5, ratios
+    assert np.max(np.abs(ratios)) < 4.0
+
+
 def test_repeats_enter_the_uncertainty_of_the_data(mariner_card, trials) -> None:
     again = trial_of(mariner_card, "again", Turn(math.radians(20.3)), seed=1)
-    alone, both = (validate_card(mariner_card, those, 0).figures[0] for those in (trials[:1], [trials[0], again]))
-    assert alone.name == both.name == "advance_m"
-    assert both.data > 2 * alone.data and both.inputs is None
+    alone, repeated, both = (
+        {figure.trial: figure for figure in validate_card(mariner_card, those, 0).figures if figure.name == "advance_m"}
+        for those in (trials[:1], [again], [trials[0], again])
+    )
+    between = (alone["turn"].measured - repeated["again"].measured) / math.sqrt(2)  # deviation of one of two runs
+    assert both["turn"].data == pytest.approx(math.hypot(alone["turn"].data, between))
+    assert abs(between) > alone["turn"].data and both["turn"].inputs is None
 
 
 def test_the_validation_uncertainty_is_twice_the_root_of_the_squares() -> None:

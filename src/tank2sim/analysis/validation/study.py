@@ -12,9 +12,10 @@ Coleman and Paterson (2001), J. Fluids Engineering 123. The factor of 2 is for 9
   grids with its factor of safety of 3 (Roache 1998), of first order, to which limits and switches of the rudder reduce
   Runge-Kutta's fourth. u_num is half of it.
 - u_input: deviation of an ensemble with the errors of all numbers on the card, and their covariance if it has one.
-- u_D: the trial's figures are evaluated again with added noise of its signals, and, where a manoeuvre was
-  run several times, the deviation between its runs; times are known to a sample (over sqrt 12). It does not include
-  weather and errors common to all runs.
+- u_D: the trial is evaluated again with added noise of its signals, and simulated from there: the deviation of E. With
+  it the errors of the measured point, of the heading's zero, and of the times of orders and reversals; times are known
+  to a sample (over sqrt 12). Where a manoeuvre was run several times, the deviation between its runs. It does not
+  include weather and errors common to all runs.
 """
 
 from __future__ import annotations
@@ -39,7 +40,6 @@ from tank2sim.analysis.validation.standard_trials import (
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, standard_errors_in_words, study_model
-from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.marks import EXTRAPOLATED
@@ -49,6 +49,7 @@ from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbe
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
+from tank2sim.units import from_si
 
 COVERAGE = 2.0
 """Expanded over standard uncertainty: 95 %."""
@@ -223,7 +224,8 @@ def validate_card(
     drawn, of_errors = members(card, model, count)
     known = [(trial, recorded(trial, model)) for trial in trials]
     messages = [
-        f"{trial.name}: neither a turning circle nor a zigzag with speed, yaw rate and track: only replayed"
+        f"{trial.name}: neither a turning circle nor a zigzag from a straight course, with heading and track: only "
+        "replayed"
         for trial, what in known
         if what is None
     ]
@@ -246,7 +248,8 @@ def validate_card(
             )
     if whats and not between:
         messages.append(
-            "no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound"
+            "no manoeuvre was run twice alike: u_D is of the record's noise and the errors of its point, heading and "
+            "orders, without weather and helmsman, and so a lower bound"
         )
     if not count:
         messages.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
@@ -297,12 +300,17 @@ def _validated(
     measured = compare_figures(what)
     (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
     ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
-    inputs, data = member_spread(ensemble), _read_again(what, engines[0].model)
+    inputs, data = member_spread(ensemble), _read_again(what, engines[0])
     messages = [
         f"{what.trial.name}: {name}: too few members of the ensemble reach it to determine u_input"
         for name in measured
         if drawn and name in coarse and name not in inputs
     ]
+    if what.rudder_rate_radps is None and what.begin_s <= what.trial.time_s[0]:
+        messages.append(
+            f"{what.trial.name}: the record begins with the order given, which is taken to be given in its first row: "
+            "if it was given before, advance and times are too small by that time, and the figures are wrong"
+        )
     if beyond := [name for name in measured if read.outside(name) and name in coarse]:
         messages.insert(0, f"{what.trial.name}: {', '.join(beyond)}: {read.message}")
     rows = []
@@ -310,7 +318,8 @@ def _validated(
         simulated, finer = coarse.get(name), fine.get(name)
         halving = 0.0 if simulated is None or finer is None else abs(simulated - finer)
         sampled = sampling_step(what.trial) / math.sqrt(12) if name.endswith("_s") else 0.0
-        u_data = math.hypot(data.get(name, 0.0), between.get((kind(what), name), 0.0), sampled)
+        reading = from_si(name, what.reading_errors.get(name, 0.0))
+        u_data = math.hypot(data.get(name, 0.0), between.get((kind(what), name), 0.0), sampled, reading)
         u_input = inputs.get(name)
         u_num = SAFETY * halving / COVERAGE
         rows.append(Validated(what.trial.name, what.words, name, value, simulated, u_num, u_input, u_data))
@@ -358,17 +367,32 @@ def _between_repeats(whats: Sequence[Recorded]) -> dict[tuple[str, str], float]:
     return found
 
 
-def _read_again(what: Recorded, model: Model) -> Numbers:
-    """Standard deviation of each figure with added noise of the trial's signals."""
+def _read_again(what: Recorded, engine: Integrator) -> Numbers:
+    """Standard deviation of each E with added noise of the trial's signals, and other lags of a zigzag's reversals.
+
+    It is that of the measured figure and that of the simulated one, which begins at the measured state with the
+    measured rudder.
+    """
     noise = record_noise(what.trial)
-    readings = []
+    errors = []
     for number in range(READINGS):
         generator = np.random.default_rng([SEED, number])
         signals = {
             name: values + noise.get(name, 0.0) * generator.standard_normal(len(values))
             for name, values in what.trial.signals.items()
         }
-        again = recorded(replace(what.trial, signals=signals), model)
+        again = recorded(replace(what.trial, signals=signals), engine.model)
         if again is not None and type(again.manoeuvre) is type(what.manoeuvre):
-            readings.append(compare_figures(again))
-    return member_spread(readings)
+            simulated, _ = _repeated(_with_another_lag(again, generator), engine)
+            errors.append(
+                {name: simulated[name] - value for name, value in compare_figures(again).items() if name in simulated}
+            )
+    return member_spread(errors)
+
+
+def _with_another_lag(what: Recorded, generator: np.random.Generator) -> Recorded:
+    """A recorded zigzag with a lag drawn within its standard error; a turn as it is."""
+    if isinstance(what.manoeuvre, Turn):
+        return what
+    lag = max(0.0, what.manoeuvre.lag_s + what.errors["lag_s"] * generator.standard_normal())
+    return replace(what, manoeuvre=replace(what.manoeuvre, lag_s=lag))

@@ -75,7 +75,8 @@ class MeasuredBatch:
     measured : array (R, T, ny)
         Mean over each block, nan where nothing was measured.
     noise : array (ny,)
-        Standard deviation of the mean over a block, of the part that is too fast for a ship.
+        Standard deviation of the mean over a block, of the part that is too fast for a ship, in a run that reads as
+        often as the median.
     unsure_s : array (R,)
         Time from one reading of the rudder's order to the next, s: within it the order changed, at an unknown instant.
         0 where the rudder's angle was measured.
@@ -84,8 +85,8 @@ class MeasuredBatch:
     recorded : mapping
         Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
         `inputs` does not hold; directions without jumps of a full turn.
-    averaged : float
-        Readings of a sensor in a fine step, 1 or more, of which the measured values are the mean; median over the runs.
+    averaged : array (R,)
+        Readings of a sensor in a fine step, 1 or more, of which the measured values are the mean.
     """
 
     names: tuple[str, ...]
@@ -101,7 +102,18 @@ class MeasuredBatch:
     unsure_s: Array
     at_execute: _Truths
     recorded: Mapping[str, Array] = field(default_factory=dict)
-    averaged: float = 1.0
+    averaged: Array = field(default_factory=lambda: np.ones(1))
+
+    @property
+    def readings(self) -> float:
+        """Readings of a sensor in a block, median over the runs."""
+        return self.fine * float(np.median(self.averaged))
+
+    @property
+    def noise_shares(self) -> Array:
+        """Variance of the noise of each run's means, over that of a run that reads as often as the median (R,)."""
+        shares: Array = np.median(self.averaged) / np.broadcast_to(self.averaged, len(self.names))
+        return shares
 
     @property
     def block_s(self) -> float:
@@ -237,12 +249,13 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
     problem = Problem(model, (), np.zeros(0), np.zeros(0), runs)
     lengths = np.array([len(run.measured) // fine for run in runs])
     size = int(lengths.max()) * fine
+    averaged = np.array([max(1.0, step / sampling) for sampling in samplings])
     states, inputs, measured, noise = [], [], [], []
-    for run in runs:
+    for run, readings in zip(runs, averaged, strict=True):
         states.append(_padded(_smooth(measured_motion(problem, run).smooth, ship_time / step), size))
         inputs.append(_padded(run.inputs, size)[:-1])
         measured.append(_means(run, size, fine))
-        noise.append(sensor_noise(problem, run))
+        noise.append(sensor_noise(problem, run) * np.sqrt(readings / np.median(averaged)))
     return MeasuredBatch(
         names=tuple(run.name for run in runs),
         seen=seen,
@@ -256,7 +269,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         unsure_s=np.array([0.0 if "delta_rad" in trial.signals else sampling_step(trial) for trial in trials]),
         at_execute=np.zeros(len(runs), dtype=bool),
         recorded=_recorded(trials, runs, size, model.input_names),
-        averaged=max(1.0, step / float(np.median(samplings))),
+        averaged=averaged,
         noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
     )
 

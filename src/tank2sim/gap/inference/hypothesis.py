@@ -19,6 +19,7 @@ from tank2sim.dynamics.effects import EFFECTS, EffectParameter
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER
 from tank2sim.simulation.rows import ArrayFunction, Chain
 
 CLOCK = "rudder.clock"
@@ -311,8 +312,8 @@ class Hypothesis:
         )
         delays = {"rudder.command": 0.0} | self._delays(theta)
         for name, delay in delays.items():
-            # An order was given, on average, half a sampling interval before the first reading that shows it.
-            delay_of_run = delay - (0.5 * motion.unsure_s if name == "rudder.command" else 0.0 * motion.unsure_s)
+            shown_late_s = ROWS_TO_SHOW_AN_ORDER * motion.unsure_s * (name == "rudder.command")
+            delay_of_run = delay - shown_late_s
             if delay_of_run.any():
                 for place in self._states_behind(name):
                     unmeasured[:, :, place] = _late(unmeasured[:, :, place], delay_of_run / motion.step_s)

@@ -84,6 +84,8 @@ class Linear:
     block_s : float
     wide : array (6,)
         Standard deviation of the error of the smoothed motion at the beginning: generous.
+    noise_shares : array (R,)
+        Variance of the white noise of each run over that of :class:`NoiseLevels`.
     """
 
     transition: Array
@@ -92,9 +94,12 @@ class Linear:
     known: _Truths
     block_s: float
     wide: Array
+    noise_shares: Array
 
 
-def linear_filter(by_state: Array, reading: Array, known: _Truths, block_s: float, wide: Array) -> Linear:
+def linear_filter(
+    by_state: Array, reading: Array, known: _Truths, block_s: float, wide: Array, noise_shares: Array
+) -> Linear:
     """From the rates by states (R, T - 1, 6, 6): exp(A h), and its mean over the time to the end of the block.
 
     By Taylor's series over h/8 and three doublings (scaling and squaring: Moler and Van Loan 2003, SIAM Review 45).
@@ -115,6 +120,7 @@ def linear_filter(by_state: Array, reading: Array, known: _Truths, block_s: floa
         np.ascontiguousarray(known),
         block_s,
         wide,
+        noise_shares,
     )
 
 
@@ -246,7 +252,7 @@ def observer(linear: Linear, noise: NoiseLevels, waves: WaveBand | None = None) 
         push = np.concatenate([push, _in_pairs(B * block.gain.real, -B * block.gain.imag)], axis=-1)
         fading = np.concatenate([fading, [block.fading.real, block.fading.imag]])
     Q[..., 6:, :6] = Q[..., :6, 6:].swapaxes(-1, -2)
-    seeing = linear.reading, linear.known, noise.white**2
+    seeing = linear.reading, linear.known, noise.white**2 * linear.noise_shares[:, None]
     gain, white, filtered = kalman_kernels.covariances(start, linear.transition, push, fading, Q, seeing)
     # rows without a measurement have S = 1 on their diagonal and count nothing
     log_det = float(-2 * np.sum(np.log(white[..., range(ny), range(ny)])))
@@ -281,7 +287,7 @@ def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Arr
     pushed = _pushed(noise, block_s)
     by_level[:FORCE_STATES] += 2 * (way * pushed.way + both * pushed.both)
     by_time[:FORCE_STATES] += way * pushed.way_slope + both * pushed.both_slope + gain * pushed.gain_slope
-    by_white = 2 * noise.white**2 * white
+    by_white = 2 * noise.white**2 * (seen.linear.noise_shares @ white)
     return np.concatenate(
         [by_white, by_level[FORCE_STATES:], by_time[FORCE_STATES:], by_level[:FORCE_STATES], by_time[:FORCE_STATES]]
     )

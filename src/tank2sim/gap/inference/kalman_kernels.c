@@ -133,7 +133,7 @@ EXPORT void covariances(long runs, long blocks, const double *start, const doubl
             S[i * NY + j] = HP[j * NZ + SHORT + i];
             for (int a = 0; a < MOTION; ++a) S[i * NY + j] += H[i * MOTION + a] * HP[j * NZ + a];
           }
-          S[i * NY + i] += white_noise[i];
+          S[i * NY + i] += white_noise[run * NY + i];
         } else {
           S[i * NY + i] = 1.0;
         }
@@ -305,7 +305,8 @@ static void seen_from_before(double *restrict N, double *restrict D, const doubl
 }
 
 /* Sums of the slopes, each over all steps: by the variance of each slow process's driving noise, of its beginning, by
-   its fading (SLOW each), by variances and gain of a force over a block (FORCES each), by each sensor's white noise. */
+   its fading (SLOW each), by variances and gain of a force over a block (FORCES each), and for each run by each sensor's
+   white noise (NY). */
 typedef struct {
   double *variance, *start, *fading, *way, *both, *gain, *white;
 } Sums;
@@ -367,7 +368,7 @@ EXPORT int backward(long runs, long blocks, int count, const double *reading, co
       measure_back(u, later, whitened + at * NY * count, K, W, H, known + at * NY, count);
       seen_from_before(N, D, K, W, H, known + at * NY);
       for (int i = 0; i < NY; ++i)
-        if (known[at * NY + i]) by_white[i] += D[i] - dot(u + i * count, u + i * count, count);
+        if (known[at * NY + i]) by_white[run * NY + i] += D[i] - dot(u + i * count, u + i * count, count);
       double *swapped = r;
       r = later;
       later = swapped;

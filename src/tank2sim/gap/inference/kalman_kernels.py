@@ -54,7 +54,7 @@ def covariances(
         Share of accelerations and sensor errors that remains a step later; real and imaginary part of that of the band.
     added : array (R, T - 1, nz, nz)
         Covariance of the process noise.
-    seeing : arrays (R, T, ny, 6), (R, T, ny), (ny,)
+    seeing : arrays (R, T, ny, 6), (R, T, ny), (R, ny)
         Readings by states, mask of the measurements, variances of their white noise.
 
     Returns
@@ -137,12 +137,12 @@ def backward(
         By the variance of each slow process's driving noise, by that of its beginning, by its fading.
     way, both, gain : arrays (3,)
         By the variances and the gain of a force over a block.
-    white : array (ny,)
-        By the variance of each sensor's white noise.
+    white : array (R, ny)
+        By the variance of each sensor's white noise in each run.
     """
     runs, blocks, ny, count = whitened.shape
     variance, start, fading = np.zeros(3 + ny), np.zeros(3 + ny), np.zeros(3 + ny)
-    way, both, gain, white = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(ny)
+    way, both, gain, white = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((runs, ny))
     sums = variance, start, fading, way, both, gain, white
     given = _places(*seeing, *moving, *filtering, whitened, after, *sums)
     _need_memory(_library(ny, _waves(moving[2])).backward(*_sizes(runs, blocks), count, *given))

@@ -140,7 +140,7 @@ class Likelihood:
         """
         by_state, reading = hypothesis.slopes(self.motion, theta)
         by_state = by_state * self._inside[..., None]  # zero outside the runs
-        return linear_filter(by_state, reading, self.known, self.motion.block_s, self.wide)
+        return linear_filter(by_state, reading, self.known, self.motion.block_s, self.wide, self.motion.noise_shares)
 
     def of_coefficients(self, hypothesis: Hypothesis, theta: Array) -> Array:
         """Driving of each cause of errors of coefficients, gear and clock, and of the unknown instant of each change of

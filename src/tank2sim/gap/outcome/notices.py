@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY, misfit_of
 from tank2sim.gap.search.model_choice import Strange
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.structures import structure_that_adds
+
+SHOWN = 5
+"""Names of effects in a notice at most (project choice)."""
 
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are reported."""
@@ -45,7 +48,7 @@ def gap_notices(
     decision, proof, withheld = judged.decision, judged.proof, judged.withheld
     named = {name for name, *_ in proof.named.estimated}
     fitted_to_held = tuple(proof.named.by_trial) if trials[1].trials else ()
-    notices = [*trials[0].notices, *trials[1].notices]
+    notices = [*trials[0].notices, *trials[1].notices, *_partly_measured(trials[0])]
     notices += [_of_waves(waves)] if waves else []
     notices += [judged.by_simulation] if judged.by_simulation else []
     notices += [_in_words(strange) for strange in decision.strange]
@@ -87,6 +90,29 @@ def gap_notices(
     return tuple(dict.fromkeys(notices))
 
 
+def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[str, ...]:
+    """That not all effects were tried which the card and the trials allow; empty if all were."""
+    if set(possible) <= set(tried):
+        return ()
+    shown = ", ".join(tried) if len(tried) <= SHOWN else f"{len(tried)}"
+    return (f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing",)
+
+
+def _partly_measured(fitted: Measured) -> list[str]:
+    """Notices of winds and currents that some of the fitted trials recorded, and not all."""
+    notices = []
+    for name, effect in EFFECTS.items():
+        signals = set(effect.measured_as.values()) if effect.surroundings else set()
+        having = [trial.name for trial in fitted.trials if signals and signals <= set(trial.signals)]
+        if 0 < len(having) < len(fitted.trials):
+            notices.append(
+                f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}), and is "
+                "not used: it is estimated in each trial where it is tried; give its columns in all trials, or give "
+                "those alone that have them"
+            )
+    return notices
+
+
 def _of_waves(waves: WaveBand) -> str:
     speed, rate = waves.motion["motion.v"], np.rad2deg(waves.motion["motion.r"])
     return (
@@ -99,5 +125,5 @@ def _of_waves(waves: WaveBand) -> str:
 def _in_words(strange: Strange) -> str:
     when = f"from {strange.begin_s:.0f} to {strange.end_s:.0f} s"
     if strange.kind == "period":
-        return f"all trials: an oscillation with a period of {strange.begin_s:.3g} s that nothing in the library causes"
-    return f"{strange.trial}: {when} a motion of the ship that nothing in the library explains"
+        return f"all trials: an oscillation with a period of {strange.begin_s:.3g} s that no tried effect causes"
+    return f"{strange.trial}: {when} a motion of the ship that no tried effect explains"

@@ -153,7 +153,7 @@ def found_in_words(found: Json) -> str:
         remainder = "" if good else ", which is more than noise, but no effect explains the rest better than none"
         return f"No missing effect shows in these data{': the card as given' + follows + remainder if follows else ''}."
     sentence = (
-        "Something is missing that no effect of the library explains: what is left has a pattern of its own, "
+        "Something is missing that no tried effect explains: what is left has a pattern of its own, "
         "and no name is given although some effect always fits a little."
     )
     return " ".join([sentence, *([f"It acts most in {place_of_cause(found)}."] if found["acting"] else [])])

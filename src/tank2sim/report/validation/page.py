@@ -37,9 +37,9 @@ _METHOD = (
 _SOURCES_OF_U = (
     "u_num comes from repeating the simulation with half the step (three times the change, Roache's factor for two "
     "grids, at the first order); u_input from ships drawn within the standard errors of the card, with "
-    "their covariance where one is next to it; u_D from reading the trial off again with its noise, and from "
-    "repeats of one manoeuvre "
-    "where there are any."
+    "their covariance where one is next to it; u_D from evaluating the trial again with its noise and "
+    "simulating it from there, from the errors of the measured point (1 % of the length), of the heading's zero "
+    "(0.25 deg) and of the times of the orders, and from repeats of one manoeuvre where there are any."
 )
 _CLOSED_LOOP = (
     "Turns and zigzags are steered as the manoeuvre asks, from the measured state at the execute, with the rudder rate "

@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial
 from tank2sim.simulation.recorded import FED, STATES
 
 OBSERVED_SIGNALS = {
@@ -97,8 +97,7 @@ def prepare(
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
     of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
     holds until the next and enters with its mean over the step; a measured angle is taken as straight between samples.
-    With `orders_before` an order was given half a sampling step before the first row that shows it, as it was on
-    average where a record asks for the order once a row.
+    With `orders_before` an order was given before the first row that shows it, by :data:`.ROWS_TO_SHOW_AN_ORDER`.
 
     Raises
     ------
@@ -122,7 +121,7 @@ def prepare(
         held = (name == "rudder.command" and "delta_rad" not in trial.signals) or any(
             signal in trial.signals for signal in (_ordered_signal(name), _ordered_azimuth(name))
         )
-        given = trial.time_s - (0.5 * sampling if orders_before and held else 0.0)
+        given = trial.time_s - (ROWS_TO_SHOW_AN_ORDER * sampling if orders_before and held else 0.0)
         inputs[:, model.input_names.index(name)] = _means(given, values, grid, step, held=held)
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
     measured = np.full((count, len(seen)), np.nan)

@@ -1,0 +1,222 @@
+"""The heading at which a recorded zigzag was reversed, the course it is counted from, and the lag of the reversals.
+
+They are fitted to all reversals together by least squares.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from tank2sim.arrays import Array
+from tank2sim.simulation.manoeuvres import Zigzag
+from tank2sim.simulation.rudder_record import HeldAngle
+
+NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
+"""Headings at which zigzags are reversed (ITTC 7.5-04-02-01, and the modified ones of SIMMAN)."""
+
+COURSE_ERROR = math.radians(0.25)
+"""Standard error of a zigzag's course from the heading of its approach, in addition to the scatter of that heading: the
+courses of MARIN's zigzags differ by 0.1 to 0.2 deg from the first headings of their records (project choice)."""
+
+LAG = 0.1
+"""Prior scale of the lags of helmsmen and controllers, in L/u0: HSVA's are 0.06, MARIN's 0.02, those
+of the 3 m Esso Osaka 0.03. It matters only with too few reversals for the lag (project choice)."""
+
+CONFIDENT = 0.975
+"""Level of agreement of a nominal heading with the reversals: their two-sided interval of 95 %."""
+
+NO_LAG = 1e-6
+"""Share of its scale below which a lag counts as zero: the residual of a search that ends at its bound."""
+
+ASTRAY = 0.2
+"""Largest scatter of the reversal headings of a zigzag, as a share of the nominal heading: some 10 % by helmsmen of the
+3 m Esso Osaka in wind (project choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedZigzag:
+    """A zigzag as it fits the reversals of a record.
+
+    Parameters
+    ----------
+    manoeuvre : Zigzag
+    errors : dict
+        Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``.
+    reading_errors : dict
+        Standard errors of figures by that of the course: rad for overshoots, s for times.
+    """
+
+    manoeuvre: Zigzag
+    errors: dict[str, float]
+    reading_errors: dict[str, float]
+
+
+def fitted_zigzag(
+    time: Array, held: list[HeldAngle], smooth: dict[str, Array], noise: float, ship_time: float
+) -> FittedZigzag | None:
+    """Rudder, nominal heading, course and lag of a zigzag, and their standard errors; None if it is not a zigzag.
+
+    At each reversal k, ordered at t_k, the heading `lag` s earlier was that of the reversal: psi(t_k - lag) = course +
+    s_k nominal, s_k = 1 while the rudder was to starboard. Course, nominal heading and lag are fitted to all reversals
+    together by least squares, with the approach's heading as another reading of the course, and :data:`LAG` as prior of
+    the lag. The nominal heading is then that of a usual zigzag, if one agrees.
+
+    Parameters
+    ----------
+    time : array (n,)
+        s.
+    held : list of HeldAngle
+        Angles of the rudder, to alternating sides.
+    smooth : dict
+        Smoothed ``psi_rad`` and ``r_radps`` (n,).
+    noise : float
+        Standard deviation of the smoothed heading, rad.
+    ship_time : float
+        L/u0, s.
+    """
+    times = np.array([each_angle.execute_s for each_angle in held[1:]])
+    sides = np.array([math.copysign(1.0, each_angle.angle) for each_angle in held[:-1]])
+    if np.min(sides * np.interp(times, time, smooth["r_radps"])) <= 0:
+        return None
+    approach = _approach(time, held[0], smooth)
+    reversals = _Reversals(time, smooth["psi_rad"], times, sides, approach, LAG * ship_time)
+    found = _usual(reversals, math.hypot(noise, _dating_noise(time, times, smooth)), round(_degrees(held)))
+    if found is None:
+        return None
+    free, fitted = found
+    first, second = (float(np.median([held_angle.angle for held_angle in held[side::2]])) for side in (0, 1))
+    errors = {"heading_rad": free.errors[1], "course_rad": fitted.errors[0], "lag_s": fitted.errors[-1]}
+    crossing = errors["course_rad"] / _yaw_rate(time, times, smooth)
+    reading = {f"overshoot_{number}_deg": errors["course_rad"] for number in (1, 2)}
+    reading |= {"initial_turning_time_s": crossing, "reach_s": crossing}
+    return FittedZigzag(Zigzag(first, fitted.nominal, fitted.lag, fitted.course, opposite=second), errors, reading)
+
+
+def _degrees(held: list[HeldAngle]) -> float:
+    """Rudder of a zigzag, deg."""
+    return math.degrees(float(np.median([abs(held_angle.angle) for held_angle in held])))
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Course, nominal heading and lag; their standard errors (without that of a given nominal heading); the
+    weighted sum of squares, and the sum of squares of the reversals alone, rad2."""
+
+    course: float
+    nominal: float
+    lag: float
+    errors: tuple[float, ...]
+    cost: float
+    squares: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Reversals:
+    """Least-squares problem of the reversals of a zigzag.
+
+    Parameters
+    ----------
+    time, heading : array (n,)
+        s, rad.
+    times, sides : array (k,)
+        Time of each reversal's order, and the side of the rudder before it.
+    approach : (float, float)
+        Course by the approach, and its standard error, rad.
+    lag_scale : float
+        Prior scale of lags, s.
+    """
+
+    time: Array
+    heading: Array
+    times: Array
+    sides: Array
+    approach: tuple[float, float]
+    lag_scale: float
+
+    def fit(self, noise: float, nominal: float | None = None) -> _Fit:
+        """The least-squares fit for a standard deviation of the reversal headings, rad; with a given `nominal` one."""
+        course, error = self.approach
+
+        def off(at: Array, heading: float) -> Array:
+            before = np.interp(self.times - at[-1], self.time, self.heading)
+            return np.asarray(before - at[0] - self.sides * heading, dtype=np.float64)
+
+        def residuals(at: Array) -> Array:
+            heading = at[1] if nominal is None else nominal
+            return np.concatenate([off(at, heading) / noise, [(at[0] - course) / error, at[-1] / self.lag_scale]])
+
+        reached = float(np.mean(self.sides * (np.interp(self.times, self.time, self.heading) - course)))
+        start, scale = np.array([course, reached, 0.1 * self.lag_scale]), np.array([0.01, 0.01, 1.0])
+        lowest = np.array([-np.inf, -np.inf, 0.0])
+        keep = [0, 1, 2] if nominal is None else [0, 2]
+        found = least_squares(residuals, start[keep], bounds=(lowest[keep], np.inf), x_scale=scale[keep])
+        heading = float(found.x[1]) if nominal is None else nominal
+        errors = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+        lag = float(found.x[-1])
+        lag = lag if lag > NO_LAG * self.lag_scale else 0.0
+        squares = float(np.sum(off(found.x, heading) ** 2))
+        return _Fit(float(found.x[0]), heading, lag, tuple(map(float, errors)), 2 * float(found.cost), squares)
+
+
+def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, _Fit] | None:
+    """The free fit, and that with the nominal heading of an agreeing usual zigzag; None if it is not a zigzag.
+
+    The candidates are, in this order, the rudder's angle (10/10, 20/20), the usual headings, and whole degrees; if none
+    agrees, the free fit is kept. With more than three reversals their scatter gives the tolerance (Student's t); with
+    three or fewer it is the residual with the nominal heading.
+    """
+    count = len(reversals.times)
+    spare = count - 3
+    free = reversals.fit(noise)
+    if spare > 0:
+        noise = max(noise, math.sqrt(free.squares / spare))
+        free = reversals.fit(noise)
+    limit = float(student.ppf(CONFIDENT, spare if spare > 0 else np.inf)) ** 2
+    whole = math.floor(math.degrees(free.nominal))
+    choices: tuple[tuple[int, ...], ...] = (
+        (rudder_deg,),
+        NOMINAL_HEADINGS_DEG,
+        (whole, whole + 1) if count > 1 else (),
+    )
+    for angles in choices:
+        agreeing = []
+        for angle in (math.radians(angle) for angle in angles if angle > 0):
+            fitted = reversals.fit(noise, angle)
+            if count == 3:
+                fitted = reversals.fit(max(noise, math.sqrt(fitted.squares)), angle)
+            if fitted.cost - free.cost <= limit and _keeps_to(reversals, fitted):
+                agreeing.append(fitted)
+        if agreeing:
+            return free, min(agreeing, key=lambda agreed: agreed.cost)
+    return (free, free) if count > 1 and _keeps_to(reversals, free) else None
+
+
+def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
+    """True if the reversals are those of a zigzag (:data:`ASTRAY`); a single one needs a known course."""
+    scatter = math.sqrt(fitted.squares / len(reversals.times))
+    if len(reversals.times) == 1:
+        scatter = reversals.approach[1]
+    return scatter <= ASTRAY * fitted.nominal
+
+
+def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[float, float]:
+    """Mean heading before the first execute, and its standard error as the course, rad."""
+    until = max(2, int(np.searchsorted(time, first.execute_s)))
+    heading = smooth["psi_rad"][:until]
+    wandered = max(float(np.std(heading)), 0.5 * abs(float(heading[-1] - heading[0])))
+    return float(np.mean(heading)), math.hypot(COURSE_ERROR, wandered)
+
+
+def _dating_noise(time: Array, times: Array, smooth: dict[str, Array]) -> float:
+    """Standard deviation of the headings at reversals because of their time resolution of a sample, rad."""
+    return _yaw_rate(time, times, smooth) * float(np.median(np.diff(time))) / math.sqrt(12)
+
+
+def _yaw_rate(time: Array, times: Array, smooth: dict[str, Array]) -> float:
+    """Root mean square of the yaw rate at the reversals, rad/s."""
+    return float(np.sqrt(np.mean(np.interp(times, time, smooth["r_radps"]) ** 2)))
