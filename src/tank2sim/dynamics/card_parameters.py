@@ -8,7 +8,7 @@ move the ship.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -231,23 +231,6 @@ def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     return found
 
 
-def standard_errors_in_words(parameters: Sequence[CardParameter], known: Collection[str] = frozenset()) -> list[str]:
-    """Notices on assumed standard errors, except for those of the keys `known`."""
-    remaining = [parameter for parameter in parameters if parameter.key not in known]
-    assumed = [unlisted.short for unlisted in remaining if unlisted.assumed and unlisted.standard_error > 0]
-    exact = [unlisted.short for unlisted in remaining if unlisted.standard_error == 0]
-    messages = []
-    if assumed:
-        every = len(assumed) + len(exact) == len(parameters)
-        subject = "any number" if every else ", ".join(assumed)
-        mark = f"{ASSUMED}, not measured ones: " if every else ""
-        share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
-        messages.append(f"{mark}the card states no standard error of {subject}: {share}")
-    if exact:
-        messages.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
-    return messages
-
-
 def agreed_by_name(
     agreed: Mapping[str, float], parameters: Sequence[CardParameter], option: str = "--agreed"
 ) -> dict[str, float]:
@@ -293,8 +276,24 @@ class JointErrors:
     @property
     def in_words(self) -> list[str]:
         """Notices on the standard errors."""
-        words = standard_errors_in_words(self.parameters, self.together)
+        words = self._assumed_in_words()
         return [self.together_in_words, *words] if self.together else words
+
+    def _assumed_in_words(self) -> list[str]:
+        """Notices on assumed standard errors of the parameters that are not in the covariance."""
+        remaining = [parameter for parameter in self.parameters if parameter.key not in self.together]
+        assumed = [unlisted.short for unlisted in remaining if unlisted.assumed and unlisted.standard_error > 0]
+        exact = [unlisted.short for unlisted in remaining if unlisted.standard_error == 0]
+        messages = []
+        if assumed:
+            every = len(assumed) + len(exact) == len(self.parameters)
+            subject = "any number" if every else ", ".join(assumed)
+            mark = f"{ASSUMED}, not measured ones: " if every else ""
+            share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
+            messages.append(f"{mark}the card states no standard error of {subject}: {share}")
+        if exact:
+            messages.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
+        return messages
 
     @property
     def together_in_words(self) -> str:

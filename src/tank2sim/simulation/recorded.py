@@ -86,8 +86,8 @@ class Recorded:
     errors : dict
         Standard errors of the joint fit of a zigzag's reversals (:func:`.fitted_zigzag`).
     reading_errors : dict
-        Standard errors of figures by what is uncertain of the measured point, of the heading's zero and of the time of a
-        turn's order: m for distances of turns, rad for overshoots, s for times of zigzags.
+        Standard errors of figures by what is uncertain of the measured point, of the heading's zero and of the time of
+        a turn's order: m for distances of turns, rad for overshoots, s for times of zigzags.
     """
 
     trial: Trial
@@ -116,8 +116,8 @@ class Recorded:
 
 
 TURNS_AT_EXECUTE = 0.1
-"""Share of the largest yaw rate of a record above which the ship turns at its execute: 0.07 at most in the trials of the
-3 m Esso Osaka, 0.04 in those of HSVA and MARIN (project choice)."""
+"""Share of the largest yaw rate of a record above which the ship turns at its execute: 0.07 at most in the trials of
+the 3 m Esso Osaka, 0.04 in those of HSVA and MARIN (project choice)."""
 
 _ABOVE_NOISE = 3.0
 """Standard deviations by which a yaw rate exceeds its noise (project choice: one reading in 370)."""

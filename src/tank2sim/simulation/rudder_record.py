@@ -27,9 +27,9 @@ _OVER = 0.8
 """Share of the usual largest angle from which a rudder is over (project choice: above the zigzag's other angles)."""
 
 _BAND, _BETWEEN = 0.1, 0.3
-"""A rudder is held between two angles if it is within a BAND (a share of the usual largest angle) for a share BETWEEN of
-the median time for which it is over: project choices. A rudder that moves through it takes a twentieth of the time from
-side to side."""
+"""A rudder is held between two angles if it is within a BAND (a share of the usual largest angle) for a share BETWEEN
+of the median time for which it is over: project choices. A rudder that moves through it takes a twentieth of the time
+from side to side."""
 
 STEEPER = 3.0
 """Factor by which a moving rudder does not accelerate: gears have constant or falling rates (project choice)."""

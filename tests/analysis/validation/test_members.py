@@ -12,6 +12,7 @@ from tank2sim.analysis.influence.card_influence import CardInfluence, influence
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.validation.standard_trials import SEED, members
+from tank2sim.analysis.validation.study import validate_card
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
 from tank2sim.dynamics import build
@@ -113,3 +114,11 @@ def test_influence_and_ensemble_of_a_card_with_a_covariance_say_the_same(joint: 
     assert result.standard_errors[0] == pytest.approx(spread, rel=0.2)
     parts = result.slopes[0] * [one.standard_error for one in result.parameters]
     assert not 0.7 < np.linalg.norm(parts) / spread < 1.4  # as if independent it would be another
+
+
+def test_numbers_in_the_covariance_are_not_said_to_have_no_standard_error(joint: ManoeuvringCard) -> None:
+    notices = validate_card(joint, [], 2).notices
+    (assumed,) = [notice for notice in notices if "no standard error of" in notice]
+    named = assumed.partition("no standard error of ")[2].partition(":")[0].split(", ")
+    assert "Xudot" in named and "Yv" not in named
+    assert len([notice for notice in notices if "go together" in notice]) == 1

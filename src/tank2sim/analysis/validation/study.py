@@ -39,7 +39,7 @@ from tank2sim.analysis.validation.standard_trials import (
 )
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
-from tank2sim.dynamics.card_parameters import card_parameters, standard_errors_in_words, study_model
+from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.marks import EXTRAPOLATED
@@ -229,7 +229,7 @@ def validate_card(
         for trial, what in known
         if what is None
     ]
-    messages += [*standard_errors_in_words(card_parameters(card, study_model(card))), *of_errors]
+    messages += [*joint_errors(card, card_parameters(card, study_model(card))).in_words, *of_errors]
     whats = [what for _, what in known if what is not None]
     between = _between_repeats(whats)
     figures: list[Validated] = []
@@ -253,7 +253,7 @@ def validate_card(
         )
     if not count:
         messages.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
-    return Validation(tuple(figures), count, tuple(messages))
+    return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)))
 
 
 def made_card(card: ManoeuvringCard, trial: str) -> bool:
