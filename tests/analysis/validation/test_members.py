@@ -118,7 +118,7 @@ def test_influence_and_ensemble_of_a_card_with_a_covariance_say_the_same(joint: 
 
 def test_numbers_in_the_covariance_are_not_said_to_have_no_standard_error(joint: ManoeuvringCard) -> None:
     notices = validate_card(joint, [], 2).notices
-    (assumed,) = [notice for notice in notices if "no standard error of" in notice]
+    (assumed,) = [notice for notice in notices if notice.startswith("the card states no standard error of")]
     named = assumed.partition("no standard error of ")[2].partition(":")[0].split(", ")
     assert "Xudot" in named and "Yv" not in named
     assert len([notice for notice in notices if "go together" in notice]) == 1
