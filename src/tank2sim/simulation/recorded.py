@@ -179,7 +179,7 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
 
 
 def _turning(trial: Trial, first: HeldAngle, rates: Array, ship_time: float) -> bool:
-    """True if the ship turns at the first execute, by her smoothed yaw rates (n,), rad/s, beyond their noise."""
+    """True if the ship turns at the first execute, by its smoothed yaw rates (n,), rad/s, beyond their noise."""
     noise = _smoothed_noise(trial, "r_radps", ship_time) if "r_radps" in trial.signals else 0.0
     rate = abs(float(np.interp(first.execute_s, trial.time_s, rates)))
     return rate > max(TURNS_AT_EXECUTE * float(np.max(np.abs(rates))), _ABOVE_NOISE * noise)

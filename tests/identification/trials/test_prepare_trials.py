@@ -129,3 +129,23 @@ def test_wind_is_reported_to_be_unused_by_the_effects_that_a_card_has_and_not_by
         own = parse_card(card.text + effects, "ship.toml")
         assert isinstance(own, ManoeuvringCard)
         assert any("wind was measured" in notice for notice in measured([one], own).notices) == unused, effects
+
+
+def test_the_same_fault_of_several_trials_is_reported_once(tmp_path: Path, card: ManoeuvringCard) -> None:
+    """Straight and then turning, in a current of 1 m/s, with velocities through the water."""
+    time = np.arange(0.0, 300.0, 1.0)
+    paths = []
+    for number, current in enumerate((1.0, 1.1)):
+        rate = np.where(time > 60.0, 0.01, 0.0)
+        psi = np.cumsum(rate)
+        u, v = 7.0 + 0.3 * np.sin(time / 30), 0.2 * np.sin(time / 20)
+        x = np.cumsum(u * np.cos(psi) - v * np.sin(psi) + current)
+        y = np.cumsum(u * np.sin(psi) + v * np.cos(psi))
+        columns = np.column_stack([time, 500 * rate, u, v, np.rad2deg(rate), np.rad2deg(psi), x, y])
+        rows = "\n".join(",".join(f"{value:.6g}" for value in row) for row in columns)
+        names = "t_s,delta_deg,u_mps,v_mps,r_degps,psi_deg,x_m,y_m"
+        paths.append(write(tmp_path / f"trial_{number}.csv", names, rows))
+    each = [measured([path], card).notices for path in paths]
+    assert all(any("a current of" in notice for notice in notices) for notices in each)
+    (together,) = [notice for notice in measured(paths, card).notices if "a current of" in notice]
+    assert "trial_0" in together and "trial_1" in together

@@ -118,11 +118,11 @@ def _joined(names: Sequence[str]) -> str:
 
 
 def as_percent(probability: float | None) -> str:
-    """A probability in words of %, never 0 or 100: nothing is that sure."""
+    """A probability in words of %, never 0 and 99 at most: an effect that was not tried may look the same."""
     if probability is None or not math.isfinite(probability):
         return "unknown"
     percent = 100 * probability
-    return "< 1 %" if percent < 1 else "> 99 %" if percent > 99 else f"{percent:.0f} %"
+    return "< 1 %" if percent < 1 else f"{min(percent, 99.0):.0f} %"
 
 
 def found_in_words(found: Json) -> str:

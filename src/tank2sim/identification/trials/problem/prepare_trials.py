@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,13 +74,13 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         rudder's angle is known in some trials and only its order in others.
     """
     trials, notices = [], []
+    audited: dict[str, list[Finding]] = {}
     for item in given:
         trial, findings = audit_and_repair(item if isinstance(item, Trial) else read_trial_file(item))
         path = trial.path
         for finding in findings:
             _refuse_open(finding)
-            done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
-            notices.append(f"{path.name}: {finding.column}: {finding.what}; {done}: {finding.likely_truth}")
+        audited[path.name] = list(findings)
         if not set(RUDDERS) & set(trial.signals):
             raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
         notices += _unused(trial, card) if report_unused else []
@@ -100,7 +100,26 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         odd = trials[by_angle.index(False)]
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
         raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
-    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(dict.fromkeys(notices)))
+    notices = [*_of_audit(audited), *dict.fromkeys(notices)]
+    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices))
+
+
+def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[str]:
+    """Notices of the findings of an audit by the names of files; of the same in several files, the truth in the first.
+
+    Faults are the same if they are of the same column, and were repaired alike.
+    """
+    groups: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
+    for name, findings in audited.items():
+        for finding in findings:
+            done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
+            groups.setdefault((finding.column, finding.what, done), []).append((name, finding.likely_truth))
+    notices = []
+    for (column, what, done), places in groups.items():
+        (name, truth), others = places[0], [other for other, _ in places[1:]]
+        again = f"; the same in {', '.join(others)}, each with its own values" if others else ""
+        notices.append(f"{name}: {column}: {what}; {done}: {truth}{again}")
+    return notices
 
 
 def _refuse_open(finding: Finding) -> None:
