@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.sampled_runs import prepare, seen_in
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, rudder_at_start, seen_in
 from tank2sim.records.trials import Trial
 from tests.identification.trials.made_up_ship import model, problem, trial, turn, zigzag
 
@@ -150,3 +150,25 @@ def test_rows_slower_than_the_steps_asked_for_are_taken_apart(by_angle):
     np.testing.assert_allclose(run.times[known], t[: known.sum()], atol=1e-9)
     np.testing.assert_allclose(column[known], 3 * run.times[known])
     np.testing.assert_allclose(command(by_angle, run)[:-1], 0.01 * (run.times[:-1] + 0.1))
+
+
+OVER = np.deg2rad(30)
+STARTS = {  # yaw rate (rad/s) over the time (s), order, and the rudder's angle at the first instant
+    "begins at the execute": (lambda t: 0.01 * (1 - np.exp(-t / 20)) * (t > 3), OVER, 0.0),
+    "to port": (lambda t: -0.01 * (1 - np.exp(-t / 20)), -OVER, 0.0),
+    "begins in the turn": (lambda t: np.full_like(t, 0.01), OVER, OVER),
+    "weather helm on a straight course": (np.zeros_like, np.deg2rad(4), np.deg2rad(4)),
+    "in waves": (lambda t: 0.004 * np.sin(2 * np.pi * t / 8), np.deg2rad(4), np.deg2rad(4)),
+    "amidships": (np.zeros_like, 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("case", STARTS)
+@pytest.mark.parametrize("measured", ["motion.r", "motion.psi"])
+def test_the_rudder_of_a_run_by_its_orders_begins_amidships_where_the_ship_does_not_turn_yet(case, measured):
+    rate, order, expected = STARTS[case]
+    t, noise = np.arange(0.0, 200.0, 0.5), np.random.default_rng(3).standard_normal(400)
+    rates = rate(t)
+    values = rates + 1e-4 * noise if measured == "motion.r" else np.cumsum(rates) * 0.5 + 1e-4 * noise
+    run = SampledRun("a", 0.0, 0.5, np.full((400, 1), order), values[:, None], (measured,))
+    assert rudder_at_start(run, run.inputs[:, 0], ship_time=20.0) == pytest.approx(expected)

@@ -16,7 +16,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.methods.posterior import BLOCK
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, rudder_at_start
 from tank2sim.simulation.sensitivity import Sensitivity
 
 START_WINDOW = 5
@@ -70,7 +70,8 @@ def _start(problem: Problem, run: SampledRun, first: int) -> Array:
         if value is None and variable.name == "motion.v":
             value = values.get("motion.v_ground")
         if variable.name == "rudder.angle":
-            value = float(run.inputs[max(first - 1, 0), model.input_names.index("rudder.command")])
+            order = run.inputs[:, model.input_names.index("rudder.command")]
+            value = float(order[first - 1]) if first else rudder_at_start(run, order, problem.ship_time)
         state.append(default[place] if value is None else value)
     return np.array(state)
 

@@ -23,7 +23,7 @@ from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, MeasuredMotion, measured_motion
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, rudder_at_start
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -118,8 +118,9 @@ class WeakForm:
         names = self.problem.model.state_names
         first = start[[names.index(name) for name in self._hidden.state_names]]
         if "rudder.angle" in self._hidden.state_names:
-            order = run.run.inputs[0, self.problem.model.input_names.index("rudder.command")]
-            first[self._hidden.state_names.index("rudder.angle")] = order
+            order = run.run.inputs[:, self.problem.model.input_names.index("rudder.command")]
+            angle = rudder_at_start(run.run, order, self.problem.ship_time)
+            first[self._hidden.state_names.index("rudder.angle")] = angle
         states = self._sensitivity.motion(first, inputs, p, run.run.step_s)
         middle = 0.5 * (states[:-1] + states[1:])
         if not self._moves_hidden:

@@ -11,8 +11,9 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial
-from tank2sim.simulation.recorded import FED, STATES
+from tank2sim.simulation.recorded import FED, STATES, TURNS_AT_EXECUTE
 
 OBSERVED_SIGNALS = {
     **STATES,
@@ -30,6 +31,15 @@ seconds) would ask for gigabytes. Project choice: records of what a ship does ha
 _SLOWER = 1.5
 """Step of a signal, as a multiple of that of the grid, from which it is slower than it (project choice: below, most
 instants have a sample of their own)."""
+
+_OVER, _LEAST_RUDDER = 0.8, np.deg2rad(2.0)
+"""A rudder is over from this share of its usual largest angle, and this angle, rad (project choices)."""
+
+_BEGINNING = 5
+"""Instants of a run whose straight line gives the first yaw rate (project choice)."""
+
+_ABOVE_NOISE = 5.0
+"""Noises from which a mean yaw rate is a turn (project choice)."""
 
 LONGEST_GAP = 3
 """Gaps of up to this many samples are bridged; longer ones count as unmeasured (project choice)."""
@@ -131,6 +141,30 @@ def prepare(
     if np.isnan(measured).all():
         raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     return SampledRun(trial.name, begin, step, inputs, measured, tuple(seen), str(trial.path))
+
+
+def rudder_at_start(run: SampledRun, order: Array, ship_time: float) -> float:
+    """Angle of the rudder at the first instant of a run of which only the rudder's order (n,) is known, rad.
+
+    It is the first order; amidships where the run begins at its execute: the order is to put the rudder over, and the
+    ship turns to that side later, and not yet.
+    """
+    rates = run.column("motion.r")
+    if np.isnan(rates).all() and not np.isnan(run.column("motion.psi")).all():
+        rates = np.gradient(_filled(run.times, run.column("motion.psi")), run.step_s)
+    side, size = np.sign(order[0]), float(np.percentile(np.abs(order), 95))
+    if np.isnan(rates).all() or abs(order[0]) < max(_OVER * size, _LEAST_RUDDER):
+        return float(order[0])
+    rates = side * _filled(run.times, rates)
+    largest = float(np.max(uniform_filter1d(rates, max(1, round(ship_time / run.step_s)))))
+    _, first = np.polyfit(np.arange(_BEGINNING), rates[:_BEGINNING], 1)
+    turns_later = largest > _ABOVE_NOISE * white_noise(rates)
+    return 0.0 if turns_later and first < TURNS_AT_EXECUTE * largest else float(order[0])
+
+
+def _filled(time: Array, values: Array) -> Array:
+    known = ~np.isnan(values)
+    return np.interp(time, time[known], values[known])
 
 
 def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[SampledRun, ...]:
