@@ -91,6 +91,16 @@ def test_an_explanation_is_all_that_is_missing_only_where_the_trials_are_followe
     assert sum("all that is missing" in line for line in lines) == whole
 
 
+def test_an_effect_that_only_scores_better_is_mentioned_without_a_probability() -> None:
+    gap = made_up.missing()
+    named = tuple(effect.name for effect in gap.effects)
+    first = replace(gap.rivals[0], effects=(*named, "rudder_lag"), probability=0.98)
+    second = replace(gap.rivals[0], effects=named, loss=40.0, probability=0.02)
+    lines = probabilities_in_words(json.loads(json.dumps(gap_as_json(replace(gap, rivals=(first, second))))))
+    (mentioned,) = [line for line in lines if "rudder lag" in line]
+    assert "%" not in mentioned and not any("all that is missing" in line for line in lines)
+
+
 def test_nothing_missing_says_how_well_the_card_follows() -> None:
     gap = made_up.nothing()
     assert "follows the fitting trials to 1.02 times the noise" in words_of(gap)

@@ -68,7 +68,8 @@ def verdict_in_words(found: Json) -> str:
 def probabilities_in_words(found: Json) -> list[str]:
     """What each probability is of: an effect, in whatever company, and one explanation as a whole.
 
-    Not the last where the trials are still missed by far: something more is missing then.
+    Not the last where the trials are still missed by far, or an effect without the evidence for a name is as probable
+    as not: something more may be missing then.
     """
     effects = found["effects"]
     if not effects:
@@ -76,12 +77,13 @@ def probabilities_in_words(found: Json) -> list[str]:
     each = "; ".join(f"{effect_in_words(effect['name'])} {as_percent(effect['confidence'])}" for effect in effects)
     names = [effect["name"] for effect in effects]
     messages = [f"probability that the effect is there, alone or with another one: {each}"]
-    if more := _unnamed(found):
-        likely = "; ".join(f"{effect_in_words(name)} {as_percent(share)}" for name, share in more.items())
-        messages.append(f"there may be more, without the evidence that a name needs: {likely}")
+    more = _unnamed(found)
+    if more:
+        likely = ", ".join(map(effect_in_words, more))
+        messages.append(f"fits a little better, without the evidence that a name needs: {likely}")
     whole = next((rival for rival in found["rivals"] if set(rival["effects"]) == set(names)), None)
     after = set_misfit(found, "after", held_out=False)
-    if whole is not None and (after is None or after <= MUCH):
+    if whole is not None and not more and (after is None or after <= MUCH):
         alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _joined(names)
         messages.append(
             f"probability that {alone} is all that is missing, among the explanations compared: "
@@ -101,12 +103,12 @@ def sizes_of_candidates(found: Json) -> list[Json]:
     return [{"name": name, **sizes[name], "confidence": _sure(found, name)} for name in unknown if name in sizes]
 
 
-def _unnamed(found: Json) -> dict[str, float]:
-    """Effects that are neither named nor candidates, and that are as probably there as not, with their probability."""
+def _unnamed(found: Json) -> list[str]:
+    """Effects that are neither named nor candidates, and that are as probably there as not by the scores."""
     known = {effect["name"] for effect in found["effects"]}
     known |= {name for text in found["alternatives"] for name in effects_of(text)}
     every = dict.fromkeys(name for rival in found["rivals"] for name in rival["effects"] if name not in known)
-    return {name: share for name in every if (share := _sure(found, name)) >= AS_LIKELY_AS_NOT}
+    return [name for name in every if _sure(found, name) >= AS_LIKELY_AS_NOT]
 
 
 def _sure(found: Json, name: str) -> float:
