@@ -15,7 +15,8 @@ from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
 from tank2sim.gap.outcome.refit import FAR, refit_coefficients
-from tank2sim.gap.outcome.surroundings import ByTrial, fit_surroundings, with_surroundings
+from tank2sim.gap.outcome.surrounded_trial import ByTrial
+from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surroundings
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import Passed, Refitted, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured

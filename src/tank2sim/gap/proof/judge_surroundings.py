@@ -15,8 +15,8 @@ from scipy.special import softmax
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.outcome.common_surroundings import CommonSurroundings, fit_common_surroundings
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
-from tank2sim.gap.outcome.surroundings import CommonSurroundings, fit_common_surroundings
 from tank2sim.gap.proof.cross_check import MUCH, closes_gap
 from tank2sim.gap.proof.improvement import NamedEffects, Proof, Prover
 from tank2sim.gap.proof.judge import CLEARLY, Judged
