@@ -61,6 +61,20 @@ def test_more_is_sought_where_something_is_surely_missing_and_the_trials_are_sti
     assert not workflow._seeks_more(found, workflow.GapOptions(max_effects=1))
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "adds"), [(6.23, 5.85, False), (6.23, 4.0, True), (1.55, 1.2, True), (1.55, 1.5, False)]
+)
+def test_a_second_search_adds_only_what_makes_the_misfit_beyond_the_noise_clearly_smaller(
+    passes, before: float, after: float, adds: bool
+) -> None:
+    """The first row is a wind next to a wave drift whose formula differs, which no wind was there to explain."""
+    first, further = (
+        replace(found, passed=(passed("turn35", 9.0, misfit),))
+        for found, misfit in zip(passes, (before, after), strict=True)
+    )
+    assert workflow._adds(first, further, likely=0.5) == adds
+
+
 def test_coefficients_are_compared_with_those_of_the_given_card(passes) -> None:
     (yv,) = combine_passes(*passes).coefficients
     assert (yv.value, yv.before, yv.standard_error_before) == (-0.0125, -0.011, 5e-4)

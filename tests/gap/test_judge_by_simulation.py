@@ -12,7 +12,7 @@ from tank2sim.cards import read_card
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.proof.improvement import NamedEffects, Proof
 from tank2sim.gap.proof.judge import Judge, Judged
-from tank2sim.gap.result import MISSING, NO_EFFECT_MISSING, Passed, Refitted
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Passed, Refitted
 from tank2sim.gap.search import model_choice
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import decide
@@ -98,18 +98,25 @@ def test_an_effect_that_scores_nearly_as_well_as_none_is_named_if_simulations_ar
     assert found_more.proof.misfit == pytest.approx(closer if named else reached)
 
 
-@pytest.mark.parametrize(("moved", "gain", "named"), [(9.0, 40.0, True), (3.0, 40.0, False), (9.0, 5.0, False)])
+@pytest.mark.parametrize(
+    ("moved", "gain", "verdict"),
+    [(9.0, 40.0, MISSING), (3.0, 40.0, None), (9.0, 5.0, AMBIGUOUS), (9.0, -5.0, AMBIGUOUS), (9.0, -30.0, None)],
+)
 def test_an_effect_is_named_whose_place_a_coefficient_far_off_would_take(
-    monkeypatch, moved: float, gain: float, named: bool
+    monkeypatch, moved: float, gain: float, verdict: str | None
 ) -> None:
-    """Simulations are as close with the coefficient, which is nine of its standard errors off."""
+    """Simulations are as close with the coefficient, which is nine of its standard errors off; where the scores are as
+    good, too, both are said."""
     monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
     smaller = fit(-500, LAG, width=2.5)
     found = Search(CALM, (fit(-500 - gain, FORCE, LAG, width=0.7), smaller, fit(0, width=2.5)), ())
     force = NAMES[FORCE]
     judge = Judge(Prover(lambda effects: 1.0, lambda effects: 1.0 if force in effects else moved), 0.5)
     judged = judge.with_more(found, Judged(replace(decide(found), best=smaller), judge.prover.prove(smaller)))
-    assert (force in judged.decision.best.hypothesis.effects) == named
+    assert (force in judged.decision.best.hypothesis.effects) == (verdict is not None)
+    if verdict:
+        assert judged.decision.verdict == verdict
+        assert (smaller in judged.decision.alike) == (verdict == AMBIGUOUS)
 
 
 @pytest.mark.parametrize(("moved", "stays"), [(9.0, True), (3.0, False)])

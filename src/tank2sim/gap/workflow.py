@@ -32,7 +32,7 @@ from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
 from tank2sim.gap.proof.cross_check import MUCH, REMAINS, BlackBox, black_box, closes_gap
 from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, corrected, sensor_faults
-from tank2sim.gap.proof.judge import Judge, Judged
+from tank2sim.gap.proof.judge import CLEARLY, Judge, Judged
 from tank2sim.gap.proof.judge_surroundings import judge_surroundings
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import (
@@ -219,12 +219,15 @@ def _seeks_more(gap: Gap, options: GapOptions) -> bool:
 
 
 def _adds(gap: Gap, further: Gap, likely: float) -> bool:
-    """Whether a search on the improved card named effects of the ship, each with a probability of `likely` at least,
-    that bring it closer."""
+    """Whether a search on the improved card named effects of the ship, each with a probability of `likely` at least.
+
+    With them the misfit beyond the noise must be clearly smaller (:data:`.judge.CLEARLY`): what the formulas of the
+    effects named before leave is not small next to the noise, and some effect always follows it a little.
+    """
     if further.verdict != MISSING or any(EFFECTS[effect.name].acts_on == "sensor" for effect in further.effects):
         return False
-    before, after = (misfit_of(result.passed, "after", held_out=False) for result in (gap, further))
-    return min(effect.confidence for effect in further.effects) >= likely and after < (1 - BETTER) * before
+    before, after = (max(misfit_of(found.passed, "after", held_out=False) ** 2 - 1, 0.0) for found in (gap, further))
+    return min(effect.confidence for effect in further.effects) >= likely and after < CLEARLY**2 * before
 
 
 def _smaller(

@@ -126,7 +126,8 @@ class Judge:
         That is, the fitted trials are missed by less than :data:`CLEARLY` of what they were, where this is not near the
         noise (:data:`.cross_check.NEAR_NOISE`); or by :data:`.improvement.BETTER` less, where the coefficients of the
         card would else be off by more than their standard errors; or by no more, where one of them would else be far
-        off (:data:`.refit.FAR`) and the score is better by :data:`.model_choice.EVIDENCE_NEEDED`.
+        off (:data:`.refit.FAR`) and the score is better by :data:`.model_choice.EVIDENCE_NEEDED`. Where the score is
+        only as good, the coefficient and the effect are explanations that these data do not distinguish.
         """
         decision, reached = judged.decision, judged.proof.misfit
         if decision.verdict == OUTSIDE_LIBRARY:
@@ -140,10 +141,14 @@ class Judge:
                 continue
             of_more = self._proved(more)
             closer = of_more.proof.misfit < limit * reached
-            if limit > CLEARLY and larger.score < decision.best.score - EVIDENCE_NEEDED:
-                closer |= judged.proof.is_farther_off(of_more.proof) and of_more.proof.misfit <= reached
+            takes_its_place = limit > CLEARLY and judged.proof.is_farther_off(of_more.proof)
+            if takes_its_place and larger.score < decision.best.score - EVIDENCE_NEEDED:
+                closer |= of_more.proof.misfit <= reached
             if closer and most_are_closer(judged.proof.results, of_more.proof.results):
                 return of_more
+            if takes_its_place and of_more.proof.misfit <= max(reached, NEAR_NOISE):
+                alike = (decision.best, *decision.alike)
+                return replace(of_more, decision=replace(decision, verdict=AMBIGUOUS, best=larger, alike=alike))
         return judged
 
     def _is_closer(self, search: Search, judged: Judged, *, clearly: bool) -> bool:
