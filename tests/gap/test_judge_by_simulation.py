@@ -10,6 +10,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.proof import judge_surroundings
 from tank2sim.gap.proof.improvement import NamedEffects, Proof
 from tank2sim.gap.proof.judge import Judge, Judged
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Passed, Refitted
@@ -117,6 +118,26 @@ def test_an_effect_is_named_whose_place_a_coefficient_far_off_would_take(
     if verdict:
         assert judged.decision.verdict == verdict
         assert (smaller in judged.decision.alike) == (verdict == AMBIGUOUS)
+
+
+@pytest.mark.parametrize(
+    ("gain", "after", "sought"),
+    [(100.0, 5.0, False), (20.0, 5.0, True), (100.0, 15.0, True), (100.0, 2.0, False)],
+)
+def test_no_wind_of_each_trial_takes_the_place_of_what_is_far_ahead_and_closes_most_of_the_gap(
+    monkeypatch, gain: float, after: float, sought: bool
+) -> None:
+    """A wave drift whose formula differs leaves something that two numbers to a trial follow."""
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    tried = []
+    monkeypatch.setattr(judge_surroundings, "_simulated", lambda *arguments: tried.append(arguments) or {})
+    found = Search(CALM, (fit(-gain, FORCE), fit(0)), ())
+    decision = decide(found)
+    assert decision.verdict == MISSING
+    closed = replace(replay(after), before={"motion.r": np.full(50, 20 * NOISE)})
+    judged = Judged(decision, Proof((), NamedEffects([(NAMES[FORCE], {}, {})]), CARD, CARD, [closed]))
+    assert judge_surroundings.judge_surroundings(Prover(lambda effects: after), found, judged, ()) is judged
+    assert bool(tried) == sought
 
 
 @pytest.mark.parametrize(("moved", "stays"), [(9.0, True), (3.0, False)])

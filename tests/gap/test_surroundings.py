@@ -224,10 +224,10 @@ def test_probabilities_by_simulation_are_those_of_the_misfits_and_of_the_numbers
         return SimpleNamespace(results=[replay] * len(fitted.trials))
 
     passages = sum(trial.time_s[-1] - trial.time_s[0] for trial in fitted.trials) * 7.7175 / 160.93
-    same = probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(10.0)})
+    same = probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(10.0)}, {"wind"})
     # Two numbers to each of three trials, half of their logarithm each, over TEMPER = 3.
     assert np.log(same[()] / same["wind",]) == pytest.approx(6 * np.log(passages) / 2 / 3, rel=1e-3)
-    closer = probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(2.0)})
+    closer = probabilities_by_simulation(card, fitted, {(): proof(10.0), ("wind",): proof(2.0)}, {"wind"})
     gained = np.log(closer["wind",] / closer[()]) + np.log(same[()] / same["wind",])
     assert gained == pytest.approx(passages * np.log(5.0) / 3, rel=1e-3)
 

@@ -6,7 +6,7 @@ same size explain it as well.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from tank2sim.gap.outcome.common_surroundings import CommonSurroundings, fit_com
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.proof.cross_check import MUCH, closes_gap
 from tank2sim.gap.proof.improvement import NamedEffects, Proof, Prover
-from tank2sim.gap.proof.judge import CLEARLY, Judged
+from tank2sim.gap.proof.judge import CLEARLY, DECISIVE, Judged, closes_clearly
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Surroundings, misfit_of
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import LIKELY, TEMPER
@@ -59,7 +59,9 @@ def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Se
 
     Where the trials are still missed by far (:data:`.cross_check.MUCH`), each wind or current that was not recorded is
     fitted to the free-running simulations. It is named if less than :data:`.judge.CLEARLY` of the misfit of the
-    decision is left, and if the first half of the trials predicts the second (:data:`PREDICTS`).
+    decision is left, and if the first half of the trials predicts the second (:data:`PREDICTS`). Not in place of
+    effects that are far ahead of none in score (:data:`.judge.DECISIVE`) and close most of the gap: two numbers to a
+    trial follow what their formulas leave.
 
     Parameters
     ----------
@@ -72,21 +74,27 @@ def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Se
     reached = misfit_of(judged.proof.results, "after")
     if reached <= MUCH or any(EFFECTS[name].surroundings for name, *_ in judged.proof.named.estimated):
         return judged
+    decisive = search.none.score - judged.decision.best.score >= DECISIVE
+    if judged.decision.verdict in (MISSING, AMBIGUOUS) and decisive and closes_clearly(judged.proof.results):
+        return judged
     simulated = _simulated(prover, search, names)
     tried = {name: found for name, found in simulated.items() if found.misfit < CLEARLY * reached}
     if not tried:
         return judged
     best, *others = sorted(tried, key=lambda name: tried[name].misfit)
     found = tried[best]
-    proofs: dict[tuple[str, ...], Proof] = {(): judged.proof}
-    proofs |= {(name,): found.proof for name, found in tried.items()}
+    before = judged.decision.best.hypothesis.effects if judged.proof.named.estimated else ()
+    proofs: dict[tuple[str, ...], Proof] = {
+        before: judged.proof,
+        **{(name,): found.proof for name, found in tried.items()},
+    }
     alike = tuple(tried[name].fit for name in others if CLEARLY * tried[name].misfit < found.misfit)
     decision = replace(
         judged.decision,
         verdict=AMBIGUOUS if alike else MISSING,
         best=found.fit,
         alike=alike,
-        probabilities=probabilities_by_simulation(prover.card, prover.trials[0], proofs),
+        probabilities=probabilities_by_simulation(prover.card, prover.trials[0], proofs, by_trial=tuple(tried)),
     )
     if not alike and decision.confidence(best) < LIKELY:
         return judged
@@ -134,7 +142,7 @@ def _at(fit: ExplanationFit, common: CommonSurroundings, trials: Sequence[str]) 
 
 
 def probabilities_by_simulation(
-    card: ManoeuvringCard, fitted: Measured, proofs: Mapping[tuple[str, ...], Proof]
+    card: ManoeuvringCard, fitted: Measured, proofs: Mapping[tuple[str, ...], Proof], by_trial: Collection[str]
 ) -> dict[tuple[str, ...], float]:
     """Probability of each explanation by the misfits of the fitted trials.
 
@@ -148,14 +156,16 @@ def probabilities_by_simulation(
     fitted : Measured
         T trials.
     proofs : mapping
-        Names of the winds and currents of an explanation to the replays with it, of the fitted trials first.
+        Effects of an explanation to the replays with it, of the fitted trials first.
+    by_trial : collection of str
+        Winds and currents that have two numbers of their own in each trial.
     """
     passage = card.ship.length_m / card.model.speed_mps
     readings = np.array([(trial.time_s[-1] - trial.time_s[0]) / passage for trial in fitted.trials])
     scores = []
     for effects, proof in proofs.items():
         misfits = np.array([result.misfit("after") for result in proof.results if not result.held_out])
-        numbers = 2 * len(fitted.trials) * len(effects)
+        numbers = 2 * len(fitted.trials) * sum(name in by_trial for name in effects)
         scores.append(2 * readings @ np.log(np.maximum(misfits, 1.0)) + numbers * np.log(np.sum(readings)))
     logs = -0.5 * np.array(scores) / TEMPER
     return dict(zip(proofs, map(float, softmax(logs)), strict=True))

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import altair as alt
-import vl_convert
 
 from tank2sim.report.kit.analysis_charts import (
     FrequencyResponse,
@@ -72,6 +71,8 @@ def chart_specification(chart: alt.TopLevelMixin) -> dict[str, Any]:
 
 def chart_png(chart: alt.TopLevelMixin, *, scale: float = 2.0) -> bytes:
     """The chart as a PNG picture on white, `scale` pixels to each px of its size. Needs no network and no browser."""
+    import vl_convert
+
     picture: bytes = vl_convert.vegalite_to_png(
         chart_specification(chart),
         vl_version=VEGALITE_VERSION,

@@ -7,21 +7,23 @@ same content gives the same bytes.
 from __future__ import annotations
 
 import functools
+import importlib.metadata
 import importlib.resources
 import json
 import urllib.parse
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 import altair as alt
 import jinja2
-import vl_convert
 from markupsafe import Markup
 
 from tank2sim import __version__
 from tank2sim.marks import marked
+from tank2sim.native.library import kept
 from tank2sim.report.kit.charts import VEGALITE_VERSION, chart_specification
 from tank2sim.report.kit.numbers import NO_VALUE, format_column, format_number, is_number_text
 from tank2sim.report.kit.theme import DARK, LIGHT, LOCALE
@@ -333,6 +335,19 @@ def resource_text(name: str) -> str:
 
 @functools.cache
 def _vega() -> str:
-    bundle: str = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;", vl_version=VEGALITE_VERSION)
+    """The library that draws the charts of a page; made once on a machine, for that takes a second."""
+    making = "vl-convert", importlib.metadata.version("vl-convert-python"), VEGALITE_VERSION, _SNIPPET
+    return kept({}, making, ".js", _make_vega).read_text(encoding="utf-8")
+
+
+_SNIPPET = "window.vegaEmbed = vegaEmbed;"
+
+
+def _make_vega(folder: Path) -> Path:
+    import vl_convert
+
+    bundle: str = vl_convert.javascript_bundle(_SNIPPET, vl_version=VEGALITE_VERSION)
     bundle = f"(() => {{{bundle}}})();"  # its hundreds of short names stay its own
-    return bundle.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+    path = folder / "vega.js"
+    path.write_text(bundle.replace("</script", "<\\/script").replace("<!--", "<\\!--"), encoding="utf-8", newline="\n")
+    return path
