@@ -9,6 +9,7 @@ import contextlib
 import errno
 import importlib
 import os
+import signal
 import sys
 import tempfile
 import traceback
@@ -114,6 +115,7 @@ def tank2sim(ctx: click.Context) -> None:
 def main() -> None:
     """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
     keep_freed_memory()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, so that nothing is left half-written
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
         code = _run()

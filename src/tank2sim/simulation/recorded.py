@@ -23,7 +23,7 @@ from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.steering_gear import UNSTATED_LAG
 from tank2sim.records.audit.noise import white_noise
-from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -87,7 +87,7 @@ class Recorded:
         Standard errors of the joint fit of a zigzag's reversals (:func:`.fitted_zigzag`).
     reading_errors : dict
         Standard errors of figures by what is uncertain of the measured point, of the heading's zero and of the time of
-        a turn's order: m for distances of turns, rad for overshoots, s for times of zigzags.
+        the first order: m for distances of turns, rad for overshoots, s for times.
     """
 
     trial: Trial
@@ -115,9 +115,13 @@ class Recorded:
         return f"zigzag {rudder:.3g}/{math.degrees(self.manoeuvre.heading):.3g}, reversed {late}"
 
 
-TURNS_AT_EXECUTE = 0.1
-"""Share of the largest yaw rate of a record above which the ship turns at its execute: 0.07 at most in the trials of
-the 3 m Esso Osaka, 0.04 in those of HSVA and MARIN (project choice)."""
+TURNS_AT_EXECUTE = 0.2
+"""Share of the largest yaw rate of a record above which the ship turns at its execute: smoothed, it is 0.07 at most in
+the trials of the 3 m Esso Osaka, 0.04 in those of HSVA and MARIN, and 0.11 in a 10/10 zigzag of a Mariner (project
+choice)."""
+
+_FEWEST = 4
+"""Rows before an execute from which its state is by straight lines (project choice)."""
 
 _ABOVE_NOISE = 3.0
 """Standard deviations by which a yaw rate exceeds its noise (project choice: one reading in 370)."""
@@ -161,16 +165,17 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
         manoeuvre, end = Turn(first.angle, first.moves_s - first.execute_s), first.end_s
     if manoeuvre is None:
         return None
-    track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
+    track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth), ship_time)
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
     start["initial.rudder_angle"] = rudder_before(trial, first)
     inputs = _fed(trial, model)
+    late = _order_error(trial, first)
     if zigzag:
-        errors, reading = zigzag.errors, zigzag.reading_errors
+        errors, reading = zigzag.errors, dict(zigzag.reading_errors)
+        reading["initial_turning_time_s"] = math.hypot(reading["initial_turning_time_s"], late)
     else:
-        errors = {}
-        reading = _turn_reading_errors(track, float(values["ship.length"]), _order_error(trial, first))
+        errors, reading = {}, _turn_reading_errors(track, float(values["ship.length"]), late)
     rate = first.rate
     reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
     if isinstance(manoeuvre, Zigzag) and reversals:  # the first movement is half as long, and its rate half as certain
@@ -186,24 +191,26 @@ def _turning(trial: Trial, first: HeldAngle, rates: Array, ship_time: float) -> 
 
 
 def _order_error(trial: Trial, held: HeldAngle) -> float:
-    """Standard error of the time of an order, s: that of a uniform distribution over a row where only orders are
-    known."""
-    return 0.0 if held.rate is not None else sampling_step(trial) / math.sqrt(12)
+    """Standard error of the time of an order, s: half a row where only orders are known.
+
+    They were given at any time of a row (0.29 of it), or, in a record that a simulator wrote, at its end (0.5).
+    """
+    return 0.0 if held.rate is not None else ROWS_TO_SHOW_AN_ORDER * sampling_step(trial)
 
 
 def _turn_reading_errors(track: Trajectory, length: float, order_error: float) -> dict[str, float]:
-    """Standard errors of a turn's distances, m.
+    """Standard errors of a turn's distances, m, and times, s.
 
     A point p ahead of the place that is taken for it changes the advance by -p and the transfer by p (heading 90 deg),
     and the tactical diameter by nothing (180 deg). With a heading's zero off by e the axes turn: a distance changes by
     e times the one across it, where it is read. With an order given e later (s, standard error `order_error`) the
-    advance is shorter by e times the speed ahead.
+    times are shorter by e, and the advance by e times the speed ahead.
     """
     psi, x, y = (track[f"motion.{name}"] - track[f"motion.{name}"][0] for name in ("psi", "x", "y"))
     course = track["motion.psi"][0]
     ahead, side = x * math.cos(course) + y * math.sin(course), y * math.cos(course) - x * math.sin(course)
     turned = np.maximum.accumulate(np.abs(psi))
-    point, errors = POINT_ERROR * length, {}
+    point, errors = POINT_ERROR * length, {"time_90_s": order_error, "time_180_s": order_error}
     late = order_error * float(track["motion.u"][0])
     for name, angle, across, shift in (
         ("advance_m", 90.0, side, math.hypot(point, late)),
@@ -283,21 +290,48 @@ def _trajectory(
     manoeuvre: Turn | Zigzag,
     span: tuple[float, float],
     seen: tuple[list[HeldAngle], dict[str, Array]],
+    ship_time: float,
 ) -> Trajectory:
     """The record between two times as a trajectory of the model: for the same evaluation of figures as a simulation."""
     held, smooth = seen
-    inside = (trial.time_s > span[0]) & (trial.time_s <= span[1])
-    t = np.concatenate([[span[0]], trial.time_s[inside]])
+    near = 1e-3 * sampling_step(trial)
+    moves = [angle.moves_s for angle in held if np.min(np.abs(trial.time_s - angle.moves_s)) > near]
+    times = np.union1d(trial.time_s, moves)  # with the executes between two rows
+    t = np.concatenate([[span[0]], times[(times > span[0]) & (times <= span[1])]])
     x = np.zeros((len(t), len(model.states)))
+    before = _state_before(trial, smooth, span[0], ship_time)
     for name, state in STATES.items():
         x[:, model.state_names.index(state)] = np.interp(t, trial.time_s, smooth[name])
+        x[0, model.state_names.index(state)] = before[name]
     u = np.tile(model.input_values(), (len(t), 1))
     command = model.input_names.index("rudder.command")
     for held_angle in held:
-        u[t >= held_angle.moves_s, command] = held_angle.angle
+        u[t >= held_angle.moves_s - near, command] = held_angle.angle
     y = np.array(model.output(x.T, u.T, np.repeat(model.parameter_values()[:, None], len(t), axis=1))).T
     y[:, model.outputs.index("motion.rdot")] = np.gradient(x[:, model.state_names.index("motion.r")], t)
     return Trajectory(model, t - span[0], x, u, y)
+
+
+def _state_before(trial: Trial, smooth: dict[str, Array], execute_s: float, ship_time: float) -> dict[str, float]:
+    """Signals of :data:`STATES` at an execute, by straight lines through what came before it.
+
+    Smoothing mixes what comes after into it: of a 10/10 zigzag of a Mariner a tenth of the largest yaw rate, and she
+    seems to turn 0.3 s earlier. Signals that were derived are slopes over a window: they have their mean over another
+    one, half a window before. Without :data:`_FEWEST` rows before, the smoothed value.
+    """
+    time, window = trial.time_s, SMOOTHING * ship_time
+    found = {}
+    for name, values in smooth.items():
+        measured = trial.signals.get(name, np.full(len(time), np.nan))
+        derived = bool(np.isnan(measured).all())
+        end = execute_s - 0.5 * window * derived
+        known = (time >= end - window) & (time <= end) & (derived | np.isfinite(measured))
+        line = values if derived else measured
+        if np.count_nonzero(known) >= _FEWEST:
+            found[name] = float(np.polyfit(time[known] - execute_s, line[known], 0 if derived else 1)[-1])
+        else:
+            found[name] = float(np.interp(execute_s, time, values))
+    return found
 
 
 def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:

@@ -26,10 +26,10 @@ KVLCC2 for at least 13 % (35/5)."""
 _OVER = 0.8
 """Share of the usual largest angle from which a rudder is over (project choice: above the zigzag's other angles)."""
 
-_BAND, _BETWEEN = 0.1, 0.3
-"""A rudder is held between two angles if it is within a BAND (a share of the usual largest angle) for a share BETWEEN
-of the median time for which it is over: project choices. A rudder that moves through it takes a twentieth of the time
-from side to side."""
+_BAND, _PASSES = 0.1, 3.0
+"""A rudder is held between two angles if it is within a BAND (a share of the usual largest angle) for more than two
+rows and so many times as long as it takes to pass it at its rate (project choices; the helmsmen of the 3 m Esso Osaka,
+and gears with a lag, stay below)."""
 
 STEEPER = 3.0
 """Factor by which a moving rudder does not accelerate: gears have constant or falling rates (project choice)."""
@@ -100,16 +100,14 @@ def rudder_of(trial: Trial) -> Array:
 
 def holds_other_angles(trial: Trial, held: list[HeldAngle]) -> bool:
     """True if the rudder is held at another angle between two of its `held` angles, or between two times of one."""
-    time, rudder = trial.time_s, rudder_of(trial)
+    time, rudder, step = trial.time_s, rudder_of(trial), sampling_step(trial)
     size = _usual_largest(rudder)
-    over = np.abs(rudder) > _OVER * size
-    begins = [held[0].moves_s, *(held_angle.end_s for held_angle in held[:-1])]
-    stretches = [(time > begin) & (time <= held_angle.end_s) for begin, held_angle in zip(begins, held, strict=True)]
-    usual_time = float(np.median([np.count_nonzero(over & stretch) for stretch in stretches]))
-    for stretch in stretches:
-        angles = np.sort(rudder[stretch & ~over])
+    for begin, held_angle in zip([held[0].moves_s, *(before.end_s for before in held)], held, strict=False):
+        inside = (time > begin) & (time <= held_angle.end_s) & (np.abs(rudder) <= _OVER * size)
+        angles = np.sort(rudder[inside])
         near = np.searchsorted(angles, angles + _BAND * size, side="right") - np.arange(len(angles))
-        if np.max(near, initial=0) > _BETWEEN * usual_time:
+        passing = _BAND * size / held_angle.rate if held_angle.rate and held_angle.rate > 0 else 0.0
+        if np.max(near, initial=0) * step > _PASSES * passing + 2 * step:
             return True
     return False
 
@@ -117,12 +115,12 @@ def holds_other_angles(trial: Trial, held: list[HeldAngle]) -> bool:
 def rudder_before(trial: Trial, held: HeldAngle) -> float:
     """The rudder's angle at an execute, rad.
 
-    Where only orders are known, it is the order of the row before, for the rudder moves after its order; amidships in a
-    record that begins at the execute.
+    It is that of the last row before the rudder moves. Where only orders are known, it is the order of the row before,
+    for the rudder moves after its order; amidships in a record that begins at the execute.
     """
     rudder = rudder_of(trial)
     if held.rate is not None:
-        return float(np.interp(held.execute_s, trial.time_s, rudder))
+        return float(rudder[max(int(np.searchsorted(trial.time_s, held.moves_s, side="right")) - 1, 0)])
     row = int(np.searchsorted(trial.time_s, held.execute_s))
     return float(rudder[row - 1]) if row else 0.0
 

@@ -101,11 +101,11 @@ def test_the_errors_of_an_exact_card_are_as_large_as_the_uncertainty_of_the_data
         ratios += [figure.error / figure.data for figure in validate_card(mariner_card, records, 0).figures]
     assert len(ratios) == 36
     assert 0.3 < np.sqrt(np.mean(np.square(ratios))) < 1.5, ratios
-    assert np.max(np.abs(ratios)) < 4.0
+    assert np.max(np.abs(ratios)) < 5.0
 
 
 def test_repeats_enter_the_uncertainty_of_the_data(mariner_card, trials) -> None:
-    again = trial_of(mariner_card, "again", Turn(math.radians(20.3)), seed=1)
+    again = trial_of(mariner_card, "again", Turn(math.radians(20.4)), seed=1)
     alone, repeated, both = (
         {figure.trial: figure for figure in validate_card(mariner_card, those, 0).figures if figure.name == "advance_m"}
         for those in (trials[:1], [again], [trials[0], again])

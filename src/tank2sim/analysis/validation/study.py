@@ -224,8 +224,8 @@ def validate_card(
     drawn, of_errors = members(card, model, count)
     known = [(trial, recorded(trial, model)) for trial in trials]
     messages = [
-        f"{trial.name}: neither a turning circle nor a zigzag from a straight course, with heading and track: only "
-        "replayed"
+        f"{trial.name}: neither a turning circle (120 deg or more) nor a zigzag, from a straight course and without "
+        "other angles of the rudder in between, with heading and track: only replayed"
         for trial, what in known
         if what is None
     ]

@@ -204,12 +204,13 @@ class Replayer:
 
         An order that was sampled once or twice a second was given at an unknown instant between two readings. These
         instants are estimated together with the initial state, each beforehand uniform over its interval (with the
-        variance of that, 1/12). Without such steps, and with a model that is further off than they explain, as
+        variance of that, 1/12). The same search, without instants, finds an initial state from which an unstable ship
+        follows a record that the first guess loses. With a model that is further off than they explain, as
         :meth:`fit_initial_state`.
         """
         start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
         rows = self._unsure_steps(record)
-        if len(rows):
+        if len(rows) or misfit >= _NEAR:
             most, explained = (np.inf, _EXPLAINED) if misfit < _FOLLOWED else (_BEGUN, 0.0)
             found = self._least_squares_instants(record, rows, sigma, p, near, most=most)
             if found is not None and found[2] < max(min(_NEAR, misfit), explained * misfit):
