@@ -237,7 +237,7 @@ def test_a_record_that_begins_in_a_manoeuvre_has_no_figures(model, kind):
         assert recorded(replace(whole, time_s=whole.time_s[rows], signals=signals), model) is None
 
 
-@pytest.mark.parametrize(("share", "lasts"), [(0.4, 12.0), (0.0, 6.0)])
+@pytest.mark.parametrize(("share", "lasts"), [(0.4, 12.0), (0.0, 13.0)])
 def test_a_rudder_that_is_held_at_other_angles_in_between_makes_no_zigzag(model, share, lasts):
     """As random steps do, and a helmsman who waits amidships: the reversals are those of a zigzag."""
     plain = controller(np.deg2rad(20), np.deg2rad(10), 0.0)
