@@ -13,7 +13,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.problem_from_card import driven_model, with_captive
+from tank2sim.identification.trials.problem.problem_from_card import driven_model, fit_driven_by, with_captive
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 Task = TypeVar("Task")
@@ -92,7 +92,7 @@ def portable(problem: Problem, card: ManoeuvringCard, driven_by: str) -> Portabl
     ValueError
         The problem's model differs from the model of the card.
     """
-    ship = PicklableShip(card.text, driven_by)
+    ship = PicklableShip(card.text, fit_driven_by(card, driven_by))
     if ship.model().parameter_names != problem.model.parameter_names:
         raise ValueError("the problem was set up for another card")
     return Portable(

@@ -28,6 +28,7 @@ from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
 from tank2sim.records.trials import Trial, window
@@ -177,6 +178,15 @@ def _driven(ship: Model, driven_by: str) -> Model:
     return driven_by_angle(model) if driven_by == "angle" else model
 
 
+def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
+    """What drives the model that is fitted to trials.
+
+    The ``angle`` of the rudder also where only orders were recorded, which the gear of the card follows
+    (:mod:`.ordered_rudder`); the ``order`` where more than this gear acts between them.
+    """
+    return "angle" if driven_by == "angle" or ordered_rudder(driven_model(card, "order")) else "order"
+
+
 def driven_by_angle(model: Model) -> Model:
     """The model without its steering gear: ``rudder.command`` is the angle of the rudder.
 
@@ -272,7 +282,8 @@ def problem_from_card(
     InputError
         A trial is too short or has nothing to compare, or the card leaves nothing free.
     """
-    model = driven_model(card, driven_by)
+    model = driven_model(card, fit_driven_by(card, driven_by))
+    gear = ordered_rudder(driven_model(card, "order")) if driven_by == "order" else None
     free = free_parameters(card, inertia=inertia)
     if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
         free[REVOLUTIONS] = card.propulsion.Xnn, REVOLUTIONS_ERROR * abs(card.propulsion.Xnn)
@@ -287,7 +298,9 @@ def problem_from_card(
     seen = seen_in(model, trials)
     if not seen:
         raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
-    prepared = [prepare(model, trial, seen, orders_before=True) for trial in trials]
+    prepared = [
+        prepare(model, trial, seen, orders_before=True, rudder=gear.angle(trial) if gear else None) for trial in trials
+    ]
     runs = tuple(prepared) if whole else tuple(part for run in prepared for part in _parts(card, model, run))
     if not runs:
         low, high = card.model.speed_range_mps

@@ -99,7 +99,13 @@ class SampledRun:
 
 
 def prepare(
-    model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None, orders_before: bool = False
+    model: Model,
+    trial: Trial,
+    seen: Sequence[str],
+    *,
+    step_s: float | None = None,
+    orders_before: bool = False,
+    rudder: tuple[Array, Array] | None = None,
 ) -> SampledRun:
     """A trial on equal steps, for a model driven by the trial's rudder signal
     (:func:`.problem_from_card.driven_model`).
@@ -108,6 +114,7 @@ def prepare(
     of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
     holds until the next and enters with its mean over the step; a measured angle is taken as straight between samples.
     With `orders_before` an order was given before the first row that shows it, by :data:`.ROWS_TO_SHOW_AN_ORDER`.
+    `rudder` are times and angles of the rudder that take the place of the trial's (:class:`.ordered_rudder`).
 
     Raises
     ------
@@ -131,6 +138,9 @@ def prepare(
         held = (name == "rudder.command" and "delta_rad" not in trial.signals) or any(
             signal in trial.signals for signal in (_ordered_signal(name), _ordered_azimuth(name))
         )
+        if name == "rudder.command" and rudder is not None:
+            inputs[:, model.input_names.index(name)] = _means(*rudder, grid, step, held=False)
+            continue
         given = trial.time_s - (ROWS_TO_SHOW_AN_ORDER * sampling if orders_before and held else 0.0)
         inputs[:, model.input_names.index(name)] = _means(given, values, grid, step, held=held)
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
