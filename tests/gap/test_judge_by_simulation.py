@@ -10,7 +10,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.proof import judge_surroundings
+from tank2sim.gap.proof import judge, judge_surroundings
 from tank2sim.gap.proof.improvement import NamedEffects, Proof
 from tank2sim.gap.proof.judge import Judge, Judged
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Passed, Refitted
@@ -118,6 +118,24 @@ def test_an_effect_is_named_whose_place_a_coefficient_far_off_would_take(
     if verdict:
         assert judged.decision.verdict == verdict
         assert (smaller in judged.decision.alike) == (verdict == AMBIGUOUS)
+
+
+@pytest.mark.parametrize(
+    ("gain", "moved", "verdict"), [(30.0, 9.0, AMBIGUOUS), (30.0, 3.0, MISSING), (60.0, 9.0, MISSING)]
+)
+def test_a_name_near_the_noise_is_said_next_to_the_coefficient_that_does_as_well(
+    monkeypatch, gain: float, moved: float, verdict: str
+) -> None:
+    """Roll was named at 96 % where a yaw damping of the card was 15 % off."""
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    none = fit(0, width=1.5)
+    found = Search(CALM, (fit(-gain, FORCE, width=0.3), none), ())
+    prover = Prover(lambda effects: 1.0, lambda effects: 1.0 if effects else moved)
+    monkeypatch.setattr(judge, "closes_gap", lambda *arguments: True)
+    decision = Judge(prover, 0.5).judge(found, decide(found)).decision
+    assert decision.verdict == verdict and decision.best.hypothesis.effects == (NAMES[FORCE],)
+    assert (none in decision.alike) == (verdict == AMBIGUOUS)
+    assert (decision.confidence(NAMES[FORCE]) == pytest.approx(0.5)) == (verdict == AMBIGUOUS)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from tank2sim.gap.search.model_choice import (
     EVIDENCE_NEEDED,
     Decision,
     decide,
+    decide_as_good,
     decide_for,
     decide_without,
     doubtful_effects,
@@ -78,7 +79,7 @@ class Judge:
         without. An effect that gained little must bring the fitted trials closer, and one more is named that brings
         them much closer, also where the scores name none. A name whose score is not far ahead of none
         (:data:`DECISIVE`) must also follow the fitted trials as closely as the card's coefficients alone, fitted to
-        them.
+        them; where these do as well with one that is far off (:data:`.refit.FAR`), both are said.
 
         Parameters
         ----------
@@ -96,6 +97,8 @@ class Judge:
             current = judged.decision
             unknown = current.verdict == OUTSIDE_LIBRARY
             if self._is_closer(search, judged, clearly=bool(withheld) or unknown):
+                if self._coefficients_do_as_well(search, judged):
+                    current = decide_as_good(remaining, current, search.none, self.false_discovery)
                 verdict = (AMBIGUOUS if current.alike else MISSING) if unknown else current.verdict
                 return Judged(replace(current, verdict=verdict), judged.proof, tuple(withheld))
             if not unknown:
@@ -158,6 +161,16 @@ class Judge:
         if not closes or search.none.score - judged.decision.best.score >= DECISIVE:
             return closes
         return proof.misfit < max((1 + BETTER) * self._of(search.none).misfit, NEAR_NOISE)
+
+    def _coefficients_do_as_well(self, search: Search, judged: Judged) -> bool:
+        """Whether the trials are followed as closely without a name whose score is not far ahead, by a coefficient that
+        is far off."""
+        if search.none.score - judged.decision.best.score >= DECISIVE or search.none in judged.decision.alike:
+            return False
+        alone = self._of(search.none)
+        return alone.is_farther_off(judged.proof) and alone.misfit <= max(
+            (1 + BETTER) * judged.proof.misfit, NEAR_NOISE
+        )
 
     def _without_name(self, search: Search, decision: Decision, withheld: tuple[str, ...]) -> Judged:
         """The decision where no explanation is left whose effects can be named."""

@@ -230,6 +230,23 @@ def decide_for(search: Search, larger: ExplanationFit, best: ExplanationFit, fal
     return _decision(replace(search, fits=fits), larger, false_discovery)
 
 
+def decide_as_good(search: Search, decision: Decision, other: ExplanationFit, false_discovery: float) -> Decision:
+    """The decision where another explanation, that scores worse, follows the trials as closely: it is as probable.
+
+    Parameters
+    ----------
+    search : Search
+    decision : Decision
+    other : ExplanationFit
+        Of the search, simpler than the best.
+    false_discovery : float
+        As in :func:`decide`.
+    """
+    fits = tuple(replace(fit, score=decision.best.score) if fit is other else fit for fit in search.fits)
+    equal = _decision(replace(search, fits=fits), decision.best, false_discovery)
+    return replace(decision, verdict=AMBIGUOUS, alike=(*decision.alike, other), probabilities=equal.probabilities)
+
+
 def doubtful_effects(search: Search, best: ExplanationFit) -> tuple[str, ...]:
     """Effects of an explanation without which it scores worse by less than :data:`DOUBTFUL`, or by less than
     :data:`DOUBTFUL_IF_RIGHT` where they make the card right; the smallest gain first.
