@@ -53,7 +53,8 @@ def test_a_foreign_column_is_left_out_and_named(write):
     [
         ("t_s", "time", "header: there is no column t_s"),
         ("delta_deg", "helm_deg", "header: there is no rudder; add delta_deg"),
-        ("r_degps", "r_deg", "column r_deg: is not a signal of a trial; call it as r_radps"),
+        ("r_degps", "r_deg", "column r_deg: is not a signal of a trial; call it as r_degps"),
+        ("delta_deg", "delta_order", "column delta_order: is not a signal of a trial; call it as delta_order_deg"),
         ("1,10,2", ",10,2", "line 3, column t_s: is empty"),
         ("1,10,2", "x,10,2", "line 3, column t_s: 'x' is not a number"),
         ("1,10,2", "0,10,2", "row 2, column t_s: 0 does not come after 0 of the row before"),
@@ -68,6 +69,12 @@ def test_faulty_csvs_are_refused_with_their_place(write, old, new, said):
     assert old in GOOD
     path = write(GOOD.replace(old, new, 1))
     with pytest.raises(InputError, match=re.escape(f"{path}: {said}")):
+        read_trial_file(path)
+
+
+def test_a_wind_of_negative_speed_is_refused(write):
+    path = write(GOOD.replace("u_mps", "wind_speed_mps").replace("0,0,1,", "0,0,-1,"))
+    with pytest.raises(InputError, match="column wind_speed_mps: has negative values"):
         read_trial_file(path)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import CsvTable, read_table
+from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 
@@ -71,10 +72,11 @@ def _origin(table: CsvTable) -> tuple[float, float] | None:
 def _refuse_slip(table: CsvTable, name: str) -> None:
     """Refuse what looks like a signal of the format misspelt or with a unit that it cannot have."""
     stem = name.rpartition("_")[0] or name
-    same = [signal for signal in TRIAL_SIGNALS if signal.rpartition("_")[0] == stem]
+    stems = {signal: signal.rpartition("_")[0] for signal in TRIAL_SIGNALS}
+    same = [signal for known in (name, stem) for signal in TRIAL_SIGNALS if stems[signal] == known]
     near = same or difflib.get_close_matches(name, TRIAL_SIGNALS, n=1, cutoff=0.85)
     if near:
-        remedy = f"call it as {near[0]} (or with another unit of that kind), or delete the column"
+        remedy = f"call it as {SignalName(near[0]).file} (or with another unit of that kind), or delete the column"
         raise InputError(table.path, f"column {table.heading(name)}", "is not a signal of a trial", remedy)
 
 
@@ -83,6 +85,10 @@ def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
         present = ", ".join(table.heading(name) for name in table.columns)
         remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
         raise InputError(table.path, "header", "there is no rudder", remedy)
+    for name in ("wind_speed_mps", "current_speed_mps"):
+        if name in signals and np.any(signals[name] < 0):
+            remedy = "a speed is 0 or more, and its direction says where it goes or comes from"
+            raise InputError(table.path, f"column {table.heading(name)}", "has negative values", remedy)
     if not any(name in signals for name in MEASURED_COLUMNS):
         remedy = "add at least one measured column, such as r_degps, psi_deg or u_mps"
         raise InputError(table.path, "header", "nothing measured is in it", remedy)

@@ -21,7 +21,6 @@ from tank2sim.cards.form import SteeringGear
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.steering_gear import UNSTATED_LAG
 from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
 from tank2sim.simulation.figures import Figures, figures_of
@@ -253,14 +252,8 @@ def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float
     """
     model = integrator.model
     values = {}
-    if record.rudder_rate_radps is not None:  # the record shows the result of order and gear: a ramp
-        known = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-        lag = UNSTATED_LAG * known["ship.length"] / known["ship.speed"]
-        gear = {
-            "steering.max_rate": record.rudder_rate_radps,
-            "steering.max_angle": math.pi / 2,
-            "steering.time_constant": lag,
-        }
+    if record.rudder_rate_radps is not None:  # the record shows the result of order and gear: a ramp, and its last part
+        gear = {"steering.max_rate": record.rudder_rate_radps, "steering.max_angle": math.pi / 2}
         values = {name: value for name, value in gear.items() if name in model.parameter_names}
     start = {name: value for name, value in record.start.items() if name in model.parameter_names}
     duration = record.end_s - record.begin_s
