@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -122,12 +121,21 @@ choice)."""
 _FEWEST = 4
 """Rows before an execute from which its state is by straight lines (project choice)."""
 
+CIRCLE_FROM = math.radians(120.0)
+"""Least change of heading of a turning circle: its figures are read to 90 and 180 deg (project choice)."""
+
 _ABOVE_NOISE = 3.0
 """Standard deviations by which a yaw rate exceeds its noise (project choice: one reading in 370)."""
 
 
 def recorded(trial: Trial, model: Model) -> Recorded | None:
-    """Recognise a turning circle or a zigzag in a trial; None if it is neither.
+    """Recognise a turning circle or a zigzag in a trial as :func:`recognise`; None if it is neither."""
+    found = recognise(trial, model)
+    return None if isinstance(found, str) else found
+
+
+def recognise(trial: Trial, model: Model) -> Recorded | str:
+    """Recognise a turning circle or a zigzag in a trial, or say why it is neither.
 
     Both begin on a straight course. A record that begins in a manoeuvre has no figures, and a rudder that is held at
     other angles in between makes no zigzag.
@@ -141,30 +149,21 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
         Of a ship of the trial's size: for L/u0 and the names of its variables.
     """
     held = held_rudders(trial)
+    if not held:
+        return "its rudder is not held over"
     values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     ship_time = float(values["ship.length"] / values["ship.speed"])
-    smooth = _motion(trial, model, ship_time) if held else None
+    smooth = _motion(trial, model, ship_time)
     if smooth is None:
-        return None
+        return "it has no heading or no positions"
     first = held[0]
     if _turning(trial, first, smooth["r_radps"], ship_time):
-        return None
-    turned = np.abs(smooth["psi_rad"] - np.interp(first.execute_s, trial.time_s, smooth["psi_rad"]))
-    inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
-    manoeuvre: Turn | Zigzag | None = None
-    zigzag: FittedZigzag | None = None
-    wait = float(np.median([angle.moves_s - angle.execute_s for angle in held]))
-    if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in pairwise(held)):
-        noise = _smoothed_noise(trial, "psi_rad", ship_time)
-        if not holds_other_angles(trial, held):
-            zigzag = fitted_zigzag(trial.time_s, held, smooth, noise, ship_time)
-        manoeuvre = replace(zigzag.manoeuvre, wait_s=wait) if zigzag else None
-        end = float(trial.time_s[-1])
-    elif turned[inside].max(initial=0.0) > math.radians(120):
-        manoeuvre, end = Turn(first.angle, first.moves_s - first.execute_s), first.end_s
-    if manoeuvre is None:
-        return None
-    track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth), ship_time)
+        return f"the ship turns at its first order, at {first.execute_s:.4g} s"
+    steered = _steered(trial, held, smooth, ship_time)
+    if isinstance(steered, str):
+        return steered
+    manoeuvre, zigzag = steered.manoeuvre, steered.zigzag
+    track = _trajectory(trial, model, manoeuvre, (first.execute_s, steered.end_s), (held, smooth), ship_time)
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
     start["initial.rudder_angle"] = rudder_before(trial, first)
@@ -179,7 +178,38 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
     if isinstance(manoeuvre, Zigzag) and reversals:  # the first movement is half as long, and its rate half as certain
         rate = float(np.median(reversals))
-    return Recorded(trial, manoeuvre, first.execute_s, end, rate, start, inputs, figures, errors, reading)
+    return Recorded(trial, manoeuvre, first.execute_s, steered.end_s, rate, start, inputs, figures, errors, reading)
+
+
+@dataclass(frozen=True, eq=False)
+class _Steered:
+    """How a trial was steered, until when, and the fit of a zigzag's reversals."""
+
+    manoeuvre: Turn | Zigzag
+    end_s: float
+    zigzag: FittedZigzag | None = None
+
+
+def _steered(trial: Trial, held: list[HeldAngle], smooth: dict[str, Array], ship_time: float) -> _Steered | str:
+    """The manoeuvre of the held angles, or why they make none."""
+    first = held[0]
+    if len(held) == 1:
+        inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
+        turned = np.abs(smooth["psi_rad"] - np.interp(first.execute_s, trial.time_s, smooth["psi_rad"]))
+        most = float(turned[inside].max(initial=0.0))
+        if most <= CIRCLE_FROM:
+            return (
+                f"it turns {math.degrees(most):.0f} deg with the rudder over, less than {math.degrees(CIRCLE_FROM):.0f}"
+            )
+        return _Steered(Turn(first.angle, first.moves_s - first.execute_s), first.end_s)
+    if holds_other_angles(trial, held):
+        return "its rudder is held at other angles between the reversals"
+    noise = _smoothed_noise(trial, "psi_rad", ship_time)
+    zigzag = fitted_zigzag(trial.time_s, held, smooth, noise, ship_time)
+    if zigzag is None:
+        return "its rudder is not reversed at the same heading to both sides"
+    wait = float(np.median([angle.moves_s - angle.execute_s for angle in held]))
+    return _Steered(replace(zigzag.manoeuvre, wait_s=wait), float(trial.time_s[-1]), zigzag)
 
 
 def _turning(trial: Trial, first: HeldAngle, rates: Array, ship_time: float) -> bool:
@@ -308,8 +338,8 @@ def _trajectory(
 def _state_before(trial: Trial, smooth: dict[str, Array], execute_s: float, ship_time: float) -> dict[str, float]:
     """Signals of :data:`STATES` at an execute, by straight lines through what came before it.
 
-    Smoothing mixes what comes after into it: of a 10/10 zigzag of a Mariner a tenth of the largest yaw rate, and she
-    seems to turn 0.3 s earlier. Signals that were derived are slopes over a window: they have their mean over another
+    Smoothing mixes what comes after into it: of a 10/10 zigzag of a Mariner a tenth of the largest yaw rate, which
+    seems to begin 0.3 s earlier. Signals that were derived are slopes over a window: they have their mean over another
     one, half a window before. Without :data:`_FEWEST` rows before, the smoothed value.
     """
     time, window = trial.time_s, SMOOTHING * ship_time

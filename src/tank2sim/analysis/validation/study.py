@@ -48,7 +48,7 @@ from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbers
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
-from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
+from tank2sim.simulation.recorded import Recorded, recognise, recorded, repeat, steerable
 from tank2sim.units import from_si
 
 COVERAGE = 2.0
@@ -222,19 +222,18 @@ def validate_card(
     finer = replace(model, step_s=model.step_s / 2)
     engines = Integrator(model), Integrator(finer)
     drawn, of_errors = members(card, model, count)
-    known = [(trial, recorded(trial, model)) for trial in trials]
+    known = [(trial, recognise(trial, model)) for trial in trials]
     messages = [
-        f"{trial.name}: neither a turning circle (120 deg or more) nor a zigzag, from a straight course and without "
-        "other angles of the rudder in between, with heading and track: only replayed"
+        f"{trial.name}: no turning circle and no zigzag, for {what}: only replayed"
         for trial, what in known
-        if what is None
+        if isinstance(what, str)
     ]
     messages += [*joint_errors(card, card_parameters(card, study_model(card))).in_words, *of_errors]
-    whats = [what for _, what in known if what is not None]
+    whats = [what for _, what in known if isinstance(what, Recorded)]
     between = _between_repeats(whats)
     figures: list[Validated] = []
     for trial, what in known:
-        if what is None:
+        if isinstance(what, str):
             continue
         found, trouble = _validated(what, engines, drawn, between)
         copied = fitted_as(card, trial)
