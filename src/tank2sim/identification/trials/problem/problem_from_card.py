@@ -183,6 +183,12 @@ def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
 
     The ``angle`` of the rudder also where only orders were recorded, which the gear of the card follows
     (:mod:`.ordered_rudder`); the ``order`` where more than this gear acts between them.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    driven_by : str
+        ``angle`` if the rudder's angle was measured, ``order`` if only its order is known.
     """
     return "angle" if driven_by == "angle" or ordered_rudder(driven_model(card, "order")) else "order"
 
