@@ -78,6 +78,26 @@ def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
     assert np.std(found) < 0.5 * np.std(middle)
 
 
+def test_a_beginning_that_the_first_search_loses_is_found_without_steps_of_the_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tanker under small orders of course keeping, whose first search ended where the record is missed by 75 noises."""
+    (made,) = make([Setting((), 3, ship="tanker", manoeuvres=("accel",))])
+    write(sampled(made, 1), tmp_path)
+    given = read_card(tmp_path / "ship.toml")
+    assert isinstance(given, ManoeuvringCard)
+    trials = measured([tmp_path / "accel.csv"], given)
+    card, noise = polynomial_over_trials(given, trials.trials), noise_of("tanker")
+    replayer = Replayer(card, trials.driven_by, list(noise))
+    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
+    record = input_record(replayer, trials.trials[0])
+    lost = replayer.guess_initial_state(record, sigma, p) + 0.01
+    monkeypatch.setattr(Replayer, "_least_squares_start", lambda *arguments, **options: (lost, 75.0))
+    found, start = replayer.fit_record(record, sigma, p)
+    away = ((replayer.motion(found, start, p) - record.readings) / sigma)[~np.isnan(record.readings)]
+    assert np.sqrt(np.mean(away**2)) < 1.3
+
+
 def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_misses_the_motion_by_far(
     tmp_path: Path,
 ) -> None:

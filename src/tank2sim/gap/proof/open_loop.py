@@ -354,6 +354,8 @@ class Replayer:
 
     @staticmethod
     def _given_at(record: InputRecord, rows: NDArray[np.intp], shares: Array) -> InputRecord:
+        if not len(rows):
+            return record
         instants = np.full(len(record.inputs), record.middle)
         instants[rows] = shares
         return replace(record, instants=instants)
