@@ -81,7 +81,7 @@ def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
 def test_a_beginning_that_the_first_search_loses_is_found_without_steps_of_the_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A tanker under small orders of course keeping, whose first search ended where the record is missed by 75 noises."""
+    """A tanker under small orders of course keeping: the first search ends where the record is missed by 75 noises."""
     (made,) = make([Setting((), 3, ship="tanker", manoeuvres=("accel",))])
     write(sampled(made, 1), tmp_path)
     given = read_card(tmp_path / "ship.toml")
