@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.outcome.surrounded_trial import SPEED_STEP, SurroundedTrial, typical_speed
+from tank2sim.gap.outcome.surrounded_trial import STEP_SHARE, SurroundedTrial, typical_speed
 from tank2sim.gap.result import Surroundings
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 
@@ -140,7 +140,7 @@ class _AllTrials:
             rows, parts = slice(row, row + trial.count), self._parts(at, place)
             now = trial.away(parts, p)
             blocks[rows, k + 2 * place : k + 2 * place + 2] = weight * trial.slopes(parts, p, now)
-            for column, step in enumerate(SPEED_STEP * self._spread):
+            for column, step in enumerate(STEP_SHARE * self._spread):
                 moved = at[:k].copy()
                 moved[column] += step
                 blocks[rows, column] = weight * (trial.away(parts, self._parameters(moved)) - now) / step

@@ -28,9 +28,9 @@ _FIRST_PART = 1 / 3
 """Share of a record that the surroundings are fitted to first (project choice): over its whole length a motion in the
 wrong wind may turn the other way, and a search is then lost."""
 
-SPEED_STEP = 1e-3
-"""Differences are taken over this share of the typical speed (project choice: rounding and curvature are both far below
-the noise)."""
+STEP_SHARE = 1e-3
+"""Differences are taken over this share of the typical speed, and of the spread of a coefficient (project choice:
+rounding and curvature are both far below the noise)."""
 
 _FAR = 1e4
 """Noise units in place of a motion out of bounds: further than any that is within."""
@@ -112,7 +112,7 @@ class SurroundedTrial:
 
     def slopes(self, parts: Array, p: Array, now: Array) -> Array:
         """Derivatives (count, 2 m) of ``away(parts, p) = now`` in the parts."""
-        return difference_slopes(lambda moved: self.away(moved, p), parts, now, SPEED_STEP * self.typical)
+        return difference_slopes(lambda moved: self.away(moved, p), parts, now, STEP_SHARE * self.typical)
 
     def begin(self, parts: Array, p: Array) -> None:
         """Find the initial state again, in these surroundings."""

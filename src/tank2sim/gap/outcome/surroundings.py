@@ -12,7 +12,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model, Quantity, State
-from tank2sim.gap.outcome.surrounded_trial import SPEED_STEP, ByTrial, SurroundedTrial, with_columns
+from tank2sim.gap.outcome.surrounded_trial import STEP_SHARE, ByTrial, SurroundedTrial, with_columns
 from tank2sim.gap.proof.open_loop import Replayer, difference_slopes
 from tank2sim.gap.result import Surroundings
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -76,7 +76,7 @@ def _of_trial(
         return residual
 
     nominal = np.array([state.nominal for state in model.states])
-    slopes = difference_slopes(away, start, away(start), SPEED_STEP * nominal) * nominal
+    slopes = difference_slopes(away, start, away(start), STEP_SHARE * nominal) * nominal
     covariance = np.linalg.inv(slopes.T @ slopes + np.eye(len(start)))  # in nominal sizes, their spread beforehand
     size = max(float(np.mean(away(start) ** 2)), 1.0) * max(trial.passage, 1.0)
     by_errors = -covariance @ slopes.T @ _slopes_in_errors(card, effects, model, away, start)
