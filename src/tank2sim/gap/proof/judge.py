@@ -157,7 +157,7 @@ class Judge:
     def _is_closer(self, search: Search, judged: Judged, *, clearly: bool) -> bool:
         """Whether simulations with the names are closer than without, and than with other coefficients alone."""
         proof = judged.proof
-        closes = closes_clearly(proof.results) if clearly else closes_gap(proof.results)
+        closes = _closes_clearly(proof.results) if clearly else closes_gap(proof.results)
         if not closes or search.none.score - judged.decision.best.score >= DECISIVE:
             return closes
         return proof.misfit < max((1 + BETTER) * self._of(search.none).misfit, NEAR_NOISE)
@@ -194,7 +194,7 @@ class Judge:
         return self._proofs[best]
 
 
-def closes_clearly(results: Sequence[Passed]) -> bool:
+def _closes_clearly(results: Sequence[Passed]) -> bool:
     """Whether a gap that is far above the noise becomes clearly smaller, in the trials held out as well."""
     before, after = (misfit_of(results, version) for version in ("before", "after"))
     held = [result for result in results if result.held_out]
