@@ -47,6 +47,16 @@ def test_the_rudder_leaves_half_a_row_before_the_row_that_shows_its_order(card, 
     assert np.rad2deg(angle) == pytest.approx(exact(time, 10.0 - 0.5 * step), abs=0.05)
 
 
+def test_the_rudder_arrives_within_a_gap_of_the_record(card) -> None:
+    trial = ordered(0.5, 10.0)
+    rows = (trial.time_s < 10.6) | (trial.time_s > 19.0)
+    short = replace(
+        trial, time_s=trial.time_s[rows], signals={name: values[rows] for name, values in trial.signals.items()}
+    )
+    time, angle = ordered_rudder(build(card)).angle(short)
+    assert np.rad2deg(angle) == pytest.approx(exact(time, 9.75), abs=0.05)
+
+
 def test_a_record_that_begins_at_its_execute_begins_amidships(card) -> None:
     gear = ordered_rudder(build(card))
     time, angle = gear.angle(ordered(0.5, 10.0, begin=10.0))

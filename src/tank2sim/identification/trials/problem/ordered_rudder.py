@@ -26,6 +26,10 @@ _PARTS_OF_LAG = 4.0
 """Steps in a time constant of the gear: Runge and Kutta's error is then below 1e-4 of a movement (project choice)."""
 
 
+_LONGEST_GAP = 20.0
+"""Rows that may be missing between two, over which the gear is still followed in such steps (project choice)."""
+
+
 @dataclass(frozen=True, eq=False)
 class OrderedRudder:
     """A steering gear alone.
@@ -50,7 +54,8 @@ class OrderedRudder:
         An order holds from half a row before the first one that shows it (:data:`.ROWS_TO_SHOW_AN_ORDER`).
         """
         time, order = trial.time_s, rudder_of(trial)
-        half = math.ceil(0.5 * sampling_step(trial) * _PARTS_OF_LAG / self.lag_s)
+        longest = min(float(np.max(np.diff(time))), _LONGEST_GAP * sampling_step(trial))
+        half = math.ceil(0.5 * longest * _PARTS_OF_LAG / self.lag_s)
         lengths = np.repeat(np.diff(time) / (2 * half), 2 * half)
         orders = np.concatenate([np.repeat(pair, half) for pair in pairwise(order)])
         chain = self.chain.run(np.array([self._first(trial, order)]), np.column_stack([orders, lengths]))
