@@ -385,7 +385,7 @@ def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Array] | 
     if not {"psi_rad", "x_m", "y_m"} <= known:
         return None
     time = trial.time_s
-    smooth = {name: _smoothed(time, _filled(time, trial.signals[name]), ship_time) for name in known}
+    smooth = {name: _smoothed(time, straight_over_gaps(time, trial.signals[name]), ship_time) for name in known}
 
     if "r_radps" not in known:
         smooth["r_radps"] = _slope(time, smooth["psi_rad"], ship_time)
@@ -432,6 +432,15 @@ def _slope(time: Array, values: Array, ship_time: float) -> Array:
     return np.asarray(rise / run, dtype=np.float64)
 
 
-def _filled(time: Array, values: Array) -> Array:
+def straight_over_gaps(time: Array, values: Array) -> Array:
+    """Return a signal with straight lines in place of what was not measured.
+
+    Parameters
+    ----------
+    time : array (n,)
+        s.
+    values : array (n,)
+        nan where nothing was measured.
+    """
     known = ~np.isnan(values)
     return np.interp(time, time[known], values[known])

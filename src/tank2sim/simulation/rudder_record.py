@@ -201,6 +201,11 @@ def _begins(time: Array, rudder: Array, origin: float, angle: float) -> tuple[fl
     return most - 0.7 * whole / rate, rate
 
 
+def is_over(angle: float, rudder: Array) -> bool:
+    """True if an angle (rad) is one at which a rudder (n,) is over, and not one of course keeping."""
+    return abs(angle) > max(_OVER * _usual_largest(rudder), _LEAST_RUDDER)
+
+
 def _usual_largest(rudder: Array) -> float:
     """Largest angle of a rudder (n,) without the 5 % beyond it, rad."""
     return float(np.percentile(np.abs(rudder), 95))

@@ -156,10 +156,10 @@ class SurroundedTrial:
         self.compare(0.5)
         first = self.nearest(parts, p).x
         self.compare(0.5, 1.0)
-        left = float(np.sum(self.away(first, p) ** 2))
+        with_first_half = float(np.sum(self.away(first, p) ** 2))
         none, kept = np.zeros(len(self.typical)), self._state
         self.begin(none, absent)
         without = float(np.sum(self.away(none, absent) ** 2))
         self._state = kept
         self.compare(1.0)
-        return math.sqrt(left / without) if without > 0 else 1.0
+        return math.sqrt(with_first_half / without) if without > 0 else 1.0

@@ -21,6 +21,7 @@ from tank2sim.identification.trials.problem.sampled_runs import SampledRun, rudd
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.rows import Chain
 from tank2sim.simulation.rudder_record import rudder_of
+from tank2sim.simulation.scheme import runge_kutta_step
 
 _PARTS_OF_LAG = 4.0
 """Steps in a time constant of the gear: Runge and Kutta's error is then below 1e-4 of a movement (project choice)."""
@@ -84,19 +85,10 @@ def ordered_rudder(model: Model) -> OrderedRudder | None:
     if {*by_state} != {place} or not by_input <= {"rudder.command", "steering.failed"}:
         return None
     angle, driving = ca.SX.sym("angle"), ca.SX.sym("driving", 2)
-    whole = ca.Function("whole", [model.x, model.u, model.p], [rate])
-
-    def rate_at(at: ca.SX) -> ca.SX:
-        x, u = ca.SX.zeros(model.x.shape), ca.SX.zeros(model.u.shape)
-        x[place], u[command] = at, driving[0]
-        return whole(x, u, model.parameter_values())
-
-    h = driving[1]
-    k1 = rate_at(angle)
-    k2 = rate_at(angle + h / 2 * k1)
-    k3 = rate_at(angle + h / 2 * k2)
-    k4 = rate_at(angle + h * k3)
-    step = ca.Function("gear", [angle, driving], [ca.densify(angle + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))])
+    x, u = ca.SX.zeros(model.x.shape), ca.SX.zeros(model.u.shape)
+    x[place], u[command] = angle, driving[0]
+    after = runge_kutta_step(model)(x, u, model.parameter_values(), driving[1])[place]
+    step = ca.Function("gear", [angle, driving], [ca.densify(after)])
     values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     return OrderedRudder(
         Chain(step), float(values["steering.time_constant"]), float(values["ship.length"] / values["ship.speed"])

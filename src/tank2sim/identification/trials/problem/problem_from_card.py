@@ -179,7 +179,7 @@ def _driven(ship: Model, driven_by: str) -> Model:
 
 
 def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
-    """What drives the model that is fitted to trials.
+    """Return the signal that drives the model which is fitted to trials.
 
     The ``angle`` of the rudder also where only orders were recorded, which the gear of the card follows
     (:mod:`.ordered_rudder`); the ``order`` where more than this gear acts between them.

@@ -13,7 +13,8 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial
-from tank2sim.simulation.recorded import FED, STATES, TURNS_AT_EXECUTE
+from tank2sim.simulation.recorded import FED, STATES, TURNS_AT_EXECUTE, straight_over_gaps
+from tank2sim.simulation.rudder_record import is_over
 
 OBSERVED_SIGNALS = {
     **STATES,
@@ -31,9 +32,6 @@ seconds) would ask for gigabytes. Project choice: records of what a ship does ha
 _SLOWER = 1.5
 """Step of a signal, as a multiple of that of the grid, from which it is slower than it (project choice: below, most
 instants have a sample of their own)."""
-
-_OVER, _LEAST_RUDDER = 0.8, np.deg2rad(2.0)
-"""A rudder is over from this share of its usual largest angle, and this angle, rad (project choices)."""
 
 _BEGINNING = 5
 """Instants of a run whose straight line gives the first yaw rate (project choice)."""
@@ -161,20 +159,14 @@ def rudder_at_start(run: SampledRun, order: Array, ship_time: float) -> float:
     """
     rates = run.column("motion.r")
     if np.isnan(rates).all() and not np.isnan(run.column("motion.psi")).all():
-        rates = np.gradient(_filled(run.times, run.column("motion.psi")), run.step_s)
-    side, size = np.sign(order[0]), float(np.percentile(np.abs(order), 95))
-    if np.isnan(rates).all() or abs(order[0]) < max(_OVER * size, _LEAST_RUDDER):
+        rates = np.gradient(straight_over_gaps(run.times, run.column("motion.psi")), run.step_s)
+    if np.isnan(rates).all() or not is_over(float(order[0]), order):
         return float(order[0])
-    rates = side * _filled(run.times, rates)
+    rates = np.sign(order[0]) * straight_over_gaps(run.times, rates)
     largest = float(np.max(uniform_filter1d(rates, max(1, round(ship_time / run.step_s)))))
     _, first = np.polyfit(np.arange(_BEGINNING), rates[:_BEGINNING], 1)
     turns_later = largest > _ABOVE_NOISE * white_noise(rates)
     return 0.0 if turns_later and first < TURNS_AT_EXECUTE * largest else float(order[0])
-
-
-def _filled(time: Array, values: Array) -> Array:
-    known = ~np.isnan(values)
-    return np.interp(time, time[known], values[known])
 
 
 def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[SampledRun, ...]:
