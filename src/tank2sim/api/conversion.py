@@ -32,6 +32,7 @@ from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
+from tank2sim.cards.examination import doubts
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError, close_name
@@ -81,7 +82,8 @@ class ConversionResult(Result):
     command = "convert"
 
     def __init__(self, ship: Ship, language: str, made: ConvertedText, notices: tuple[str, ...]) -> None:
-        self.ship, self.language, self.made, self.notices = ship, language, made, notices
+        self.ship, self.language, self.made = ship, language, made
+        self.notices = (*doubts(ship.card), *notices)
 
     @property
     def text(self) -> str:

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard
+from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import (
@@ -69,7 +70,7 @@ class CraftIdentificationResult(Result):
         self.before, self.fit, self.predictions, self.held = before, fit, list(predictions), list(held)
         self.driven_by, self.responses = driven_by, dict(responses or {})
         self.card = identified_craft(before.card, fit, self.responses)
-        self.notices = tuple(self._notices())
+        self.notices = (*dict.fromkeys((*doubts(before.card), *doubts(self.card))), *self._notices())
 
     def _notices(self) -> list[str]:
         of_thrust = [

@@ -13,6 +13,7 @@ from tank2sim.api.craft_identification import CraftTrialPaths, craft_trial_files
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard
+from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import (
     PREDICTED_S,
@@ -51,6 +52,7 @@ class CraftValidationResult(Result):
         short = [path.name for path in self.paths if str(path) not in known]
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         self.notices = (
+            *doubts(ship.card),
             *([f"not longer than {least:g} s, and not predicted: {', '.join(short)}"] if short else []),
             NOT_ITS_OWN,
         )

@@ -15,6 +15,7 @@ from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
+from tank2sim.cards.examination import doubts
 from tank2sim.cards.writing import TestedRange
 from tank2sim.design.captive_design import DRAWN_SHIPS, CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
 from tank2sim.design.figure_slopes import FIGURES_OPTION, figure_of_text, range_of_figures
@@ -69,7 +70,8 @@ class CampaignDesignResult(PagedResult):
     command = "design"
 
     def __init__(self, ship: Ship, design: CaptiveDesign, notices: tuple[str, ...]) -> None:
-        self.ship, self.design, self.notices = ship, design, notices
+        self.ship, self.design = ship, design
+        self.notices = tuple(dict.fromkeys((*doubts(ship.card), *notices)))
 
     @cached_property
     def _rows(self) -> list[dict[str, object]]:
@@ -330,7 +332,8 @@ class TrialDesignResult(PagedResult):
     command = "design"
 
     def __init__(self, ship: Ship, design: TrialDesign, notices: tuple[str, ...]) -> None:
-        self.ship, self.design, self.notices = ship, design, notices
+        self.ship, self.design = ship, design
+        self.notices = tuple(dict.fromkeys((*doubts(ship.card), *notices)))
 
     @property
     def manoeuvres(self) -> pd.DataFrame:

@@ -17,6 +17,7 @@ from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
 from tank2sim.fmu.osp import osp_system
 from tank2sim.fmu.platforms import named_platforms
 from tank2sim.fmu.unpacking import embedded_card
+from tank2sim.marks import marked
 
 if TYPE_CHECKING:
     from tank2sim.api.ship import Ship
@@ -84,9 +85,9 @@ class CheckResult(Result):
 
     command = "check"
 
-    def __init__(self, report: CheckReport) -> None:
+    def __init__(self, report: CheckReport, notices: tuple[str, ...] = ()) -> None:
         self.report = report
-        self.notices = (
+        self.notices = notices + (
             ()
             if report.compared
             else ("the FMU carries no card: only its description was validated; give --card to compare",)
@@ -197,4 +198,5 @@ def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     text = embedded_card(Path(path)) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else card.model
-    return CheckResult(check_against_model(Path(path), model=model and with_simulator_interface(model)))
+    report = check_against_model(Path(path), model=model and with_simulator_interface(model))
+    return CheckResult(report, tuple(marked(model.notices)) if model else ())

@@ -15,9 +15,9 @@ from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
 from tank2sim.cards.card import PROPELLER_COEFFICIENTS
 from tank2sim.cards.covariance import Covariance
+from tank2sim.cards.plausibility import unusual_signs, yaw_damping
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.plausibility import unusual_signs, yaw_damping
 from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column

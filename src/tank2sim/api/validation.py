@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,9 @@ from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import signal_display_name
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import Passed
+from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
+from tank2sim.marks import CHECK
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.units import in_words
@@ -189,6 +191,9 @@ def validate(
     records = trials_of(trials)
     given = measured(records, ship) if records else Measured((), "angle", ())
     found = validate_figures(ship, given.trials, members, required_percent)
+    if records and (evidence := evidence_of_other_ship(ship, given)):
+        notice = f"{CHECK} these look like trials of another ship: {'; '.join(evidence)}"
+        found = replace(found, notices=(notice, *found.notices))
     return ValidationResult(ship_of(ship), given, found, members)
 
 

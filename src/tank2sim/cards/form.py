@@ -17,10 +17,14 @@ Positive = Annotated[float, Field(gt=0)]
 # the pen or of the unit, and the powers of it in the prime system (up to L^5) leave the range of a float.
 Length = Annotated[float, Field(ge=0.01, le=1000.0)]
 Speed = Annotated[float, Field(ge=0.001, le=100.0)]
-CardWaterDensity = Annotated[float, Field(ge=1.0, le=20000.0)]
-AirDensity = Annotated[float, Field(ge=1e-3, le=100.0)]
-CardGravity = Annotated[float, Field(ge=0.01, le=1000.0)]
-CardViscosity = Annotated[float, Field(ge=1e-9, le=1.0)]
+WaterDensity = Annotated[float, Field(gt=900, lt=1300)]
+"""kg/m3. Fresh water has 958 (boiling) to 1000, sea water up to 1030, the Dead Sea 1240: g/cm3 and t/m3 are refused."""
+AirDensity = Annotated[float, Field(gt=0.3, lt=2.0)]
+"""kg/m3. Air has 1.23 at sea level and 15 deg, 1.5 at -40 deg, 0.7 on the highest lakes."""
+Gravity = Annotated[float, Field(gt=9.7, lt=9.9)]
+"""On Earth: 9.764 m/s2 (Huascaran) to 9.834 (Arctic Ocean), EGM2008; wider by half a percent."""
+Viscosity = Annotated[float, Field(gt=1e-7, lt=1e-5)]
+"""m2/s. Water has 0.3e-6 (boiling) to 1.8e-6 (freezing): refuses centistokes."""
 TimeConstant = Annotated[float, Field(ge=1e-3, le=1000.0)]
 AngularRate = Annotated[float, Field(ge=1e-6, le=1e5)]
 Mass = Annotated[float, Field(ge=1e-6, le=1e12)]
@@ -90,10 +94,10 @@ class ShipSection(BodySection):
 class Environment(CardSection):
     """``[environment]``: water, air and gravity; the defaults are those of the card format."""
 
-    water_density_kgpm3: CardWaterDensity = 1025.0
+    water_density_kgpm3: WaterDensity = 1025.0
     air_density_kgpm3: AirDensity = 1.225
-    gravity_mps2: CardGravity = 9.80665
-    kinematic_viscosity_m2ps: CardViscosity = 1.19e-6
+    gravity_mps2: Gravity = 9.80665
+    kinematic_viscosity_m2ps: Viscosity = 1.19e-6
 
 
 class ShipModel(CardSection):

@@ -25,6 +25,7 @@ from tank2sim.cards.card import (
     YawRigCard,
     scales_of_file,
 )
+from tank2sim.cards.examination import refuse_impossible
 from tank2sim.cards.form import (
     CARD_FORMS,
     CraftForm,
@@ -103,6 +104,12 @@ def read_card(name: str | Path, changes: Mapping[str, object] | None = None) -> 
 
 def parse_card(text: str, source: str) -> Card:
     """The card that a TOML text describes; `source` names it in messages. Raises as :func:`read_card`."""
+    card = _parsed(text, source)
+    refuse_impossible(card)
+    return card
+
+
+def _parsed(text: str, source: str) -> Card:
     content = _content(text, source)
     if not isinstance(content.get("model"), dict):
         raise InputError(source, "model", "this section is missing", "a card needs [model] with its kind")

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from tank2sim.cards.form import CardSection, Positive
+from tank2sim.cards.form import CardSection, Gravity, Positive, WaterDensity
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.cards.reading import faults_of_toml
 from tank2sim.errors import InputError
@@ -19,8 +19,6 @@ from tank2sim.files import read_text
 from tank2sim.records.campaign_form import (
     Angle,
     TankSection,
-    TestGravity,
-    TestWaterDensity,
     section_in_si,
 )
 
@@ -131,8 +129,8 @@ class TestedModelSection(CardSection):
 
     length_m: Annotated[float, Field(gt=0.1, le=100)] | None = None
     speed_mps: _Speed | None = None
-    water_density_kgpm3: TestWaterDensity = 1000.0
-    gravity_mps2: TestGravity = 9.80665
+    water_density_kgpm3: WaterDensity = 1000.0
+    gravity_mps2: Gravity = 9.80665
 
 
 class TankFile(CardSection):

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import cast
 
 from tank2sim.cards.card import Card, CraftCard, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
+from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS, Effect
 from tank2sim.dynamics.glider import glider_model
@@ -58,7 +59,8 @@ def _described(card: Card, effects: tuple[Effect | None, ...] = ()) -> _Describe
 
 @lru_cache(maxsize=KEPT_MODELS)
 def _built(described: _Described) -> Model:
-    return replace(_model(described.card), source=described.card.source)
+    model = _model(described.card)
+    return replace(model, source=described.card.source, notices=(*doubts(described.card), *model.notices))
 
 
 def _model(card: Card) -> Model:

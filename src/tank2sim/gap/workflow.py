@@ -12,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
@@ -56,6 +57,7 @@ from tank2sim.gap.search.model_choice import (
     Decision,
     decide,
 )
+from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
     above_low_speed,
@@ -132,6 +134,9 @@ def run_gap_workflow(
     options = options or GapOptions()
     given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
     fitted, held = above_low_speed(card, fitted), above_low_speed(card, held)
+    if evidence := evidence_of_other_ship(card, fitted):
+        remedy = "give the card and the trials of one ship, in the same units and signs"
+        raise not_of_ship(card, fitted, evidence, remedy)
     if card.roll is not None:
         fitted, held = _without_heel(fitted), _without_heel(held)
     # Small matrices: threads of the linear algebra library would wait for each other.
@@ -163,7 +168,7 @@ def run_gap_workflow(
             smaller = _smaller(card, (fitted, held), (gap, both), options, pool)
             gap, trials = smaller or (both, found_trials)
         tried = of_tried_effects(_names(card, fitted, options), candidate_explanations(card, fitted.driven_by))
-        return replace(gap, notices=(*lowered_bound_notice(given, card), *tried, *gap.notices))
+        return replace(gap, notices=(*doubts(given), *lowered_bound_notice(given, card), *tried, *gap.notices))
 
 
 def _without_heel(group: Measured) -> Measured:

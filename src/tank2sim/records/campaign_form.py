@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationError
 
-from tank2sim.cards.form import CardSection, Positive, Text
+from tank2sim.cards.form import CardSection, Gravity, Positive, Text, Viscosity, WaterDensity
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
 from tank2sim.units import to_si
@@ -32,13 +32,6 @@ OSCILLATING: tuple[RunType, ...] = ("pure_sway", "pure_yaw", "yaw_with_drift")
 """Types of run in which the model oscillates; in the others it is towed steadily."""
 
 NotNegative = Annotated[float, Field(ge=0)]
-TestGravity = Annotated[float, Field(gt=9.7, lt=9.9)]
-"""On Earth: 9.764 m/s2 (Huascaran) to 9.834 (Arctic Ocean), EGM2008; wider by half a percent."""
-TestWaterDensity = Annotated[float, Field(gt=900, lt=1100)]
-"""kg/m3. Fresh water has 958 (boiling) to 1000, sea water up to 1030, the Dead Sea 1240: a project choice that refuses
-g/cm3 and t/m3, and air."""
-TestViscosity = Annotated[float, Field(gt=1e-7, lt=1e-5)]
-"""m2/s. Water has 0.3e-6 (boiling) to 1.8e-6 (freezing): refuses centistokes."""
 Angle = Annotated[float, Field(gt=-1.5707963267948966, lt=1.5707963267948966)]
 
 
@@ -94,8 +87,8 @@ class TankTest(CardSection):
         Motions left free, such as ``["heave", "pitch"]``.
     """
 
-    water_density_kgpm3: TestWaterDensity = 1000.0
-    gravity_mps2: TestGravity = 9.80665
+    water_density_kgpm3: WaterDensity = 1000.0
+    gravity_mps2: Gravity = 9.80665
     speed_mps: Positive
     force_convention: Literal["on_model", "on_gauge", "hydrodynamic"]
     rudder_sign: Literal["starboard", "port"] = "starboard"
@@ -103,7 +96,7 @@ class TankTest(CardSection):
     propeller_radps: NotNegative | None = None
     force_delay_s: Annotated[float, Field(gt=-10, lt=10)] = 0.0
     free_motions: list[str] | str | bool | None = None
-    kinematic_viscosity_m2ps: TestViscosity | None = None
+    kinematic_viscosity_m2ps: Viscosity | None = None
 
     @property
     def sense(self) -> float:
@@ -155,9 +148,9 @@ class UncertaintySection(CardSection):
 class FullScaleSection(CardSection):
     """``[full_scale]``: the water the ship sails in, for a card at ship scale."""
 
-    water_density_kgpm3: TestWaterDensity = 1025.0
-    gravity_mps2: TestGravity = 9.80665
-    kinematic_viscosity_m2ps: TestViscosity = 1.19e-6
+    water_density_kgpm3: WaterDensity = 1025.0
+    gravity_mps2: Gravity = 9.80665
+    kinematic_viscosity_m2ps: Viscosity = 1.19e-6
 
 
 class ColumnEntry(CardSection):

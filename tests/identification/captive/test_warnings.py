@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from tank2sim.cards import read_card
-from tank2sim.identification.captive.plausibility import force_convention, levers, unusual_signs, yaw_force
+from tank2sim.cards.plausibility import levers, unusual_signs, yaw_force
+from tank2sim.identification.captive.plausibility import force_convention
 from tank2sim.identification.captive.tank_conditions import (
     CarriedBody,
     FroudeScaling,

@@ -1,24 +1,54 @@
 """Trials of another ship than the card's: refused; no alarm on measured ships and ships with unknown effects."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tank2sim.cards import read_card
-from tank2sim.identification.trials.assessment.other_ship import other_ship
+from tank2sim.identification.trials.assessment.other_ship import far_from_card, other_ship
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.records.trials import Trial
 from tests.identification.trials.made_up_ship import TRUTH, problem, trial, turn, zigzag
 
 
-@pytest.mark.parametrize("factor", [0.2, 5.0])
-def test_a_rudder_moment_far_off_the_cards_is_reported_by_its_trial(factor):
-    other = {**TRUTH, "Nd": factor * TRUTH["Nd"]}
-    runs = [trial(zigzag(20), name="own"), trial(zigzag(15), name="other", truth=other)]
-    (reported,) = (one for one in other_ship(problem(runs)) if one.startswith("other"))
-    assert float(reported.split()[2]) == pytest.approx(factor, rel=0.5)
-    assert not any(one.startswith("own") for one in other_ship(problem(runs)))
+def of_other_size(run: Trial, size: float) -> Trial:
+    """The same motion by a ship `size` times as long at the same speed, which takes as much longer for it."""
+    scale = {"r_radps": 1 / size, "x_m": size, "y_m": size}
+    signals = {name: scale.get(name, 1.0) * values for name, values in run.signals.items()}
+    return replace(run, time_s=size * run.time_s, signals=signals)
+
+
+@pytest.mark.parametrize(("size", "words"), [(0.5, "more than"), (2.0, "less than")])
+def test_a_ship_of_half_or_twice_the_length_is_reported_by_its_trial(size: float, words: str) -> None:
+    runs = [trial(zigzag(20), name="own"), of_other_size(trial(zigzag(15), name="other"), size)]
+    reported = other_ship(problem(runs))
+    (alone,) = (one for one in reported if one.startswith("by other "))
+    assert words in alone
+    assert not any(one.startswith("by own ") for one in reported)
+
+
+def test_a_rudder_of_the_other_sign_is_told_from_another_ship() -> None:
+    other = {**TRUTH, "Yd": -TRUTH["Yd"], "Nd": -TRUTH["Nd"]}
+    runs = [trial(zigzag(20), name="a", truth=other), trial(zigzag(10), name="b", truth=other)]
+    assert any("rudder_sign" in one for one in other_ship(problem(runs)))
+
+
+def test_wide_errors_of_a_card_do_not_widen_the_test() -> None:
+    known = problem([of_other_size(trial(zigzag(20), name="other"), 0.5)])
+    wide = replace(known, prior_error=100 * known.prior_error)
+    assert other_ship(wide) == other_ship(known) != ()
+
+
+def test_an_estimate_whose_coefficients_are_several_times_their_size_away_is_no_result() -> None:
+    known = problem([trial(zigzag(20), name="own")])
+    known = replace(known, prior_error=0.05 * np.abs(known.prior_mean))
+    assert far_from_card(known, {"Y": 10.0, "N": 10.0}) == ()  # half their size
+    (far,) = far_from_card(known, {"Y": 10.0, "N": 80.0})
+    assert "yaw" in far and "sway" not in far
 
 
 @pytest.mark.parametrize("off", [0.0, 0.3])
@@ -43,7 +73,15 @@ def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Pa
 
 
 @pytest.mark.slow
-def test_a_mariner_is_no_tanker(data: Path) -> None:
+@pytest.mark.parametrize("tanker", ["kvlcc2", "kvlcc2-captive", "kvlcc2-mmg"])
+def test_a_mariner_is_no_tanker_by_whatever_equations(data: Path, tanker: str) -> None:
+    card = read_card(tanker)
+    trials = measured([data / f"data/gap_cases/case_1/zigzag{angle}.csv" for angle in ("20_20", "10_10")], card)
+    assert other_ship(problem_from_card(card, trials.trials, trials.driven_by))
+
+
+@pytest.mark.slow
+def test_a_mariner_is_no_tanker_in_any_structure(data: Path) -> None:
     trials = measured(
         [data / f"data/gap_cases/case_1/zigzag{angle}.csv" for angle in ("20_20", "10_10")], read_card("kvlcc2-captive")
     )

@@ -18,6 +18,7 @@ from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, circle_track, stop_track
 from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.examination import doubts
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
 from tank2sim.errors import InputError
@@ -182,7 +183,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         hard_over_s=2 * largest / rate if largest and rate else None,
         neutral_deg=_neutral(ship),
         squat=squat_of(card),
-        notices=tuple(dict.fromkeys((*circle_notes, *troubles))),
+        notices=tuple(dict.fromkeys((*doubts(card), *circle_notes, *troubles))),
     )
 
 

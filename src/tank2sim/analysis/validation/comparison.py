@@ -28,6 +28,7 @@ from tank2sim.analysis.validation.standard_trials import (
 )
 from tank2sim.arrays import Array
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, SteeredCard
+from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.marks import ASSUMED, EXTRAPOLATED
 from tank2sim.simulation.card_range import Numbers
@@ -358,7 +359,7 @@ def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
 
 
 def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[str]:
-    messages = []
+    messages = [f"{label}: {doubt}" for card, label in zip(cards, labels, strict=True) for doubt in doubts(card)]
     reference = cards[0]
     for card, label in zip(cards, labels, strict=True):
         ratio = reference.ship.length_m / card.ship.length_m

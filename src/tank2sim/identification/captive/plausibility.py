@@ -1,65 +1,16 @@
-"""Physics warnings on derivatives from captive tests: values that no known ship has.
+"""Added masses from captive tests that no body has, and the convention of the forces that would explain them.
 
 Prime system, rudder positive to starboard, without inertia terms.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
-from tank2sim.identification.captive.tank_conditions import Caution
+from tank2sim.cards.plausibility import ADDED_MASSES, Caution
 
 ADDED_SHARE = (0.1, 3.0)
 """Range of added mass over mass, and of added yaw inertia over yaw inertia; about 0.9 and 0.7 are usual."""
-
-DEEP_ADDED_SHARES = {"Yvdot": (0.5, 1.6), "Nrdot": (0.25, 2.0)}
-"""Added mass over mass, and added yaw inertia over yaw inertia, of ships in deep water: 0.76 and 0.60 (KVLCC2), 0.89
-(S175), 0.94 and 1.12 (Mariner); both limits are a project choice. If half the mass is stated, the reaction of the other
-half seems to come from the water, and 0.94 becomes 2.9."""
-
-ADDED_MASSES = ("Yvdot", "Nrdot")
-"""Derivatives that reveal a wrong convention of the forces; their sign is checked with it."""
-
-LEVERS = (
-    ("Nv", "Yv", (-0.1, 0.6), "the force of a small drift angle"),
-    ("Nd", "Yd", (-0.55, -0.35), "the force of the rudder"),
-)
-"""Moment and force, and the range of their ratio, lengths forward of midships. The rudder is at -0.5, and its force
-on the hull acts forward of it; drift: 0.23 (Mariner) to 0.44 (KVLCC2)."""
-
-YAW_DAMPING = (0.05, 1.0)
-"""Range of N_r' over that of a slender hull, -pi (d/L)^2. Clarke, Gedling and Hine (1983) have 1/4 + 0.039 B/d -
-0.56 B/L times it, 0.2 to 0.4; the KVLCC2 0.24 without and 0.29 with its rudder. The bounds, a factor of three and more
-away, are a project choice: a yaw rate r L/U taken for deg/s makes N_r' about ten times as large, one in rad/s five
-times."""
-
-_SIGNIFICANT = 2.0
-
-
-@dataclass(frozen=True)
-class ExpectedSign:
-    """The sign, +1 or -1, and its reason, written after a colon."""
-
-    sign: int
-    reason: str
-
-
-EXPECTED_SIGNS: dict[str, ExpectedSign] = {
-    "Yv": ExpectedSign(-1, "the water resists sideways motion"),
-    "Nv": ExpectedSign(-1, "the force of a drift angle acts forward of midships (Munk moment)"),
-    "Nr": ExpectedSign(-1, "the water damps yawing"),
-    "Yd": ExpectedSign(-1, "a rudder that turns to starboard pushes the stern to port"),
-    "Nd": ExpectedSign(+1, "a rudder that turns to starboard, at the stern, pushes the bow to starboard"),
-    "Yvdot": ExpectedSign(-1, "accelerating sideways takes water along (added mass)"),
-    "Nrdot": ExpectedSign(-1, "accelerating in yaw takes water along (added inertia)"),
-    "Xudot": ExpectedSign(-1, "accelerating ahead takes water along (added mass)"),
-    "Xdd": ExpectedSign(-1, "a rudder at an angle has more drag"),
-}
-"""Signs of derivatives that every known ship has. Compared with the Mariner (Chislett and Strom-Tejsen 1965) and the
-KVLCC2 (Yasukawa and Yoshimura 2015, converted); derivatives whose sign differs between ships, such as Y_r, Y_rdot and
-N_vdot, are not listed."""
 
 
 def force_convention(
@@ -87,33 +38,6 @@ def force_convention(
             yield Caution("force convention", f"{message}; {_likely_cause(value, inertia, convention)}.")
 
 
-def added_masses(
-    derivatives: Mapping[str, float],
-    standard_errors: Mapping[str, float],
-    mass_prime: float,
-    inertia_prime: float | None,
-) -> Iterator[Caution]:
-    """Added mass or yaw inertia that no known ship has in deep water, by more than two standard errors.
-
-    Positive derivatives are the subject of :func:`force_convention`. `derivatives` and `standard_errors` are prime, as
-    `mass_prime` and `inertia_prime` (None if unknown).
-    """
-    inertias = ((mass_prime, "mass", "mass_kg"), (inertia_prime, "yaw inertia", "yaw_inertia_kgm2"))
-    for name, (inertia, what, key) in zip(ADDED_MASSES, inertias, strict=True):
-        value = derivatives.get(name)
-        if value is None or value > 0 or not inertia:
-            continue
-        low, high = DEEP_ADDED_SHARES[name]
-        share, doubt = -value / inertia, _SIGNIFICANT * standard_errors.get(name, 0.0) / inertia
-        if not low - doubt <= share <= high + doubt:
-            yield Caution(
-                "mass",
-                f"{name} is {value:.3g}: the added {what} would be {share:.2g} times the model's own ({inertia:.3g}), "
-                f"and known ships have {low:g} to {high:g} in deep water; check [model] {key} and the unit of the "
-                "gauges.",
-            )
-
-
 def _likely_cause(value: float, inertia: float, convention: str) -> str:
     """Likely cause of a positive acceleration derivative."""
     least, most = ADDED_SHARE
@@ -129,76 +53,3 @@ def _likely_cause(value: float, inertia: float, convention: str) -> str:
     if abs(value - inertia) < least * inertia:
         return "the forces hardly show the model's own inertia: check the unit of the gauges"
     return "check force_convention, the mass and the unit of the gauges"
-
-
-def unusual_signs(derivatives: Mapping[str, float], standard_errors: Mapping[str, float]) -> Iterator[Caution]:
-    """Derivatives whose sign no known ship has, by more than two standard errors, each with the reason for the sign.
-
-    `derivatives` and `standard_errors` are prime.
-    """
-    for name, expected in EXPECTED_SIGNS.items():
-        value = derivatives.get(name)
-        if value is None or value * expected.sign > 0:
-            continue
-        if abs(value) > _SIGNIFICANT * standard_errors.get(name, 0.0):
-            yield Caution("sign", _sign_message(name, value, expected))
-
-
-def yaw_force(derivatives: Mapping[str, float], mass_prime: float) -> Iterator[Caution]:
-    """Y_r of m' or more: the water would push a yawing ship inwards by more than the centrifugal force.
-
-    `derivatives` are prime, as `mass_prime`.
-    """
-    value = derivatives.get("Yr")
-    if value is not None and value >= mass_prime:
-        yield Caution(
-            "sign",
-            f"Yr is {value:.3g}, not below m' = {mass_prime:.3g}; Y_r - m' is negative of every known ship. Was the "
-            "inertia of the model taken out of the forces twice?",
-        )
-
-
-def yaw_damping(
-    derivatives: Mapping[str, float], standard_errors: Mapping[str, float], draught_ratio: float | None
-) -> Iterator[Caution]:
-    """N_r of a size that no hull has, by more than two standard errors.
-
-    `derivatives` and `standard_errors` are prime; `draught_ratio` is d/L, None if unknown.
-    """
-    value = derivatives.get("Nr")
-    if value is None or value > 0 or not draught_ratio:
-        return
-    unit = math.pi * draught_ratio**2
-    ratio, doubt = -value / unit, _SIGNIFICANT * standard_errors.get("Nr", 0.0) / unit
-    low, high = YAW_DAMPING
-    if not low - doubt <= ratio <= high + doubt:
-        yield Caution(
-            "size",
-            f"Nr is {value:.3g}, {ratio:.2g} times -pi (d/L)², and hulls have 0.2 to 0.4 times it; check the unit of "
-            "the yaw rate (r L/U, rad/s or deg/s).",
-        )
-
-
-def levers(derivatives: Mapping[str, float], standard_errors: Mapping[str, float]) -> Iterator[Caution]:
-    """Points of attack that no ship has, by more than two standard errors: N_v/Y_v and N_delta/Y_delta.
-
-    `derivatives` and `standard_errors` are prime.
-    """
-    for moment, force, (low, high), what in LEVERS:
-        if not derivatives.get(moment) or not derivatives.get(force):
-            continue
-        lever = derivatives[moment] / derivatives[force]
-        parts = (standard_errors.get(name, 0.0) / derivatives[name] for name in (moment, force))
-        doubt = _SIGNIFICANT * abs(lever) * math.hypot(*parts)
-        if not low - doubt <= lever <= high + doubt:
-            yield Caution(
-                "lever",
-                f"{moment}/{force} is {lever:+.2f}: {what} would act {abs(lever):.2f} lengths "
-                f"{'forward of' if lever > 0 else 'abaft'} midships, and known ships have {low:g} to {high:g}; check "
-                "to which point moments are referred.",
-            )
-
-
-def _sign_message(name: str, value: float, expected: ExpectedSign) -> str:
-    usual = "positive" if expected.sign > 0 else "negative"
-    return f"{name} is {value:+.3g}; it is {usual} of every known ship: {expected.reason}."

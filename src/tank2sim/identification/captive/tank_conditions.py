@@ -11,27 +11,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
-class Caution:
-    """A warning.
-
-    Parameters
-    ----------
-    kind : str
-        Subject, such as ``"frequency parameter"``.
-    message : str
-        One sentence, with figures and source.
-    runs : tuple of str
-        The runs concerned; empty for the whole campaign.
-    missing : str
-        The missing key that prevents the check; empty if the check was made.
-    """
-
-    kind: str
-    message: str
-    runs: tuple[str, ...] = ()
-    missing: str = ""
+from tank2sim.cards.plausibility import Caution
 
 
 def lacking(kind: str, what: str, key: str) -> Caution:

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tank2sim.cards import ManoeuvringCard
-from tank2sim.identification.captive.plausibility import (
+from tank2sim.cards.plausibility import (
     ADDED_MASSES,
+    Caution,
     added_masses,
-    force_convention,
     levers,
     unusual_signs,
     yaw_damping,
     yaw_force,
 )
+from tank2sim.identification.captive.plausibility import force_convention
 from tank2sim.identification.captive.tank_conditions import (
     LEAST_DEPTH_RATIO,
     CarriedBody,
-    Caution,
     OscillationMotion,
     Tank,
     blockage,

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
@@ -31,7 +32,7 @@ from tank2sim.identification.trials.assessment.model_selection import (
     simplest,
     yaw_rate_error,
 )
-from tank2sim.identification.trials.assessment.other_ship import other_ship
+from tank2sim.identification.trials.assessment.other_ship import far_from_card, not_of_ship, other_ship
 from tank2sim.identification.trials.assessment.prediction_intervals import (
     FittedProblem,
     WeightedFit,
@@ -222,6 +223,9 @@ class Identification:
         return fitted, ("held out", self.before_holdout, self.holdout)
 
 
+_OF_ONE_SHIP = "give the card and the trials of one ship, in the same units and signs, or --force"
+
+
 def identify_trials(
     card: ManoeuvringCard,
     trials: Measured,
@@ -301,10 +305,11 @@ def _identified(
         chosen = (_average_in_words(weights),)
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
-        names = ", ".join(trial.name for trial in trials.trials)
-        problem_text = f"not trials of the ship of {card.source}: {'; '.join(evidence)}"
-        raise InputError(names, "", problem_text, "give the card and the trials of one ship, or --force")
+        raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
     fit = _fitted(card, structure, trials, options, progress, drifts=drifts)
+    evidence += far_from_card(fit.fitted.problem, fit.fitted.estimate.prior_scale)
+    if evidence and not options.force:
+        raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
     started, fitted, current = fit.started, fit.fitted, fit.current
     card = card if current is None else card_in(card, current)
     samples = None
@@ -343,6 +348,7 @@ def _identified(
         current=current,
         choice=fit.choice,
         notices=(
+            *dict.fromkeys((*doubts(given), *doubts(improved))),
             *trials.notices,
             *(held.notices if held else ()),
             *lowered_bound_notice(given, card),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.evaluation import pooled
 from tank2sim.identification.trials.identify import Identification
+from tank2sim.marks import CHECK
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
 
@@ -33,7 +33,7 @@ def remarks(result: Identification) -> tuple[str, ...]:
     return (
         *_recognised(result),
         *_chosen(result),
-        *_widened(result.estimate.prior_scale),
+        *_widened(result),
         *_worse(result),
         *_outside(result),
         *_stops(result.card),
@@ -60,14 +60,18 @@ def _chosen(result: Identification) -> list[str]:
     ]
 
 
-def _widened(scale: Mapping[str, float]) -> list[str]:
+def _widened(result: Identification) -> list[str]:
+    scale = result.estimate.prior_scale
     wide = [f"{group} {factor:.3g} times" for group, factor in sorted(scale.items()) if factor > 1.05]
     if not wide:
         return []
+    far = max(scale.values()) > LACKING
+    mark = f"{CHECK} " if far and result.started.uncertainty else ""  # assumed errors may be too small
     found = [
-        f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; --trust-card keeps them"
+        f"{mark}the card's standard errors were widened as the trials demand: {', '.join(wide)}; --trust-card keeps "
+        "them"
     ]
-    if max(scale.values()) > LACKING:
+    if far:
         found.append(
             "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these trials "
             "and the card as it was given, finds which"
@@ -81,7 +85,7 @@ def _worse(result: Identification) -> list[str]:
         old, new = pooled(before.following, "motion.r"), pooled(after.following, "motion.r")
         if new > WORSE * old:
             messages.append(
-                f"WORSE than the card before on the trials {words}: "
+                f"{CHECK} WORSE than the card before on the trials {words}: "
                 f"yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
             )
     return messages
@@ -104,7 +108,7 @@ def _stops(card: ManoeuvringCard) -> list[str]:
     largest = HARD_TURN if gear is None or gear.max_angle_rad is None else min(HARD_TURN, gear.max_angle_rad)
     messages = []
     for side, word in ((1, "starboard"), (-1, "port")):
-        words = f"in a {math.degrees(largest):.0f} deg turn to {word} the model found"
+        words = f"{CHECK} in a {math.degrees(largest):.0f} deg turn to {word} the model found"
         try:
             speed = simulate(build(card), Turn(side * largest)).trajectory["motion.speed"]
         except InputError:

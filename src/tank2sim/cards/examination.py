@@ -1,0 +1,264 @@
+"""The one check of a card's sizes and signs: impossible ones are refused, implausible ones are said with every result.
+
+:func:`refuse_impossible` is called when a card is read, :func:`doubts` when its model is built or its numbers are
+written elsewhere, so that no command has a check of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from tank2sim.cards.card import Card, CraftCard, ManoeuvringCard, MmgCard
+from tank2sim.cards.form import BodySection
+from tank2sim.cards.plausibility import (
+    EXPECTED_SIGNS,
+    added_masses,
+    levers,
+    unusual_signs,
+    yaw_damping,
+    yaw_force,
+)
+from tank2sim.errors import InputError
+from tank2sim.marks import CHECK
+
+FULLEST_BLOCK = 1.15
+"""Largest volume over L B d. Nothing is fuller than a box; the rest is for a length between perpendiculars that is
+shorter than the waterline. Project choice."""
+
+LARGEST_GYRADIUS = 0.5
+"""Largest radius of gyration over L: all mass at the ends of the hull."""
+
+LEAST_ANGLE_RAD = math.radians(2.0)
+"""Largest rudder angle below which a gear steers nothing, and pi/2 in degrees or less is an angle in radians."""
+
+LEAST_RATE_RADPS = math.radians(0.2)
+"""Slowest rudder that is taken for one: a tenth of the 2.3 deg/s of SOLAS II-1/29, and more than that in rad/s for
+degrees. Project choice."""
+
+USUAL = {
+    "length over beam": (1.5, 20.0),
+    "beam over draught": (1.0, 12.0),
+    "block coefficient": (0.2, 1.0),
+    "block coefficient by mass over the stated one": (0.75, 1.33),
+    "added mass ahead over mass": (0.01, 0.4),
+    "Froude number": (0.03, 0.7),
+    "radius of gyration over length": (0.15, 0.4),
+    "place of the centre of gravity over length": (-0.1, 0.1),
+    "rudder area over L d": (1 / 150, 1 / 12),
+    "propeller diameter over draught": (0.1, 1.2),
+    "metacentric height over beam": (-0.1, 0.5),
+    "Y_v' over -pi (d/L)^2": (0.5, 6.0),
+}
+"""Ranges of proportions beyond which no displacement vessel with a rudder is known. Merchant ships have L/B 5 to 8,
+B/d 2 to 4, C_B 0.5 to 0.87, an added mass ahead of 0.03 to 0.15 m, a Froude number of 0.1 to 0.35, a radius of
+gyration of 0.22 to 0.28 L, x_G within 0.04 L, a rudder of L d/70 to L d/30 and Y_v' 1.5 to 2.5 times -pi (d/L)^2
+(Clarke, Gedling and Hine 1983). The bounds leave room for tugs, ferries and narrow hulls, and none for a length in
+feet, beam and draught exchanged, a speed or an area of another scale, or one prime system taken for another. Project
+choice."""
+
+_CRAFT_USUAL = {
+    "length over beam": (0.5, 30.0),
+    "Froude number": (0.01, 3.0),
+    "radius of gyration over length": (0.1, 0.5),
+    "place of the centre of gravity over length": (-0.25, 0.25),
+}
+
+_DEEP_DRAUGHTS = 4.0
+"""Depth over draught from which the water counts as deep for added masses and damping (Vantorre: h/d > 3)."""
+
+_LARGEST_PRIME_MASS = 0.1
+"""m' = 2 C_B (B/L) (d/L) of ships is 0.003 to 0.04; mass over 1/2 rho L^2 d is 0.2 to 0.3. Project choice."""
+
+
+_LEVER_ROOM = 0.15
+"""Room (over L) around the levers of measured ships: effects on a card share the force of rudder and drift with the
+polynomial, and 0.63 L abaft was measured so (HMRI's KVLCC2). Project choice."""
+
+
+def refuse_impossible(card: Card) -> None:
+    """Raise InputError if a card states what no body can have.
+
+    Parameters
+    ----------
+    card : Card
+        As read: SI or prime, starboard positive.
+
+    Raises
+    ------
+    InputError
+        The hull is fuller than a box, its mass lies outside it, it is aground, or an angle or a rate of the steering
+        gear is far too small (radians for degrees).
+    """
+    if isinstance(card, ManoeuvringCard | CraftCard):
+        _refuse_body(card)
+    ship = card.ship
+    if ship.water_depth_m is not None and ship.draught_m is not None and ship.water_depth_m <= ship.draught_m:
+        problem = f"is {ship.water_depth_m:g} m, and the draught {ship.draught_m:g} m: the ship is aground"
+        raise InputError(card.source, "ship.water_depth_m", problem, "check both")
+    gear = card.steering_gear if isinstance(card, ManoeuvringCard) else None
+    for key, least, unit in (("max_angle_rad", LEAST_ANGLE_RAD, "deg"), ("max_rate_radps", LEAST_RATE_RADPS, "deg/s")):
+        value = getattr(gear, key, None)
+        if isinstance(card, ManoeuvringCard) and value is not None and value < least:
+            place, shown = card.in_file(f"steering_gear.{key}", value)
+            problem = f"is {shown:.3g}, less than any steering gear has"
+            if not place.endswith(("_rad", "_radps")):
+                problem += f"; {shown:.3g} in radians would be {math.degrees(shown):.3g} {unit}"
+            raise InputError(card.source, place, problem, f"give it in {unit} (_deg, _degps) or radians (_rad, _radps)")
+
+
+def doubts(card: Card) -> tuple[str, ...]:
+    """Sizes and signs of a card that no known ship has, as one notice with the mark CHECK; empty if there are none.
+
+    Examples
+    --------
+    >>> from tank2sim.cards import read_card
+    >>> doubts(read_card("mariner"))
+    ()
+    >>> doubts(read_card("mariner", {"model.rudder_sign": "starboard"}))[0][:57]
+    'CHECK: Mariner class: the rudder turns the ship the wrong'
+    """
+    if isinstance(card, ManoeuvringCard):
+        facts = [*_of_ship(card), *(_of_mmg(card) if isinstance(card, MmgCard) else ())]
+    elif isinstance(card, CraftCard):
+        facts = list(_of_craft(card))
+    else:
+        return ()
+    name = " ".join(card.ship.name.split())
+    return (f"{CHECK} {name}: {'; '.join(facts)}. Correct the card, or know why this ship differs.",) if facts else ()
+
+
+def _refuse_body(card: ManoeuvringCard | CraftCard) -> None:
+    mass, gyradius_2 = _mass_kg(card), _gyradius_2(card)
+    block = _block(card.ship, mass, card.environment.water_density_kgpm3)
+    if block is not None and block > FULLEST_BLOCK:
+        problem = f"is {mass:.4g} kg, {block:.3g} times the water that a box of length, beam and draught displaces"
+        remedy = "check mass, scaling, length_m, beam_m and draught_m (all in m)"
+        raise InputError(card.source, "rigid_body.mass", problem, remedy)
+    centre = card.rigid_body.x_G / (card.ship.length_m if isinstance(card, CraftCard) else 1.0)
+    if not centre**2 <= gyradius_2 <= LARGEST_GYRADIUS**2:
+        problem = (
+            f"gives a radius of gyration of {math.sqrt(gyradius_2):.3g} L about midships with x_G at {centre:.3g} L"
+        )
+        remedy = "it is about midships, in the scaling of the mass; 0.25 L is usual"
+        raise InputError(card.source, "rigid_body.yaw_inertia", problem, remedy)
+
+
+def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
+    """What is unusual about a ship with a rudder; most serious first."""
+    ship, body = card.ship, card.rigid_body
+    hull = _hydrodynamic(card)
+    errors = card.uncertainty
+    signs = {caution.fact.split()[0]: caution.fact for caution in unusual_signs(hull, errors)}
+    if "Nd" in signs:
+        turned = [name for name in ("Yd", "Nd") if signs.pop(name, "")]
+        values = " and ".join(f"{name}' = {hull[name]:.3g}" for name in turned)
+        yield f"the rudder turns the ship the wrong way ({values}, starboard positive): check model.rudder_sign"
+    yield from signs.values()
+    yield from _proportions(card, USUAL)
+    deep = not (ship.water_depth_m and ship.draught_m) or ship.water_depth_m >= _DEEP_DRAUGHTS * ship.draught_m
+    slender = math.pi * (ship.draught_m / ship.length_m) ** 2 if ship.draught_m else None
+    cautions = [*yaw_force(hull, body.mass)]
+    if deep:
+        cautions += added_masses(hull, errors, body.mass, body.yaw_inertia)
+        cautions += yaw_damping(hull, errors, ship.draught_m / ship.length_m if ship.draught_m else None)
+        value = hull.get("Yv", 0.0)
+        if slender and value < 0:
+            yield from _beyond("Y_v' over -pi (d/L)^2", -value / slender, USUAL, 2 * errors.get("Yv", 0.0) / slender)
+    if "Nd" not in signs:
+        cautions += levers({name: value for name, value in hull.items() if name not in signs}, errors, _LEVER_ROOM)
+    yield from (caution.fact for caution in cautions)
+    if not (ship.beam_m and ship.draught_m) and body.mass > _LARGEST_PRIME_MASS:
+        yield f"m' is {body.mass:.3g}, and ships have 0.003 to 0.04: check model.scaling"
+    for key in ("valid_rudder_rad", "valid_drift_rad"):
+        value = getattr(card.model, key)
+        if value is not None and 0 < value < LEAST_ANGLE_RAD:
+            place, shown = card.in_file(f"model.{key}", value)
+            yield f"{place} is {shown:.3g}, and nearly every motion is beyond it: check its unit"
+
+
+def _of_mmg(card: MmgCard) -> Iterator[str]:
+    rudder, propeller, ship = card.rudder, card.propeller, card.ship
+    for name, value in (("x_R", rudder.x_R), ("x_H", rudder.x_H), ("x_P", propeller.x_P), ("l_R", rudder.l_R)):
+        if value is not None and value > 0:
+            what = "the effective place of the rudder" if name == "l_R" else "this is forward of midships"
+            yield f"{name} is {value:+.3g}, and it is negative for every ship: {what}"
+    yield from _beyond(
+        "rudder area over L d", rudder.number * ship.rudder_area_m2 / (ship.length_m * ship.draught_m), USUAL
+    )
+    if card.propulsion is not None and propeller.k_0 is not None:
+        speed = (1 - propeller.w_P0) * card.model.speed_mps
+        advance = speed / (card.propulsion.nominal_radps / (2 * math.pi) * ship.propeller_diameter_m)
+        thrust = propeller.k_0 + (propeller.k_1 or 0.0) * advance + (propeller.k_2 or 0.0) * advance**2
+        if not 0 < advance < 2 or thrust <= 0:
+            yield (
+                f"the propeller's advance ratio is {advance:.3g} at model.speed_mps and the nominal revolutions, with "
+                f"K_T = {thrust:.3g}: check propulsion.nominal_rpm, the speed and propeller_diameter_m"
+            )
+
+
+def _of_craft(card: CraftCard) -> Iterator[str]:
+    known = {name: value for name, value in card.derivatives.items() if name in EXPECTED_SIGNS and value}
+    yield from (caution.fact for caution in unusual_signs(known, card.uncertainty) if "Nv" not in caution.fact)
+    yield from _proportions(card, _CRAFT_USUAL)
+    for thruster in card.thrusters:
+        for side, sign in (("port", -1.0), ("starboard", 1.0)):
+            if side in thruster.name and thruster.y_m * sign < 0:
+                yield f"thruster {thruster.name} is at y_m = {thruster.y_m:g}: y is positive to starboard"
+
+
+def _proportions(card: ManoeuvringCard | CraftCard, usual: dict[str, tuple[float, float]]) -> Iterator[str]:
+    ship, length = card.ship, card.ship.length_m
+    of_length = length if isinstance(card, CraftCard) else 1.0
+    block = _block(ship, _mass_kg(card), card.environment.water_density_kgpm3)
+    found = {
+        "length over beam": _over(length, ship.beam_m),
+        "beam over draught": _over(ship.beam_m, ship.draught_m),
+        "block coefficient": block,
+        "block coefficient by mass over the stated one": _over(block, ship.block_coefficient),
+        "added mass ahead over mass": -card.derivatives.get("Xudot", 0.0) / card.rigid_body.mass or None,
+        "Froude number": card.model.speed_mps / math.sqrt(card.environment.gravity_mps2 * length),
+        "radius of gyration over length": math.sqrt(_gyradius_2(card)),
+        "place of the centre of gravity over length": card.rigid_body.x_G / of_length,
+        "propeller diameter over draught": _over(ship.propeller_diameter_m, ship.draught_m),
+        "metacentric height over beam": _over(ship.metacentric_height_m, ship.beam_m),
+    }
+    for name, value in found.items():
+        if value is not None and name in usual:
+            yield from _beyond(name, value, usual)
+
+
+def _beyond(name: str, value: float, usual: dict[str, tuple[float, float]], doubt: float = 0.0) -> Iterator[str]:
+    low, high = usual[name]
+    if not low - doubt <= value <= high + doubt:
+        yield f"{name} is {value:.3g}, and known ships have {low:.2g} to {high:.2g}"
+
+
+def _over(value: float | None, by: float | None) -> float | None:
+    return value / by if value is not None and by else None
+
+
+def _hydrodynamic(card: ManoeuvringCard) -> dict[str, float]:
+    """The derivatives (prime) without the terms of inertia that a card with "total" terms has in them."""
+    hull = {name: value for name, value in card.derivatives.items() if value}
+    body = card.rigid_body
+    if card.model.yaw_rate_terms == "total":
+        for name, inertia in (("Yr", body.mass), ("Nr", body.mass * body.x_G)):
+            if name in hull:
+                hull[name] += inertia
+    return hull
+
+
+def _mass_kg(card: ManoeuvringCard | CraftCard) -> float:
+    return card.rigid_body.mass * (1.0 if isinstance(card, CraftCard) else float(card.scales.mass))
+
+
+def _gyradius_2(card: ManoeuvringCard | CraftCard) -> float:
+    body = card.rigid_body
+    return body.yaw_inertia / body.mass / (card.ship.length_m**2 if isinstance(card, CraftCard) else 1.0)
+
+
+def _block(ship: BodySection, mass: float, density: float) -> float | None:
+    if not (ship.length_m and ship.beam_m and ship.draught_m):
+        return None
+    return mass / (density * ship.length_m * ship.beam_m * ship.draught_m)
