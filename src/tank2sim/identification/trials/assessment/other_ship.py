@@ -73,10 +73,9 @@ def other_ship(problem: Problem) -> tuple[str, ...]:
         if run.inputs[:, rudder].std() > _LEAST_RUDDER:
             trials.setdefault(run.name.partition(" at ")[0], []).append(run)
     found = {name: effect for name, runs in trials.items() if (effect := _effect(problem, runs)) is not None}
-    messages = [text for name, effect in found.items() if (text := _beyond(name, [effect], FACTOR_ALONE))]
-    if whole := _beyond("the mean of all trials", list(found.values()), FACTOR) if found else "":
-        messages.insert(0, whole)
-    return tuple(messages)
+    if whole := _beyond("all trials together", list(found.values()), FACTOR) if found else "":
+        return (whole,)
+    return tuple(text for name, effect in found.items() if (text := _beyond(name, [effect], FACTOR_ALONE)))
 
 
 def evidence_of_other_ship(card: ManoeuvringCard, trials: Measured) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
+from tank2sim.marks import CHECK
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies
@@ -109,16 +110,18 @@ def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[str]:
 
     Faults are the same if they are of the same column, and were repaired alike.
     """
-    groups: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
+    groups: dict[tuple[str, str, str, str], list[tuple[str, str]]] = {}
     for name, findings in audited.items():
         for finding in findings:
             done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
-            groups.setdefault((finding.column, finding.what, done), []).append((name, finding.likely_truth))
+            mark = f"{CHECK} " if finding.kind == "fault" else ""
+            key = mark, finding.column, finding.what, done
+            groups.setdefault(key, []).append((name, finding.likely_truth))
     notices = []
-    for (column, what, done), places in groups.items():
+    for (mark, column, what, done), places in groups.items():
         (name, truth), others = places[0], [other for other, _ in places[1:]]
         again = f"; the same in {', '.join(others)}, each with its own values" if others else ""
-        notices.append(f"{name}: {column}: {what}; {done}: {truth}{again}")
+        notices.append(f"{mark}{name}: {column}: {what}; {done}: {truth}{again}")
     return notices
 
 

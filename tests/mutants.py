@@ -1,0 +1,218 @@
+"""Draw mutants of chosen rooms and run the tests of each room: do the tests notice a wrong sign, bound or constant?
+
+    python -m tests.mutants 60 --seed 1            # draw 60 mutants from all rooms
+    python -m tests.mutants 5 --room waves --seed 2
+    python -m tests.mutants --list
+
+A mutant is one change of one expression: a comparison, an operator, a sign, a constant or a condition is turned.
+The package is copied to a temporary folder for it; the checkout stays as it is. Printed are the mutants that no test
+notices (they survive), with file, line and change, and their number. The same seed draws the same mutants.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SLOW_TOO = ("-m", "not long")
+
+ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "mmg": (("dynamics/mmg/*.py", "cards/mmg.py"), ("tests/dynamics/mmg", "tests/cards/test_mmg_card.py")),
+    "waves": (
+        ("dynamics/effects/waves.py", "analysis/wave_response.py"),
+        ("tests/dynamics/effects/test_waves.py", "tests/analysis/test_wave_response.py"),
+    ),
+    "banks": (
+        ("dynamics/effects/banks.py", "dynamics/effects/harbour.py"),
+        ("tests/dynamics/effects/test_banks.py", "tests/dynamics/effects/test_harbour.py"),
+    ),
+    "ships near": (("dynamics/effects/ships_near.py",), ("tests/dynamics/effects/test_ships_near.py",)),
+    "rudder and gear": (
+        ("dynamics/effects/gear.py", "dynamics/effects/loaded_rudder.py"),
+        ("tests/dynamics/effects/test_rudder_and_gear.py", "tests/dynamics/effects/test_every_effect.py"),
+    ),
+    "propeller": (
+        ("dynamics/effects/propeller.py", "dynamics/effects/controllable_pitch.py"),
+        ("tests/dynamics/effects/test_propeller_and_hull.py", "tests/dynamics/effects/test_controllable_pitch.py"),
+    ),
+    "small craft": (("dynamics/small_craft.py", "cards/small_craft.py"), ("tests/dynamics/test_small_craft.py",)),
+    "roll": (("dynamics/roll.py",), ("tests/dynamics/test_roll.py",)),
+    "card check": (
+        ("cards/examination.py", "cards/plausibility.py"),
+        ("tests/cards/test_examination.py", "tests/identification/captive/test_warnings.py"),
+    ),
+    "guess": (("analysis/guess/*.py",), ("tests/analysis/guess",)),
+    "logs": (("logs/clock.py", "logs/current.py", "logs/delays.py", "logs/quantities.py"), ("tests/logs",)),
+    "gap judge": (
+        ("gap/proof/judge.py", "gap/proof/improvement.py", "gap/diagnosis/error_intervals.py"),
+        (
+            "tests/gap/test_judge_by_simulation.py",
+            "tests/gap/test_cross_check.py",
+            "tests/gap/test_error_intervals.py",
+            "tests/gap/test_workflow.py",
+        ),
+    ),
+    "captive mmg": (("identification/captive_mmg/*.py",), ("tests/identification/captive_mmg",)),
+    "other ships": (
+        ("identification/trials/assessment/other_ship.py", "records/same_record.py"),
+        ("tests/identification/trials/test_other_ship.py", "tests/records/test_same_record.py"),
+    ),
+    "simulator rules": (("fmu/simulator_rules.py",), ("tests/fmu/test_passport.py",)),
+    "lanes": (
+        ("simulation/lane_runs.py", "simulation/lane_spirals.py", "simulation/lane_figures.py"),
+        ("tests/simulation/test_lanes.py", "tests/simulation/test_stop.py"),
+    ),
+}
+"""Room: its modules, and the tests that should notice a change in them."""
+
+_COMPARED = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
+_OPERATED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change of one module: the expression before and after, and its room."""
+
+    room: str
+    path: Path
+    line: int
+    before: str
+    after: str
+    start: int
+    end: int
+
+    def text(self) -> str:
+        """The module with the change."""
+        whole = self.path.read_bytes()
+        return (whole[: self.start] + self.after.encode() + whole[self.end :]).decode()
+
+    def __str__(self) -> str:
+        place = self.path.relative_to(ROOT)
+        return f"{place}:{self.line}: {' '.join(self.before.split())[:70]}  ->  {' '.join(self.after.split())[:70]}"
+
+
+def changes(node: ast.expr) -> Iterator[ast.expr]:
+    """Each expression that a mutation makes of one."""
+    match node:
+        case ast.Compare(left, [operator], right) if type(operator) in _COMPARED:
+            yield ast.Compare(left, [_COMPARED[type(operator)]()], right)
+        case ast.BinOp(left, operator, right) if type(operator) in _OPERATED:
+            yield ast.BinOp(left, _OPERATED[type(operator)](), right)
+        case ast.UnaryOp(ast.USub(), operand):
+            yield operand
+        case ast.BoolOp(ast.And(), values):
+            yield ast.BoolOp(ast.Or(), values)
+        case ast.BoolOp(ast.Or(), values):
+            yield ast.BoolOp(ast.And(), values)
+        case ast.UnaryOp(ast.Not(), operand):
+            yield operand
+        case ast.IfExp(test, body, otherwise):
+            yield ast.IfExp(test, otherwise, body)
+        case ast.Constant(bool() as value):
+            yield ast.Constant(not value)
+        case ast.Constant(float() as value) if value:
+            yield ast.Constant(value * 1.5)
+        case ast.Constant(int() as value) if value > 1:
+            yield ast.Constant(value + 1)
+
+
+def numbers_of(room: str, path: Path) -> list[Mutant]:
+    """All mutants of a module; text, annotations and C are left alone."""
+    source = path.read_bytes()
+    starts = [0]
+    for line in source.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+    tree, found = ast.parse(source), []
+    left_alone = {id(child) for node in ast.walk(tree) for child in _not_changed(node)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.expr) or id(node) in left_alone or node.end_lineno is None:
+            continue
+        start = starts[node.lineno - 1] + node.col_offset
+        end = starts[node.end_lineno - 1] + (node.end_col_offset or 0)
+        before = source[start:end].decode()
+        for changed in changes(node):
+            after = f"({ast.unparse(ast.fix_missing_locations(changed))})"
+            found.append(Mutant(room, path, node.lineno, before, after, start, end))
+    return found
+
+
+def _not_changed(node: ast.AST) -> Iterator[ast.AST]:
+    """Expressions that say nothing of the physics: annotations, formatted text, raised messages."""
+    match node:
+        case ast.AnnAssign():
+            yield from ast.walk(node.annotation)
+        case ast.arg(annotation=ast.expr() as annotation):
+            yield from ast.walk(annotation)
+        case ast.FunctionDef(returns=ast.expr() as returns):
+            yield from ast.walk(returns)
+        case ast.JoinedStr() | ast.Raise():
+            yield from ast.walk(node)
+        case ast.Call(func=ast.Name("dataclass" | "lru_cache" | "zip")):
+            yield from ast.walk(node)
+
+
+def survives(mutant: Mutant, package: Path) -> bool:
+    """True if the tests of its room pass with the mutant; a run that does not end counts as noticed."""
+    target = package / mutant.path.relative_to(ROOT / "src" / "tank2sim")
+    original = target.read_text()
+    target.write_text(mutant.text())
+    tests = [path for path in ROOMS[mutant.room][1] if (ROOT / path).exists()]
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", *SLOW_TOO, *tests]
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+    try:
+        run = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, timeout=900, check=False)
+    except subprocess.TimeoutExpired:
+        return False
+    finally:
+        target.write_text(original)
+    return run.returncode == 0
+
+
+def main() -> None:
+    """Draw, run and report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("number", type=int, nargs="?", default=10)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--room", choices=ROOMS, action="append")
+    parser.add_argument("--list", action="store_true", help="print the drawn mutants and run nothing")
+    asked = parser.parse_args()
+    generator = random.Random(asked.seed)
+    rooms = asked.room or list(ROOMS)
+    pool = {
+        room: [
+            mutant
+            for pattern in ROOMS[room][0]
+            for path in sorted((ROOT / "src" / "tank2sim").glob(pattern))
+            for mutant in numbers_of(room, path)
+        ]
+        for room in rooms
+    }
+    drawn = [generator.choice(pool[rooms[place % len(rooms)]]) for place in range(asked.number)]
+    if asked.list:
+        print("\n".join(f"{mutant.room}: {mutant}" for mutant in drawn))
+        return
+    survivors = []
+    with tempfile.TemporaryDirectory() as folder:
+        package = Path(folder) / "src" / "tank2sim"
+        shutil.copytree(ROOT / "src" / "tank2sim", package, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in ("models", "fmu_templates"):
+            os.symlink(ROOT / name, Path(folder) / name)
+        for count, mutant in enumerate(drawn, 1):
+            alive = survives(mutant, package)
+            survivors += [mutant] if alive else []
+            print(f"{count}/{len(drawn)} {'SURVIVES' if alive else 'noticed'} {mutant.room}: {mutant}", flush=True)
+    print(f"{len(survivors)} of {len(drawn)} mutants survive (seed {asked.seed})")
+
+
+if __name__ == "__main__":
+    main()
