@@ -87,7 +87,7 @@ def evidence_of_other_ship(card: ManoeuvringCard, trials: Measured) -> tuple[str
 
 
 def not_of_ship(card: ManoeuvringCard, trials: Measured, evidence: Sequence[str], remedy: str) -> InputError:
-    """The refusal of trials that are not of the card's ship."""
+    """The refusal of trials that are not of the card's ship by `evidence`; `remedy` says what to do."""
     names = ", ".join(trial.name for trial in trials.trials)
     reasons = "; ".join((*evidence, *(doubt.removeprefix(f"{CHECK} ").rstrip(".") for doubt in doubts(card))))
     return InputError(names, "", f"not trials of the ship of {card.source}: {reasons}", remedy)
@@ -163,53 +163,73 @@ class RudderEffect:
         """The measured coefficient less `factor` times the card's, and its standard error (Fieller 1954)."""
         weights = np.array([1.0, -factor])
         model = _MODEL_ERROR * max(abs(self.measured), abs(factor * self.modelled))
-        return self.measured - factor * self.modelled, float(
-            np.hypot(np.sqrt(weights @ self.covariance @ weights), model)
-        )
+        error = np.hypot(np.sqrt(weights @ self.covariance @ weights), model)
+        return self.measured - factor * self.modelled, float(error)
+
+
+@dataclass(frozen=True, eq=False)
+class _Responses:
+    """Windows after moves of the rudder: regressors (n, 2 + runs), accelerations as measured and by the card (n, 2),
+    the number of the block of each (n,), and the card's own derivative by the rudder (n,)."""
+
+    regressors: Array
+    accelerations: Array
+    block: Array
+    slope: Array
 
 
 def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None:
-    """The yaw acceleration by the rudder in runs; None for short ones."""
-    rudder = problem.model.input_names.index("rudder.command")
-    one = problem.without(problem.free[1:])
-    moved = []
-    for run in runs:
-        inputs = run.inputs.copy()
-        inputs[:, rudder] += _NUDGE
-        moved.append(replace(run, inputs=inputs))
-    try:
-        form, nudged = WeakForm(one.with_runs(tuple(runs))), WeakForm(one.with_runs(tuple(moved)))
-    except InputError:
+    """The yaw acceleration by the rudder in runs; None where they do not show it."""
+    found = _responses(problem, runs)
+    if found is None:
         return None
-    per_block = max(1, round(BLOCK * problem.ship_time / form.half))
-    rows, sides, blocks, slopes = [], [], [], []
-    windows = zip(form.runs, form.at(one.prior_mean), nudged.at(one.prior_mean), strict=True)
-    for number, (run, at, beside) in enumerate(windows):
-        angle, yaw_rate = run.averaging @ run.run.inputs[:-1, rudder], run.averaging @ run.middle[:, 2]
-        back = np.maximum(np.arange(len(angle)) - round(_RESPONSE * problem.ship_time / form.half), 0)
-        kept = np.array(
-            [np.ptp(angle[first : last + 1]) > _LEAST_RUDDER for last, first in enumerate(back)], dtype=bool
-        )
-        means = np.eye(len(form.runs))[[number] * len(angle)]
-        rows.append(np.column_stack([angle, yaw_rate, means])[kept])
-        measured = run.change[:, 2]
-        sides.append(np.column_stack([measured, measured - at.residuals[:, 2]])[kept])
-        slopes.append((at.residuals - beside.residuals)[kept, 2] / _NUDGE)
-        blocks.append((np.arange(len(angle)) // per_block + 1000 * number)[kept])
-    X, Y, block = np.vstack(rows), np.vstack(sides), np.concatenate(blocks)
-    if len(X) <= X.shape[1] or np.linalg.matrix_rank(X) < X.shape[1] or not np.isfinite(Y).all():
-        return None
-    slope = float(np.mean(np.concatenate(slopes)))
-    if not slope:
+    X, Y = found.regressors, found.accelerations
+    slope = float(np.mean(found.slope)) if len(X) > X.shape[1] else 0.0
+    if not slope or np.linalg.matrix_rank(X) < X.shape[1] or not np.isfinite(Y).all():
         return None
     inverse = np.linalg.inv(X.T @ X)
     coefficients = inverse @ X.T @ Y
     left = Y - X @ coefficients
-    shares = np.array([inverse[0] @ X[block == name].T @ left[block == name] for name in np.unique(block)])
+    names = np.unique(found.block)
+    shares = np.array([inverse[0] @ X[found.block == name].T @ left[found.block == name] for name in names])
     spare = len(X) - X.shape[1]
     by_blocks = shares.T @ shares * len(X) / spare  # Liang and Zeger 1986; of one block it is 0
     by_windows = inverse[0, 0] * (left.T @ left) / spare * _OVERLAP
     covariance = by_blocks if np.trace(by_blocks) > np.trace(by_windows) else by_windows
-    measured, modelled = (float(value) for value in coefficients[0] / slope)
-    found = RudderEffect(measured, modelled, covariance / slope**2)
-    return found if found.determined else None
+    measured, modelled = coefficients[0] / slope
+    effect = RudderEffect(float(measured), float(modelled), covariance / slope**2)
+    return effect if effect.determined else None
+
+
+def _responses(problem: Problem, runs: Sequence[SampledRun]) -> _Responses | None:
+    """The windows after moves of the rudder of runs; None where no velocities are known."""
+    rudder = problem.model.input_names.index("rudder.command")
+    one, beside = problem.without(problem.free[1:]), []
+    for run in runs:
+        inputs = run.inputs.copy()
+        inputs[:, rudder] += _NUDGE
+        beside.append(replace(run, inputs=inputs))
+    try:
+        form, nudged = WeakForm(one.with_runs(tuple(runs))), WeakForm(one.with_runs(tuple(beside)))
+    except InputError:
+        return None
+    per_block = max(1, round(BLOCK * problem.ship_time / form.half))
+    before = round(_RESPONSE * problem.ship_time / form.half)
+    found, windows = [], 0
+    both = zip(form.runs, form.at(one.prior_mean), nudged.at(one.prior_mean), strict=True)
+    for number, (windowed, at, by) in enumerate(both):
+        angle = windowed.averaging @ windowed.run.inputs[:-1, rudder]
+        yaw_rate = windowed.averaging @ windowed.middle[:, 2]
+        moves = [np.ptp(angle[max(0, place - before) : place + 1]) for place in range(len(angle))]
+        kept = np.array(moves, dtype=float) > _LEAST_RUDDER
+        mean = np.eye(len(form.runs))[[number] * len(angle)]
+        measured = windowed.change[:, 2]
+        columns = (
+            np.column_stack([angle, yaw_rate, mean]),
+            np.column_stack([measured, measured - at.residuals[:, 2]]),
+            windows + np.arange(len(angle)) // per_block,
+            (at.residuals[:, 2] - by.residuals[:, 2]) / _NUDGE,
+        )
+        found.append([column[kept] for column in columns])
+        windows += len(angle)
+    return _Responses(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
