@@ -18,8 +18,39 @@ _DOUBLED_STEPS = 3.0
 """Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone
 differs by one to two."""
 
+_ROLLOVER_S = 1024 * 604800.0
+"""Time after which the week number of GPS begins anew, s (IS-GPS-200, 20.3.3.3.1.1)."""
+
+_DAY_S = 86400.0
+"""Difference of two clocks, s, from which one is wrong by more than a time zone."""
+
+_TWO_DIGITS_FROM = 80
+"""Years of two digits from here on are of the 20th century: GPS time begins in 1980 (IS-GPS-200, 3.3.4)."""
+
 FALL_STEPS = 1.5
 """Steps by which a clock falls where it was set back. Project choice: two samples that changed places fall by one."""
+
+
+def full_year(year: int) -> int:
+    """The year of a year of two digits."""
+    return year + (1900 if year >= _TWO_DIGITS_FROM else 2000)
+
+
+def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
+    """What to add to a receiver's clock that is ahead of the recorder's by `ahead_s`, and what to say of it.
+
+    Whole multiples of 1024 weeks are the receiver's fault, for its week number has ten bits; of any other difference
+    the receiver is right.
+    """
+    turns = round(-ahead_s / _ROLLOVER_S)
+    rest = ahead_s + turns * _ROLLOVER_S
+    if turns and abs(rest) < _DAY_S:
+        text = f"the receiver's date is {1024 * abs(turns)} weeks off that of the recorder, which is taken"
+        return turns * _ROLLOVER_S, [LogFinding("note", text, evidence={"weeks": 1024 * turns})]
+    if abs(ahead_s) > _DAY_S:
+        text = f"the recorder's clock is {abs(ahead_s) / _DAY_S:.4g} days off that of the receiver, which is taken"
+        return 0.0, [LogFinding("note", text, evidence={"days": ahead_s / _DAY_S})]
+    return 0.0, []
 
 
 def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:

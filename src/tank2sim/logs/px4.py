@@ -43,7 +43,8 @@ _AIRFRAME_ROVER_DIFFERENTIAL = 6
 
 
 def read_px4_ulog(path: Path) -> VesselLog:
-    """Read a ULog. Times are those of the board, set to UTC by the GPS with the least delay.
+    """Read a ULog. Times are those of the board, set to UTC by the GPS with the least delay; without a GPS that
+    has a UTC the log has no date.
 
     ``actuator_motors`` and ``actuator_servos`` are orders as shares of their range: the one servo is the rudder, one
     motor the propeller, two motors the right and the left one where CA_AIRFRAME says that the difference of two motors
@@ -52,7 +53,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
     Raises
     ------
     InputError
-        The file is not a ULog, or holds no UTC of a GPS.
+        The file is not a ULog, or no topic of it is understood.
     """
     library = optional_library("pyulog", path)
     try:
@@ -66,8 +67,10 @@ def read_px4_ulog(path: Path) -> VesselLog:
     receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
     gps = next((data for data in receivers if _utc_of(data).any()), None)
     if gps is None:
-        raise InputError(path, "", "holds no UTC of a GPS", "log sensor_gps")
-    boot, findings = _boot(gps)
+        text = "no GPS of it has a UTC: the trials have no date"
+        boot, findings = 0.0, [LogFinding("note", text)]
+    else:
+        boot, findings = _boot(gps)
     airframe = int(log.initial_parameters.get("CA_AIRFRAME", -1))
     streams = list(_streams(topics, boot, airframe))
     if not streams:
@@ -77,7 +80,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
         findings.append(LogFinding("fault", "parts of the file are corrupted and left out"))
     if lost := sum(dropout.duration for dropout in log.dropouts):
         findings.append(LogFinding("note", f"{len(log.dropouts)} dropouts of the logger, {lost / 1000:.3g} s in all"))
-    return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings))
+    return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings), gps is not None)
 
 
 def _utc_of(data: dict[str, Any]) -> Array:
