@@ -14,7 +14,7 @@ from tank2sim.records.signals.sampling import GAP_STEPS
 _DOUBLED = 0.2
 """Share of samples at the time of another from which two instruments are suspected. Project choice."""
 
-_DOUBLED_STEPS = 3.0
+DOUBLED_STEPS = 3.0
 """Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone
 differs by one to two."""
 
@@ -24,7 +24,7 @@ _ROLLOVER_S = 1024 * 604800.0
 _DAY_S = 86400.0
 """Difference of two clocks, s, from which one is wrong by more than a time zone."""
 
-_TWO_DIGITS_FROM = 80
+TWO_DIGITS_FROM = 80
 """Years of two digits from here on are of the 20th century: GPS time begins in 1980 (IS-GPS-200, 3.3.4)."""
 
 FALL_STEPS = 1.5
@@ -33,7 +33,7 @@ FALL_STEPS = 1.5
 
 def full_year(year: int) -> int:
     """The year of a year of two digits."""
-    return year + (1900 if year >= _TWO_DIGITS_FROM else 2000)
+    return year + (1900 if year >= TWO_DIGITS_FROM else 2000)
 
 
 def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
@@ -106,7 +106,7 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     if repeated > _DOUBLED * len(time):
         apart = np.abs(np.diff(values))[~new[1:]]
         steps = np.abs(np.diff(values[new]))
-        if np.median(apart) > _DOUBLED_STEPS * max(float(np.median(steps)), 1e-12):
+        if np.median(apart) > DOUBLED_STEPS * max(float(np.median(steps)), 1e-12):
             text = (
                 f"{stream.name}: two values at one time, {np.median(apart):.3g} apart (median): two instruments in one"
             )

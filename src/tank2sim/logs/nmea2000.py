@@ -74,7 +74,7 @@ _FIRST_EPOCH_S = 1e8
 _SAME = 0.5
 """Share of the lines of a log that decides how it is written. Project choice."""
 
-_VESSELS = (*range(127001, 129038), *range(129551, 129793), *range(129811, 130816))
+_VESSELS = frozenset((*range(127001, 129038), *range(129551, 129793), *range(129811, 130816)))
 """Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)."""
 
 _NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")

@@ -231,7 +231,8 @@ def _rate(series: Mapping[str, QuantitySeries]) -> QuantitySeries | None:
     heading = series.get("heading", series.get("magnetic_heading"))
     if heading is None:
         return None
-    return QuantitySeries(*differenced(heading.time_s, heading.values, 2.0))
+    time, rate = differenced(heading.time_s, heading.values, 2.0)
+    return QuantitySeries(time, rate) if len(time) else None
 
 
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:

@@ -14,6 +14,7 @@ from tank2sim.logs.channel_search import find_channels
 from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
+from tank2sim.logs.missing import without_missing
 from tank2sim.logs.parts import joined_parts
 from tank2sim.logs.pulses import pulses_of
 from tank2sim.logs.quantities import QUANTITIES
@@ -93,10 +94,13 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     for log in parts:
         repeated = 0
         for stream in log.streams:
-            tidy, doubled, found_in_time = tidied(stream)
+            known, missing = without_missing(stream)
+            tidy, doubled, found_in_time = tidied(known)
             repeated += doubled
-            findings += found_in_time
+            findings += [*missing, *found_in_time]
             tidy, _ = pulses_of(tidy)
+            if stream.quantity and len(stream.values) and not len(tidy.values):
+                findings.append(LogFinding("note", f"{stream.name}: holds no valid value", stream.name))
             if len(tidy.values):
                 name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
                 streams.append(replace(tidy, name=name))

@@ -1,0 +1,77 @@
+"""Numbers that stand for missing values: -999, 511 deg, position 0, 0."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.logs.content import FEW_SAMPLES
+from tank2sim.logs.streams import LogFinding, LogStream, wrapped_angle
+
+_MARK = re.compile(r"-?(9{2,}(\.9+)?|32767|32768|65535|2147483647|2147483648|1023|4095)")
+"""Numbers that recorders write for no value: nines, and the bounds of their integers."""
+
+_NOT_AVAILABLE = {"sog": (102.3,), "cog": (360.0,), "heading": (511.0,), "yaw_rate": (128.0, -128.0)}
+"""Numbers that AIS sends for no value (ITU-R M.1371-5, table 47)."""
+
+_BOUNDS = {"heading": 361.0, "magnetic_heading": 361.0, "cog": 361.0, "latitude": 90.0, "longitude": 360.0}
+"""Largest size of a quantity in deg."""
+
+_JUMP = 10.0
+"""Jump to a number of AIS, as a multiple of the 90th percentile of the steps of the others. Project choice."""
+
+
+def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
+    """The stream with nan for numbers that stand for none, and a note of them; streams defined by a format stay.
+
+    A number stands for none if it is beyond the bounds of its quantity, or if it is one that recorders write so and is
+    further from all others than these are from each other.
+    """
+    if stream.stated_by == "format":
+        return stream, []
+    values = np.array(stream.values, dtype=float)
+    bound = _BOUNDS.get(stream.quantity)
+    if bound is not None and stream.unit in ("", "deg") and np.isfinite(values).any():
+        inside = np.nanmedian(np.abs(values)) <= bound
+        values[inside & (np.abs(values) > bound)] = np.nan
+    while (mark := _lone_mark(values, stream.quantity in ("latitude", "longitude"))) is not None:
+        values[values == mark] = np.nan
+    for number in _NOT_AVAILABLE.get(stream.quantity, ()):
+        values[_jumps(values, number, circular=stream.quantity in ("cog", "heading"))] = np.nan
+    lost = np.isnan(values) & np.isfinite(stream.values)
+    if not lost.any():
+        return stream, []
+    shown = ", ".join(f"{number:g}" for number in np.unique(stream.values[lost])[:3])
+    text = f"{stream.name}: {lost.sum()} values of {shown} are taken for missing ones"
+    return replace(stream, values=values), [LogFinding("note", text, stream.name, {"values": float(lost.sum())})]
+
+
+def _lone_mark(values: Array, zero: bool) -> float | None:
+    """The least or largest value, if it is a mark that is far from all others; None if neither is."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return None
+    for extreme in (float(known.min()), float(known.max())):
+        others = known[known != extreme]
+        if not (_MARK.fullmatch(f"{extreme:.10g}") or (zero and extreme == 0)) or len(others) < FEW_SAMPLES:
+            continue
+        if min(abs(others.min() - extreme), abs(others.max() - extreme)) > np.ptp(others):
+            return extreme
+    return None
+
+
+def _jumps(values: Array, number: float, circular: bool) -> np.ndarray:
+    """Where a series (n,) has a number and jumps to it from the values around."""
+    at = values == number
+    others = np.isfinite(values) & ~at
+    if not at.any() or others.sum() < FEW_SAMPLES:
+        return np.zeros(len(values), dtype=bool)
+    place = np.arange(len(values))
+    series = np.unwrap(np.radians(values[others])) if circular else values[others]
+    difference = np.interp(place, place[others], series) - (np.radians(values) if circular else values)
+    difference = wrapped_angle(difference) if circular else difference
+    usual = float(np.percentile(np.abs(np.diff(series)), 90))
+    return np.asarray(at & (np.abs(difference) > _JUMP * max(usual, 1e-9)))
