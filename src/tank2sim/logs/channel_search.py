@@ -113,8 +113,8 @@ _LEAST_ZERO = 10.0
 """Rudder on straight legs, deg or %, from which a zero of the record is taken out. Project choice: wind and a single
 propeller ask for some degrees (SNAME, PNA vol. III, IX.17); servos rest at 90 deg, sensors amid their range."""
 
-_LEAST_HELM = 3.0
-"""Rudder on straight legs, deg, that is worth a word. Project choice."""
+_LEAST_HELM = 4.0
+"""Rudder on straight legs, deg, that is doubted. Project choice: from here on a held rudder is taken to turn."""
 
 LARGEST_RUDDER_RAD = math.radians(75.0)
 """Angle that no rudder goes beyond: Schilling rudders go to 70 or 75 deg."""
@@ -126,11 +126,11 @@ a ship too."""
 _STRAIGHT_S = 10.0
 """Time before and after for which a straight leg has been one, s. Project choice: rudders cross their zero faster."""
 
-_LEAST_ZERO_SHARE = 0.15
-"""The same as a share of the range of a rudder of unknown unit (project choice)."""
+_LEAST_ZERO_SHARE = 0.4
+"""The same of a rudder of unknown unit, as a share of its range (project choice): it hardly crosses its zero."""
 
-_LARGEST_SPAN_RAD = 2.0
-"""Range of a rudder up to which its unit may be rad: 57 deg to either side."""
+_SERVO_DEG = 90.0
+"""Servos rest at 90 deg of 180, or at 180 of 360."""
 
 _STRAIGHT_SHARE = 0.1
 """Rate of turn on straight legs, as a share of its 99th percentile (project choice)."""
@@ -634,15 +634,14 @@ class _Search:
             return 0.0
         zero = float(np.median(values[straight]))
         span = float(np.ptp(values[np.isfinite(values)]))
-        scale = math.degrees(1) if stream.unit == "rad" or (not stream.unit and span < _LARGEST_SPAN_RAD) else 1.0
+        size = abs(zero) * math.degrees(QUANTITIES["rudder_angle"].units.get(stream.unit or "deg", 1.0))
         words = f"{stream.name} is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
-        if abs(zero) * scale >= max(_LEAST_ZERO, _LEAST_ZERO_SHARE * span * scale):
+        if size >= _LEAST_ZERO if stream.unit else abs(zero) > _LEAST_ZERO_SHARE * span:
             text = f"{words}, which is taken as its zero (offset in channels.toml)"
             self.findings.append(LogFinding("note", text, stream.name, {"zero": zero}))
             return zero
-        if abs(zero) * scale > _LEAST_HELM:
-            text = f"{words}: helm against wind, or its zero"
-            self.findings.append(LogFinding("note", text, stream.name, {"zero": zero}))
+        if size > _LEAST_HELM:
+            self.fault(stream, f"at {zero:.3g} {stream.unit or 'deg'} on straight legs: helm against wind, or its zero")
         return 0.0
 
     def _rudder(self, stream: LogStream, evidence: ContentEvidence) -> None:
@@ -674,6 +673,8 @@ class _Search:
         )
         if unit in ("deg", "rad") and most > LARGEST_RUDDER_RAD:
             confidence, why = min(confidence, 0.6), f"{why}; it goes to {math.degrees(most):.3g} deg, as no rudder does"
+        if zero and not stream.unit and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
+            confidence, why = min(confidence, 0.6), f"{why}; its unit is known by its size alone"
         if zero:
             confidence, why = min(confidence, _BASE["name"]), f"{why}; {zero:.4g} on straight legs is taken as its zero"
         self.add(stream, confidence, why, unit=unit, sign=sign, offset=zero)

@@ -28,7 +28,7 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     """The stream with nan for numbers that stand for none, and a note of them; streams defined by a format stay.
 
     A number stands for none if it is beyond the bounds of its quantity, or if it is one that recorders write so and is
-    further from all others than these are from each other.
+    further from all others than these are from each other; headings, rates and speeds do not jump to it either.
     """
     if stream.stated_by == "format":
         return stream, []
@@ -39,8 +39,11 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
         values[inside & (np.abs(values) > bound)] = np.nan
     while (mark := _lone_mark(values, stream.quantity in ("latitude", "longitude"))) is not None:
         values[values == mark] = np.nan
-    for number in _NOT_AVAILABLE.get(stream.quantity, ()):
-        values[_jumps(values, number, circular=stream.quantity in ("cog", "heading"))] = np.nan
+    if stream.quantity in _NOT_AVAILABLE:
+        extremes = {float(known(values)) for known in (np.nanmin, np.nanmax) if np.isfinite(values).any()}
+        marks = [extreme for extreme in extremes if _MARK.fullmatch(f"{extreme:.10g}")]
+        for number in (*_NOT_AVAILABLE[stream.quantity], *marks):
+            values[_jumps(values, number, circular=stream.quantity in ("cog", "heading"))] = np.nan
     lost = np.isnan(values) & np.isfinite(stream.values)
     if not lost.any():
         return stream, []

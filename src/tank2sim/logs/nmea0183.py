@@ -13,7 +13,7 @@ import math
 import re
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import xor
@@ -270,7 +270,10 @@ class _Reader:
         self._tick(kind, talker, dt.date(int(cells[3]), int(cells[2]), int(cells[1])), cells[0])
 
     def _tick(self, kind: str, talker: str, date: dt.date, time: str) -> None:
-        seconds = 3600 * int(time[:2]) + 60 * int(time[2:4]) + float(time[4:])
+        hours, minutes, rest = int(time[:2]), int(time[2:4]), float(time[4:])
+        if not (0 <= hours < 24 and 0 <= minutes < 60 and 0 <= rest < 61):
+            raise ValueError(time)
+        seconds = 3600 * hours + 60 * minutes + rest
         self.clocks[kind].add(self.line, 86400.0 * (date - dt.date(1970, 1, 1)).days + seconds)
         self.clocks[kind].talkers.append(talker)
 
@@ -368,19 +371,19 @@ class _Reader:
     def _say_unread(self, counts: dict[str, int], findings: list[LogFinding]) -> None:
         """Say what is spoilt, holds no value, is not used, or is not known; each kind with its number."""
         read = {*_FIELDS, *self.special}
-        spoilt = {"corrupted (wrong checksum or cut)": self.counts["corrupted"]}
-        spoilt |= {f"{kind} with a cell that cannot be read": number for kind, number in self.malformed.items()}
-        for words, number in spoilt.items():
-            if number:
-                text = f"{number} of {self.counts['lines']} lines are {words} and left out"
-                findings.append(LogFinding("note", text, evidence={"share": number / self.counts["lines"]}))
+        if spoilt := self.counts["corrupted"]:
+            text = f"{spoilt} of {self.counts['lines']} lines are corrupted (wrong checksum or cut) and left out"
+            findings.append(LogFinding("note", text, evidence={"share": spoilt / self.counts["lines"]}))
+        if self.malformed:
+            listed = _listed(self.malformed)
+            findings.append(LogFinding("note", f"sentences with a cell that cannot be read are left out: {listed}"))
         for kind, number in self.wrong.items():
             total = number + self.kinds[kind]
             if number >= _FEW and number > _MOST * total:
                 text = f"{number} of {total} {kind} have a wrong checksum and are left out"
                 findings.append(LogFinding("fault" if kind in read else "note", text, kind))
         for kind, number in self.void.items():
-            if kind in read and number > _MOST * self.kinds[kind]:
+            if kind in read and number >= _FEW and number > _MOST * self.kinds[kind]:
                 text = f"{number} of {self.kinds[kind]} {kind} hold no valid value (status V, mode N, or empty)"
                 findings.append(LogFinding("note", text, kind))
         for key, words, which in (
@@ -394,8 +397,7 @@ class _Reader:
             kinds = {kind: self.kinds[kind] for kind in sorted(which) if self.kinds[kind]}
             if kinds:
                 counts[key] = sum(kinds.values())
-                listed = ", ".join(f"{number} {kind}" for kind, number in kinds.items())
-                findings.append(LogFinding("note", f"{words}: {listed}", evidence=kinds))
+                findings.append(LogFinding("note", f"{words}: {_listed(kinds)}", evidence=kinds))
 
     def _clock(self, findings: list[LogFinding]) -> tuple[np.ndarray, Array, str, dict[int, float]]:
         """Sentences and times of the best clock, its name, and the times of all its sentences."""
@@ -502,6 +504,10 @@ class _Reader:
         lines = [np.unique(np.concatenate([part.lines for part in self.series[kind, t].values()])) for t in talkers]
         labels = np.concatenate([np.full(len(part), talker) for part, talker in zip(lines, talkers, strict=True)])
         return _overlapping(np.concatenate(lines), labels)
+
+
+def _listed(kinds: Mapping[str, int]) -> str:
+    return ", ".join(f"{number} {kind}" for kind, number in kinds.items())
 
 
 def _kind(label: bytes) -> str:

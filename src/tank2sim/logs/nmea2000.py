@@ -51,11 +51,11 @@ _CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
 _TIMED = re.compile(r"^\(\d+\.\d+\)|^\d{4}-\d\d-\d\d|^\d\d:\d\d:\d\d\.|^A\d{6}\.")
 _FRAME = re.compile(
     r"^\s*\(?(?P<stamp>\d{4}-\d\d-\d\d[T ]\d\d:[\d:.]+Z?|\d+(?:\.\d+)?)\)?[\s,;]+"
-    r"(?P<bus>\S+?)[\s,;]+(?:[RT]X\s+\S\s+\S\s+)?(?P<id>[0-9A-Fa-f]{8})(?:\s*\[\d\]\s*|\#|[\s,;]+)"
+    r"(?P<bus>\S+?)[\s,;]+(?:[RT]X\s+\S\s+\S\s+)?(?P<id>[0-9A-Fa-f]{8})x?(?:\s*\[\d\]\s*|\#|\s+[RT]x\s+d\s+\d\s+|[\s,;]+)"
     r"(?P<data>(?:[0-9A-Fa-f]{2} ?){1,8})\s*(?:[RT]|'.*')?\s*$"
 )
 """A frame with a time stamp, a bus, the identifier of 29 bits and the data: candump in any form (-L, -t, -x, -a; of
-can-utils), and tables of frames."""
+can-utils), Vector's ASC, and tables of frames."""
 
 _SIGNAL_K = re.compile(r"^\d{13};[^;]*;")
 """What Signal K puts before a line that it records."""

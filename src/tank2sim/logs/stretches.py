@@ -163,6 +163,8 @@ def _signals(voyage: Voyage) -> _Signals | None:
     entry, threshold = steering
     step = float(np.clip(usual_step(entry.time_s), 0.2, 1.0))
     time = np.arange(entry.time_s[0], entry.time_s[-1], step)
+    if len(time) < LEAST_TRIAL_ROWS:  # many samples of a few instants
+        return None
     steer = median_filter(_on_grid(time, entry), size=3, mode="nearest")
     propulsion, full = _propulsion(series, time)
     heading = series.get("heading", series.get("magnetic_heading"))

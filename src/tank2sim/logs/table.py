@@ -58,6 +58,9 @@ _COUNTS = (
 )
 """Words for the unit in which a column counts time, and its seconds."""
 
+_BEGINNING = 10
+"""Percentile of times that are since 1970 already; counts since a start are less. Project choice: some cells are 0."""
+
 _DOUBTFUL_STEP, _SLOWEST_STEP_S = 5.0, 100.0
 """Step of a count without a unit from which its unit is looked for, and from which it is not s. Project choice: logs
 have a row a second or more; a row in 100 s shows no manoeuvre."""
@@ -244,7 +247,9 @@ def _time(
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
             values = column.to_numpy(dtype=float)
-            if dates and name not in dates and (clock := _clock_of_numbers(values)) is not None:
+            if name not in dates and (clock := _clock_of_numbers(values)) is not None:
+                if not dates:
+                    continue
                 day = _days(path, dates[0], frame[dates[0]], _zone_s(name, findings))
                 return day + clock, True, {name, dates[0]}
             seconds = _epoch_seconds(name, values, findings)
@@ -302,9 +307,11 @@ def _undated_time(
 
 def _epoch_seconds(name: str, values: Array, findings: list[LogFinding]) -> Array | None:
     """Seconds (rows,) since 1970 of numbers that count s, ms, us or ns since then, or days; None if they do not."""
-    size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
+    known = values[np.isfinite(values)]
+    size = float(np.median(np.abs(known))) if len(known) else 0.0
     for least, largest, factor in _EPOCHS:
-        if least <= size <= largest:
+        counts = least <= size <= largest and np.percentile(known, _BEGINNING) >= least
+        if counts and (len(known) < 2 or np.median(np.diff(known)) * factor < _SLOWEST_STEP_S):
             return values * factor
     moments = _moments_of_numbers(values)
     if moments is not None:

@@ -26,6 +26,9 @@ from tank2sim.records.signals.sampling import GAP_STEPS
 _GAP_LEAST_S = 3.0
 """Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds."""
 
+LONGEST_VOYAGE_S = 1e8
+"""Longest time that a log may span, s. Project choice: three years; more is a clock that was not set."""
+
 _GAPS_LISTED = 5
 """Gaps of a channel that are listed one by one. Project choice: more are a rate of loss."""
 
@@ -134,6 +137,9 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     findings += _gap_findings(series)
     begin = min(float(entry.time_s[0]) for entry in series.values())
     end = max(float(entry.time_s[-1]) for entry in series.values())
+    if end - begin > LONGEST_VOYAGE_S:
+        problem = f"its times span {end - begin:.3g} s: they are in another unit, or some are wrong"
+        raise InputError(logs[0].path, "", problem, "name the unit in the column of time, or remove the wrong rows")
     return Voyage(tuple(logs), found, series, origin, begin, end, tuple(findings), counts)
 
 
