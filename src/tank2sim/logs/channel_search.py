@@ -840,7 +840,8 @@ class _Search:
             self.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
 
     def lost_signs(self) -> None:
-        """Report revolutions that stay ahead while the vessel goes astern: many engines count without a sign."""
+        """Report revolutions that stay ahead while the vessel goes astern, for many engines count without a sign, and
+        refuse revolutions astern while it goes ahead."""
         heading = self._best("heading")
         if heading is None or heading.confidence < SURE_FROM:
             return
@@ -848,9 +849,14 @@ class _Search:
         angle = self._heading_at(at)
         ahead = motion.v_north_mps * np.cos(angle) + motion.v_east_mps * np.sin(angle)
         fast = _ASTERN_SHARE * float(np.percentile(motion.speed_mps, 95)) if len(at) else 0.0
-        for stream in self.named("rpm", "rpm_port", "rpm_starboard"):
+        for stream in self.named("rpm", "rpm_port", "rpm_starboard", "rpm_order"):
             values = interpolated(at, stream.time_s, stream.values, 10.0)
             turning = values > _ASTERN_SHARE * float(np.percentile(stream.values, 95))
+            shown = values[(ahead > max(fast, LEAST_SPEED_MPS)) & np.isfinite(values)]
+            if len(shown) > FEW_SAMPLES and (shown < 0).mean() > AGREES:
+                self.fault(stream, "is negative while the vessel goes ahead: its sign is the other one")
+                self._doubt([stream.name], "the motion contradicts its sign")
+                continue
             astern = (ahead < -max(fast, LEAST_SPEED_MPS)) & turning & (stream.values.min() >= 0)
             if astern.sum() * usual_step(at) > _ASTERN_S:
                 text = (

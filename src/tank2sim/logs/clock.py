@@ -106,11 +106,16 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     if repeated > _DOUBLED * len(time):
         apart = np.abs(np.diff(values))[~new[1:]]
         steps = np.abs(np.diff(values[new]))
-        if np.median(apart) > DOUBLED_STEPS * max(float(np.median(steps)), 1e-12):
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        if np.median(apart) > DOUBLED_STEPS * max(usual, 1e-12):
             text = (
                 f"{stream.name}: two values at one time, {np.median(apart):.3g} apart (median): two instruments in one"
             )
             findings.append(LogFinding("fault", text, stream.name))
+        elif apart.any():
+            share = 100 * repeated / len(time)
+            text = f"{stream.name}: {share:.0f} % of its samples have the time of another, and are left out"
+            findings.append(LogFinding("note", text, stream.name))
     tidy = LogStream(stream.name, time[new], values[new], stream.unit, stream.quantity, stream.stated_by)
     return tidy, repeated, findings
 

@@ -41,6 +41,10 @@ STOPPED_SHARE = 0.05
 RESTING_MPS = 0.25
 """Speed below which a vessel rests, m/s: drifting with wind and current."""
 
+UNDER_WAY_MPS = 1.0
+"""Steady speed from which a vessel does not rest though its propulsion is stopped, m/s. Project choice: twice what
+currents usually are; sails or an engine that is not in the log drive it."""
+
 SPEED_CHANGE = 0.15
 """Relative change of speed in a piece without steering from which it is an acceleration. Project choice."""
 
@@ -297,7 +301,9 @@ def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
         if turning:
             kind = StretchKind.PIVOT if signals.threshold != HELD_RUDDER_RAD else StretchKind.TURN
         else:
-            kind = StretchKind.COAST if moved and change > SPEED_CHANGE else StretchKind.REST
+            sailing = len(known) > 0 and float(np.median(known)) > UNDER_WAY_MPS
+            slow = StretchKind.STEADY if sailing else StretchKind.REST
+            kind = StretchKind.COAST if moved and change > SPEED_CHANGE else slow
     elif turning:
         kind = StretchKind.TURN
     elif moved and change > SPEED_CHANGE:

@@ -55,6 +55,7 @@ _COUNTS = (
     (r"ns|nano\w*", 1e-9),
     (r"min|mins|minutes?", 60.0),
     (r"h|hr|hrs|hours?", 3600.0),
+    (r"s|sec|secs|seconds?", 1.0),
 )
 """Words for the unit in which a column counts time, and its seconds."""
 
@@ -247,7 +248,8 @@ def _time(
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
             values = column.to_numpy(dtype=float)
-            if name not in dates and (clock := _clock_of_numbers(values)) is not None:
+            counted = _stated_count(name, layout) is not None
+            if not counted and name not in dates and (clock := _clock_of_numbers(values)) is not None:
                 if not dates:
                     continue
                 day = _days(path, dates[0], frame[dates[0]], _zone_s(name, findings))
@@ -284,7 +286,7 @@ def _undated_time(
     for name in [*named, *clocks, *frame.columns[:1]]:
         column = _as_numbers(frame[name])
         of_day = _clock(column) if re.match(r"\d{1,2}:\d\d", _first_cell(column)) else None
-        if pd.api.types.is_numeric_dtype(column):
+        if pd.api.types.is_numeric_dtype(column) and _stated_count(name, layout) is None:
             of_day = _clock_of_numbers(column.to_numpy(dtype=float))
         if of_day is not None:
             text = f"{name} has times of day without a date: the trials have no date"
@@ -298,8 +300,8 @@ def _undated_time(
             if len(steps) and (steps >= 0).mean() > 0.9:
                 text = f"{name} counts from the beginning of the log: the trials have no date"
                 findings.append(LogFinding("note", text, name))
-                unit = layout.units[layout.names.index(name)]
-                return values * _relative_scale(f"{name} {unit}", values, frame, findings), False, {name}
+                scale = _stated_count(name, layout) or _count_by_motion(name, values, frame, findings)
+                return values * scale, False, {name}
     problem = "it is no log of a known format, and as a table there is no column of time"
     remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
     raise InputError(path, "header", problem, remedy)
@@ -340,28 +342,28 @@ def _first_cell(column: pd.Series[Any]) -> str:
     return next((str(value) for value in column.dropna()[:1]), "")
 
 
-def _relative_scale(name: str, values: Array, frame: pd.DataFrame, findings: list[LogFinding]) -> float:
-    """Seconds of the unit in which a column counts: by its name, or else by the speed of the track, or the step."""
-    words = _plain(name)
-    for pattern, factor in _COUNTS:
-        if re.search(rf"\b({pattern})\b", words):
-            return factor
+def _stated_count(name: str, layout: TextLayout) -> float | None:
+    """Seconds of the unit in which a column counts by its name or its unit; None where neither says."""
+    words = _plain(f"{name} {layout.units[layout.names.index(name)]}")
+    return next((factor for pattern, factor in _COUNTS if re.search(rf"\b({pattern})\b", words)), None)
+
+
+def _count_by_motion(name: str, values: Array, frame: pd.DataFrame, findings: list[LogFinding]) -> float:
+    """Seconds of the unit in which a column counts, by the speed of the track, or else by the step."""
     step = float(np.median(np.diff(values[np.isfinite(values)])))
-    if step < _DOUBTFUL_STEP or re.search(r"\b(s|sec|secs|seconds?)\b", words):
+    if step < _DOUBTFUL_STEP:
         return 1.0
     speed = _track_speed(values, frame)
     if speed is None:
         if step < _SLOWEST_STEP_S:
             return 1.0
-        text = f"{name.strip()} states no unit, and a row in {step:.4g} s shows no manoeuvre: it is taken to count ms"
-        findings.append(LogFinding("fault", text, name.strip()))
+        text = f"{name} states no unit, and a row in {step:.4g} s shows no manoeuvre: it is taken to count ms"
+        findings.append(LogFinding("fault", text, name))
         return 1e-3
     factor = next((factor for factor in (1.0, 1e-3, 1e-6, 1e-9) if speed > _SLOWEST_MPS * factor), 1.0)
     if factor < 1:
-        text = (
-            f"{name.strip()} states no unit; in s the vessel would make {speed:.2g} m/s, so it counts in {factor:g} s"
-        )
-        findings.append(LogFinding("note", text, name.strip(), {"unit_s": factor}))
+        text = f"{name} states no unit; in s the vessel would make {speed:.2g} m/s, so it counts in {factor:g} s"
+        findings.append(LogFinding("note", text, name, {"unit_s": factor}))
     return factor
 
 
