@@ -172,7 +172,7 @@ class TestFrames:
             can_frame(t, 128267, b"\xff" + (1234).to_bytes(4, "little") + b"\xff\x7f\xff") for t in voyage().time[:40]
         ]
         found = read([*(FORMS["candump -L"](*part) for part in frames()), *depth])
-        assert "40 of PGN 128267" in texts(found)
+        assert "40 PGN 128267" in texts(found)
         assert stream_of(found, "128267.depth").values == pytest.approx(12.34)
 
     def test_a_receiver_that_is_1024_weeks_late_has_the_date_of_the_recorder(self, read) -> None:
@@ -240,6 +240,12 @@ class TestBoards:
     def test_a_log_whose_receiver_has_no_time_has_no_date(self, tmp_path) -> None:
         found = read_log(dataflash(tmp_path / "none.log", statuses=(1,)))
         assert not found.dated and stream_of(found, "ATT.Yaw").time_s == pytest.approx(voyage().time + 20)
+
+    def test_messages_that_are_not_used_are_named(self, tmp_path) -> None:
+        path = dataflash(tmp_path / "more.log")
+        more = "FMT, 140, 20, STER, Qff, TimeUS,SteerIn,SteerOut\n" + "STER, 1000, 0.5, 0.25\n" * 3
+        path.write_text(path.read_text("ascii") + more, encoding="ascii")
+        assert "3 STER" in texts(read_log(path), "note")
 
     def test_a_week_before_the_first_board_is_named(self, tmp_path) -> None:
         path = dataflash(tmp_path / "old.log")

@@ -15,7 +15,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.logs.lines import text_lines
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
 from tank2sim.records.spelt_units import unit_of_text
 
 GPS_EPOCH_S = 315964800.0
@@ -56,6 +56,9 @@ _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
 _FIELDS["GPS2"] = _FIELDS["GPS"]
 """Fields of dataflash messages: ardupilot.org, "Onboard message log messages" of Rover."""
 
+_FORMAL = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG")
+"""Messages about the log itself."""
+
 _INSTANCES = ("I", "C", "Inst", "Instance")
 _COMMONEST = 3
 """Status of a GPS fix in three dimensions (GPS_STATUS of ArduPilot); less is not a fix, except 2, a fix in two."""
@@ -78,12 +81,12 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
         with path.open("rb") as file:
             binary = file.read(2) == _MAGIC
         if binary:
-            tables, units, params = _dataflash_tables(library.DFReader_binary(str(path)))
+            tables, units, params, unread = _dataflash_tables(library.DFReader_binary(str(path)))
         else:
             with tempfile.TemporaryDirectory() as folder:
                 copy = Path(folder) / "log.log"  # the library reads one byte a letter
                 copy.write_bytes(b"".join(text_lines(path)))
-                tables, units, params = _dataflash_tables(library.DFReader_text(str(copy)))
+                tables, units, params, unread = _dataflash_tables(library.DFReader_text(str(copy)))
     except Exception as error:  # the library lets errors of struct through
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
         raise InputError(path, "", problem, "give a whole dataflash log") from None
@@ -98,6 +101,7 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     else:
         boot = _boot(gps, findings)
     leaps = any(finding.kind == "fault" for finding in findings)
+    findings += not_used("messages", unread)
     streams = []
     for (kind, instance), table in tables.items():
         time = table["TimeUS"] * 1e-6 - boot
@@ -166,8 +170,10 @@ def _shaft(field: str, instance: Any, table: Mapping[str, Array], instances: int
 _Tables = dict[tuple[str, Any], dict[str, Array]]
 
 
-def _dataflash_tables(reader: Any) -> tuple[_Tables, dict[tuple[str, str], str], Mapping[str, float]]:
-    """Columns by message and instance, and units by message and field."""
+def _dataflash_tables(
+    reader: Any,
+) -> tuple[_Tables, dict[tuple[str, str], str], Mapping[str, float], dict[str, int]]:
+    """Columns by message and instance, units by message and field, parameters, and the number of all other messages."""
     wanted = {*_FIELDS, "RCOU"}
     rows: dict[tuple[str, Any], dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
     units: dict[tuple[str, str], str] = {}
@@ -184,7 +190,10 @@ def _dataflash_tables(reader: Any) -> tuple[_Tables, dict[tuple[str, str], str],
         for name in names:
             group[name].append(float(getattr(message, name)))
     tables = {key: {name: np.array(values) for name, values in group.items()} for key, group in rows.items()}
-    return tables, units, reader.params
+    counts = reader.counts if isinstance(reader.counts, dict) else dict(enumerate(reader.counts))
+    numbers = {form.name: counts.get(key, 0) for key, form in reader.formats.items()}
+    others = {kind: number for kind, number in numbers.items() if number and kind not in {*wanted, *_FORMAL}}
+    return tables, units, reader.params, others
 
 
 def _servo_orders(time: Array, table: Mapping[str, Array], params: Mapping[str, float]) -> list[LogStream]:
@@ -262,11 +271,15 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
     mavutil = optional_library("pymavlink.mavutil", path)
     rows: dict[_Sender, dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
     every: dict[int, dict[str, float]] = defaultdict(dict)
+    unread: Counter[str] = Counter()
     try:
         link = mavutil.mavlogfile(str(path), robust_parsing=True)
-        wanted = [*_TELEMETRY, "SERVO_OUTPUT_RAW", "PARAM_VALUE", "SYSTEM_TIME"]
-        while (message := link.recv_match(type=wanted)) is not None:
+        wanted = {*_TELEMETRY, "SERVO_OUTPUT_RAW", "PARAM_VALUE", "SYSTEM_TIME"}
+        while (message := link.recv_match()) is not None:
             kind, system = message.get_type(), message.get_srcSystem()
+            if kind not in wanted:
+                unread[kind] += 1
+                continue
             if kind == "PARAM_VALUE":
                 every[system][message.param_id] = message.param_value
                 continue
@@ -280,7 +293,7 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
     except Exception as error:
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
         raise InputError(path, "", problem, "give a whole telemetry log") from None
-    findings: list[LogFinding] = []
+    findings = not_used("messages", unread)
     system, chosen = _one_vehicle(rows, findings)
     tables = {kind: {name: np.array(values) for name, values in group.items()} for kind, group in chosen.items()}
     streams = []

@@ -26,7 +26,7 @@ from tank2sim.errors import InputError
 from tank2sim.logs.clock import continued_clock, full_year, rollover_s
 from tank2sim.logs.lines import mostly, text_lines
 from tank2sim.logs.quantities import QUANTITIES, quantity_of_name
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
 from tank2sim.units import KNOT_MPS
 
 _SENTENCE = re.compile(rb"(?P<body>[$!][^*$!\r\n]*)(?:\*(?P<sum>[0-9A-Fa-f]{2}))?")
@@ -387,17 +387,16 @@ class _Reader:
                 text = f"{number} of {self.kinds[kind]} {kind} hold no valid value (status V, mode N, or empty)"
                 findings.append(LogFinding("note", text, kind))
         for key, words, which in (
-            ("unused", "sentences that are not used", self.known - read),
+            ("unused", "sentences", self.known - read),
             (
                 "unknown",
-                "sentences that are not known, whose numbers channels.toml may name",
+                "sentences (unknown; channels.toml may name their numbers)",
                 self.kinds.keys() - self.known - read,
             ),
         ):
-            kinds = {kind: self.kinds[kind] for kind in sorted(which) if self.kinds[kind]}
-            if kinds:
-                counts[key] = sum(kinds.values())
-                findings.append(LogFinding("note", f"{words}: {_listed(kinds)}", evidence=kinds))
+            kinds = {kind: self.kinds[kind] for kind in which if self.kinds[kind]}
+            findings += not_used(words, kinds)
+            counts |= {key: sum(kinds.values())} if kinds else {}
 
     def _clock(self, findings: list[LogFinding]) -> tuple[np.ndarray, Array, str, dict[int, float]]:
         """Sentences and times of the best clock, its name, and the times of all its sentences."""

@@ -18,7 +18,7 @@ from tank2sim.errors import InputError
 from tank2sim.logs.clock import continued_clock, rollover_s
 from tank2sim.logs.lines import mostly, text_lines
 from tank2sim.logs.nmea0183 import steady_times
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
 
 _FIELDS: dict[int, dict[str, tuple[str, str]]] = {
     127250: {"heading": ("rad", "heading")},
@@ -179,13 +179,13 @@ class _Reader:
                 where = _quantity(pgn, quantity, values)
                 _append(self.columns[pgn, source, name, where, instance], stamp, float(value), number)
                 if where == "magnetic_heading":
-                    turned = [values.get(name, 0.0) for name in ("deviation", "variation")]
-                    turned = [part if isinstance(part, float) else 0.0 for part in turned]
-                    turned[1] = turned[1] or self.variation
-                    if math.isfinite(turned[1]):
+                    stated = [values.get(key) for key in ("deviation", "variation")]
+                    deviation, variation = (part if isinstance(part, float) else 0.0 for part in stated)
+                    true = value + deviation + (variation or self.variation)
+                    if math.isfinite(true):
                         self.units[pgn, "true heading"] = "rad"
                         column = self.columns[pgn, source, "true heading", "heading", ""]
-                        _append(column, stamp, (value + sum(turned)) % (2 * math.pi), number)
+                        _append(column, stamp, true % (2 * math.pi), number)
 
     def _sum(self, stamp: float, number: int) -> None:
         """Count where time stamps fall, and add them up, for they may be differences (candump -t d)."""
@@ -239,11 +239,9 @@ class _Reader:
         counts = {"lines": self.counts["lines"]} | ({"corrupted": spoilt} if spoilt else {})
         if self.unused.total():
             counts["unused"] = self.unused.total()
-            known = sorted(pgn for pgn in self.unused if pgn in _VESSELS)
-            others = self.unused.total() - sum(self.unused[pgn] for pgn in known)
-            listed = [f"{self.unused[pgn]} of PGN {pgn}" for pgn in known]
-            listed += [f"{others} of the protocol, of makers, satellites and other ships"] if others else []
-            findings.append(LogFinding("note", f"messages that are not used: {', '.join(listed)}"))
+            kinds = {f"PGN {pgn}": number for pgn, number in self.unused.items() if pgn in _VESSELS}
+            others = self.unused.total() - sum(kinds.values())
+            findings += not_used("messages", kinds | ({"of makers, satellites, other ships": others} if others else {}))
         return VesselLog(
             self.path, "NMEA 2000", tuple(streams), counts, tuple(findings), dated or len(ticks.values) > 0
         )

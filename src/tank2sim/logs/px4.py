@@ -10,7 +10,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, optional_library
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, not_used, optional_library
 
 _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
     "sensor_gps": {
@@ -75,6 +75,10 @@ def read_px4_ulog(path: Path) -> VesselLog:
     streams = list(_streams(topics, boot, airframe))
     if not streams:
         raise InputError(path, "", "no topic of it is understood", "log sensor_gps, vehicle_attitude, actuator_*")
+    read = {stream.name.split(".")[0].split("[")[0] for stream in streams}
+    findings += not_used(
+        "topics", {topic.name: len(topic.data["timestamp"]) for topic in log.data_list if topic.name not in read}
+    )
     counts = {"messages": sum(len(data["timestamp"]) for data in topics.values()), "dropouts": len(log.dropouts)}
     if log.file_corruption:
         findings.append(LogFinding("fault", "parts of the file are corrupted and left out"))
