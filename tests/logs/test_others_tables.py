@@ -204,6 +204,7 @@ def rudder(degrees: bool = True) -> np.ndarray:
         ("rudder_angle_deg", lambda: 90 - rudder(), 90.0),
         ("rudder_rad", lambda: 1.57 + rudder(degrees=False), 1.57),
         ("rudder_deg", lambda: -20 + rudder(), -20.0),
+        ("rudder_percent", lambda: 50 + rudder() / 35 * 50, 50.0),
     ],
 )
 def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(tmp_path, name, values, zero) -> None:

@@ -720,7 +720,8 @@ class _Search:
                 continue
             share = QUANTITIES["rudder_order"].units[channel.unit]
             angle = next((c for c in self.found if c.quantity == "rudder_angle" and c.unit in ("deg", "rad")), None)
-            scale, confidence, why = FULL_RUDDER_DEG * share, min(channel.confidence, 0.75), channel.why
+            full = FULL_RUDDER_DEG / max(1 - abs(share * channel.offset), 0.5)  # 50 of 0 to 100 % leaves 50 to a side
+            scale, confidence, why = full * share, min(channel.confidence, 0.75), channel.why
             if angle is not None and angle.confidence >= USED_FROM:
                 ratio = self._ratio(angle, channel)
                 if ratio is not None:
