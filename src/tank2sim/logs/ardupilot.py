@@ -14,6 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.logs.clock import board_start
 from tank2sim.logs.lines import text_lines
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
 from tank2sim.records.spelt_units import unit_of_text
@@ -140,12 +141,7 @@ def _boot(gps: Mapping[str, Array], findings: list[LogFinding]) -> float:
             f"the GPS week {weeks:.0f} is before the first boards: the receiver's date is 1024 weeks too early if its "
         )
         findings.append(LogFinding("note", f"{text}week number has rolled over", "GPS", {"week": weeks}))
-    if (spread := float(np.ptp(lag))) > 1.0:
-        text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
-        findings.append(LogFinding("fault", text, "GPS"))
-        return float(np.median(lag))
-    # The message is written after the fix was measured: the least difference has the least delay.
-    return float(np.min(lag))
+    return board_start(lag, "GPS", findings)
 
 
 def _has_fix(table: Mapping[str, Array]) -> Array:

@@ -53,6 +53,16 @@ def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
     return 0.0, []
 
 
+def board_start(lag_s: Array, receiver: str, findings: list[LogFinding]) -> float:
+    """Time of a board at UTC 0, s, by its clock less UTC at each fix (n,); leaps of the receiver are a fault."""
+    if (spread := float(np.ptp(lag_s))) > 1.0:
+        text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
+        findings.append(LogFinding("fault", text, receiver))
+        return float(np.median(lag_s))
+    # The message is written after the fix was measured: the least difference has the least delay.
+    return float(lag_s.min())
+
+
 def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     """Times (n,) of a clock in the order of recording, continued over places where it was set back.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.logs.clock import board_start
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, not_used, optional_library
 
 _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
@@ -66,11 +67,14 @@ def read_px4_ulog(path: Path) -> VesselLog:
         topics = {(name, instance): data for (name, instance), data in topics.items() if name != "sensor_gps"}
     receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
     gps = next((data for data in receivers if _utc_of(data).any()), None)
+    boot, findings = 0.0, list[LogFinding]()
     if gps is None:
-        text = "no GPS of it has a UTC: the trials have no date"
-        boot, findings = 0.0, [LogFinding("note", text)]
+        findings.append(LogFinding("note", "no GPS of it has a UTC: the trials have no date"))
     else:
-        boot, findings = _boot(gps)
+        known = gps["time_utc_usec"] > 0
+        boot = board_start(
+            (gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6), "sensor_gps", findings
+        )
     airframe = int(log.initial_parameters.get("CA_AIRFRAME", -1))
     streams = list(_streams(topics, boot, airframe))
     if not streams:
@@ -90,16 +94,6 @@ def read_px4_ulog(path: Path) -> VesselLog:
 def _utc_of(data: dict[str, Any]) -> Array:
     """UTC of the fixes of a receiver (n,), us since 1970; 0 where it is not known."""
     return np.asarray(data.get("time_utc_usec", np.zeros(len(data["timestamp"]))))
-
-
-def _boot(gps: dict[str, Any]) -> tuple[float, list[LogFinding]]:
-    """Time of the board at UTC 0, s, and what is wrong with the receiver's clock."""
-    known = gps["time_utc_usec"] > 0
-    lag = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6
-    if np.ptp(lag) > 1.0:
-        text = f"the receiver's clock leaps by {np.ptp(lag):.3g} s against that of the board, which is taken"
-        return float(np.median(lag)), [LogFinding("fault", text, "sensor_gps")]
-    return float(lag.min()), []
 
 
 def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airframe: int) -> Iterator[LogStream]:
