@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tests.corpus.mutations import Files
 from tests.identification.captive.generator import Campaign, write
@@ -104,8 +105,38 @@ def plain() -> Files:
         "voyage.csv": frame().iloc[::4].to_csv(index=False).encode(),
         "voyage.nmea": "\n".join(nmea_lines()[:2400]).encode() + b"\n",
         "voyage.log": "\n".join(list(candump_lines())[:3000]).encode() + b"\n",
+        "digits.csv": _digits(),
+        "brackets.log": b"# frames\n" + b"".join(_brackets(line) for line in list(candump_lines())[:3000]),
+        "mixed.nmea": _mixed(nmea_lines()[:2400]),
         "noise.csv": _csv([], "t_s,delta_deg,r_degps", [(i * 0.5, 0.0, float(r)) for i, r in enumerate(oscillating)]),
     }  # fmt: skip
+
+
+def _digits() -> bytes:
+    """The voyage with its clock in digits, and -999 for some headings."""
+    table = frame().iloc[::4]
+    moments = pd.to_datetime(table["utc"])
+    table.insert(0, "date", moments.dt.strftime("%d%m%y"))
+    table["utc"] = moments.dt.strftime("%H%M%S")
+    table.loc[::40, "heading_deg"] = -999
+    return table.to_csv(index=False).encode()
+
+
+def _brackets(line: str) -> bytes:
+    """A line of candump -L as candump -t a writes it."""
+    stamp, bus, frame_text = line.split()
+    name, data = frame_text.split("#")
+    return f" {stamp}  {bus}  {name}   [8]  {' '.join(data[k : k + 2] for k in range(0, 16, 2))}\n".encode()
+
+
+def _mixed(lines: list[str]) -> bytes:
+    """Sentences two in a line, rudders as transducers, some without a checksum, and unknown ones."""
+    text = [line.partition("*")[0] if "ROT" in line else line for line in lines]
+    text = [
+        line.replace("$AGRSA,", "$IIXDR,A,").partition(",A,,")[0] + ",D,RUDDER" if "RSA" in line else line
+        for line in text
+    ]
+    return "".join(a + b + "\n" for a, b in zip(text[::2], text[1::2], strict=True)).encode() + b"$PABC,1.5,A\n" * 40
 
 
 AVERAGES = b"""[model]

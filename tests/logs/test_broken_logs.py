@@ -206,7 +206,7 @@ def test_repeated_rows_are_counted_and_left_out(written) -> None:
         ("noise.bin", bytes(range(256)) * 20, "of no known format"),
         ("cut.bag", b"#ROSBAG V2.0\nnothing", "cut off"),
         ("cut.mcap", b"\x89MCAP0\r\nnothing at all", "cut off"),
-        ("cut.ulg", b"ULog\x01\x12\x35\x01" + bytes(8), "holds no UTC"),
+        ("cut.ulg", b"ULog\x01\x12\x35\x01" + bytes(8), "no topic of it is understood"),
         ("rows.csv", b"1,2,3\n4,5,6\n7,8,9\n", "no channel of it is understood"),
     ],
 )

@@ -32,10 +32,6 @@ class TestDataflash:
         utc = 315964800 + 2300 * 604800 + 100000 - 18
         assert named["ATT.Yaw"].time_s[0] == pytest.approx(utc, abs=1e-3)
 
-    def test_a_log_without_a_fix_is_refused(self, tmp_path) -> None:
-        with pytest.raises(InputError, match="no fix"):
-            read_log(dataflash(tmp_path / "none.log", statuses=(1,)))
-
     @pytest.mark.slow
     def test_two_speed_controllers_are_a_guess_and_one_is_the_shaft(self, tmp_path) -> None:
         for escs, expected in ((1, [("rpm", "format")]), (2, [("rpm_port", ""), ("rpm_starboard", "")])):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from array import array
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, optional_library
+from tank2sim.logs.clock import board_start
+from tank2sim.logs.lines import text_lines
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
 from tank2sim.records.spelt_units import unit_of_text
 
 GPS_EPOCH_S = 315964800.0
@@ -23,6 +26,10 @@ LEAP_SECONDS = 18.0
 """GPS time is this many seconds ahead of UTC since 2017-01-01 (IERS Bulletin C 52; none was added up to 2025)."""
 
 _WEEK_S = 604800.0
+_FIRST_BOARD_WEEK = 1500
+"""GPS week of October 2008: ArduPilot's first boards are of 2009 (ardupilot.org, "History of ArduPilot")."""
+
+_MAGIC = b"\xa3\x95"
 
 _SERVO_FUNCTIONS = {
     26: "rudder_order",
@@ -50,6 +57,9 @@ _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
 _FIELDS["GPS2"] = _FIELDS["GPS"]
 """Fields of dataflash messages: ardupilot.org, "Onboard message log messages" of Rover."""
 
+_FORMAL = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG")
+"""Messages about the log itself."""
+
 _INSTANCES = ("I", "C", "Inst", "Instance")
 _COMMONEST = 3
 """Status of a GPS fix in three dimensions (GPS_STATUS of ArduPilot); less is not a fix, except 2, a fix in two."""
@@ -65,14 +75,19 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     Raises
     ------
     InputError
-        The file is not such a log, is empty, or holds no GPS time.
+        The file is not such a log, or no message of it is understood.
     """
     library = optional_library("pymavlink.DFReader", path)
     try:
-        reader = (
-            library.DFReader_text(str(path)) if path.suffix.lower() == ".log" else library.DFReader_binary(str(path))
-        )
-        tables, units, params = _dataflash_tables(reader)
+        with path.open("rb") as file:
+            binary = file.read(2) == _MAGIC
+        if binary:
+            tables, units, params, unread = _dataflash_tables(library.DFReader_binary(str(path)))
+        else:
+            with tempfile.TemporaryDirectory() as folder:
+                copy = Path(folder) / "log.log"  # the library reads one byte a letter
+                copy.write_bytes(b"".join(text_lines(path)))
+                tables, units, params, unread = _dataflash_tables(library.DFReader_text(str(copy)))
     except Exception as error:  # the library lets errors of struct through
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
         raise InputError(path, "", problem, "give a whole dataflash log") from None
@@ -80,19 +95,14 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
         table for (kind, _), table in tables.items() if kind.startswith("GPS") and {"GWk", "GMS"} <= set(table)
     ]
     gps = next((table for table in receivers if _has_fix(table).any()), None)
-    if gps is None:
-        raise InputError(
-            path, "", "holds no fix of a GPS with its time", "log GPS messages, or export the log with UTC"
-        )
-    utc = GPS_EPOCH_S + _WEEK_S * gps["GWk"] + gps["GMS"] / 1000 - LEAP_SECONDS
-    lag = (gps["TimeUS"] * 1e-6 - utc)[_has_fix(gps)]
-    # The message is written after the fix was measured: the least difference has the least delay.
-    boot = float(np.min(lag))
     findings: list[LogFinding] = []
-    if (spread := float(np.ptp(lag))) > 1.0:
-        boot = float(np.median(lag))
-        text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
-        findings.append(LogFinding("fault", text, "GPS"))
+    if gps is None:
+        boot = 0.0
+        findings.append(LogFinding("note", "no fix of a GPS has a time: the trials have no date"))
+    else:
+        boot = _boot(gps, findings)
+    leaps = any(finding.kind == "fault" for finding in findings)
+    findings += not_used("messages", unread)
     streams = []
     for (kind, instance), table in tables.items():
         time = table["TimeUS"] * 1e-6 - boot
@@ -102,9 +112,8 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
                 continue
             values, stamps = table[field], time
             if kind in ("GPS", "GPS2") and {"GWk", "GMS"} <= set(table):
-                at = GPS_EPOCH_S + _WEEK_S * table["GWk"] + table["GMS"] / 1000 - LEAP_SECONDS
-                stamps = at if not findings else time
-                values = np.where(table.get("Status", np.full(len(at), _COMMONEST)) >= 2, values, np.nan)
+                stamps = time if leaps or gps is None else _utc(table)
+                values = np.where(table.get("Status", np.full(len(time), _COMMONEST)) >= 2, values, np.nan)
             stated = unit_of_text(units.get((kind, field), "")) or unit
             meaning = (quantity, "format")
             if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
@@ -115,7 +124,24 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     if not streams:
         raise InputError(path, "", "no message of it is understood", "log GPS, ATT, IMU and RCOU")
     counts = {"messages": sum(len(table["TimeUS"]) for table in tables.values())}
-    return VesselLog(path, "ArduPilot dataflash", tuple(streams), counts, tuple(findings))
+    return VesselLog(path, "ArduPilot dataflash", tuple(streams), counts, tuple(findings), gps is not None)
+
+
+def _utc(table: Mapping[str, Array]) -> Array:
+    """UTC of the fixes of a GPS (n,), s since 1970."""
+    return np.asarray(GPS_EPOCH_S + _WEEK_S * table["GWk"] + table["GMS"] / 1000 - LEAP_SECONDS)
+
+
+def _boot(gps: Mapping[str, Array], findings: list[LogFinding]) -> float:
+    """Time of the board at UTC 0, s; faults of the receiver's clock become findings."""
+    fixed = _has_fix(gps)
+    lag = (gps["TimeUS"] * 1e-6 - _utc(gps))[fixed]
+    if (weeks := float(np.median(gps["GWk"][fixed]))) < _FIRST_BOARD_WEEK:
+        text = (
+            f"the GPS week {weeks:.0f} is before the first boards: the receiver's date is 1024 weeks too early if its "
+        )
+        findings.append(LogFinding("note", f"{text}week number has rolled over", "GPS", {"week": weeks}))
+    return board_start(lag, "GPS", findings)
 
 
 def _has_fix(table: Mapping[str, Array]) -> Array:
@@ -140,8 +166,10 @@ def _shaft(field: str, instance: Any, table: Mapping[str, Array], instances: int
 _Tables = dict[tuple[str, Any], dict[str, Array]]
 
 
-def _dataflash_tables(reader: Any) -> tuple[_Tables, dict[tuple[str, str], str], Mapping[str, float]]:
-    """Columns by message and instance, and units by message and field."""
+def _dataflash_tables(
+    reader: Any,
+) -> tuple[_Tables, dict[tuple[str, str], str], Mapping[str, float], dict[str, int]]:
+    """Columns by message and instance, units by message and field, parameters, and the number of all other messages."""
     wanted = {*_FIELDS, "RCOU"}
     rows: dict[tuple[str, Any], dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
     units: dict[tuple[str, str], str] = {}
@@ -158,22 +186,25 @@ def _dataflash_tables(reader: Any) -> tuple[_Tables, dict[tuple[str, str], str],
         for name in names:
             group[name].append(float(getattr(message, name)))
     tables = {key: {name: np.array(values) for name, values in group.items()} for key, group in rows.items()}
-    return tables, units, reader.params
+    counts = reader.counts if isinstance(reader.counts, dict) else dict(enumerate(reader.counts))
+    numbers = {form.name: counts.get(key, 0) for key, form in reader.formats.items()}
+    others = {kind: number for kind, number in numbers.items() if number and kind not in {*wanted, *_FORMAL}}
+    return tables, units, reader.params, others
 
 
 def _servo_orders(time: Array, table: Mapping[str, Array], params: Mapping[str, float]) -> list[LogStream]:
     """Orders as shares of the range, positive to starboard and ahead, of the outputs with a known function.
 
-    Without any SERVOn_FUNCTION the pulses of all outputs, us.
+    Outputs of any other function are pulses, us, whose use is found by what the vessel does, or named.
     """
     streams = []
-    nothing_known = not any(name.endswith("_FUNCTION") for name in params)
     for number in range(1, 17):
         quantity = _SERVO_FUNCTIONS.get(int(params.get(f"SERVO{number}_FUNCTION", 0)))
         pulses = table.get(f"C{number}", table.get(f"Ch{number}"))
-        if nothing_known and pulses is not None:  # their use is found by what the vessel does
+        if pulses is None:
+            continue
+        if quantity is None:
             streams.append(LogStream(f"RCOU.C{number}", time, np.where(pulses > 0, pulses, math.nan), "us"))
-        if quantity is None or pulses is None:
             continue
         least, trim, most = (
             params.get(f"SERVO{number}_{name}", usual)
@@ -206,32 +237,61 @@ _UNKNOWN_16_BITS = 65535
 """What a field of 16 bits holds where nothing is known (mavlink.io)."""
 
 
+_FRAMES = {0xFE: 8, 0xFD: 12}
+"""Bytes of a message of MAVLink 1 and 2 beside its payload, by its first one (mavlink.io, "Packet Serialization")."""
+
+_SIGNED = 13
+"""Bytes of a signature."""
+
+
+def looks_like_tlog(head: bytes) -> bool:
+    """Whether a file begins with two messages of MAVLink, each behind a time stamp of 8 bytes, us since 1970."""
+    place = 0
+    for _ in range(2):
+        frame = head[place + 8 : place + 11]
+        if len(frame) < 3 or frame[0] not in _FRAMES or not 9e14 < int.from_bytes(head[place : place + 8]) < 4e15:
+            return False
+        place += 8 + frame[1] + _FRAMES[frame[0]] + (_SIGNED if frame[0] == 0xFD and frame[2] & 1 else 0)
+    return True
+
+
+_Sender = tuple[int, str, int]
+"""System, kind of message, component."""
+
+
 def read_ardupilot_tlog(path: Path) -> VesselLog:
     """Read a telemetry log: MAVLink messages with the time of the ground station. Raises as :func:`read_ardupilot_bin`.
 
     Orders to servos become shares of their range where the log holds the parameters SERVOn_FUNCTION.
     """
     mavutil = optional_library("pymavlink.mavutil", path)
-    rows: dict[str, dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
-    params: dict[str, float] = {}
+    rows: dict[_Sender, dict[str, array[float]]] = defaultdict(lambda: defaultdict(lambda: array("d")))
+    every: dict[int, dict[str, float]] = defaultdict(dict)
+    unread: Counter[str] = Counter()
     try:
-        link = mavutil.mavlink_connection(str(path), robust_parsing=True)
-        wanted = [*_TELEMETRY, "SERVO_OUTPUT_RAW", "PARAM_VALUE", "SYSTEM_TIME"]
-        while (message := link.recv_match(type=wanted)) is not None:
-            kind = message.get_type()
-            if kind == "PARAM_VALUE":
-                params[message.param_id] = message.param_value
+        link = mavutil.mavlogfile(str(path), robust_parsing=True)
+        wanted = {*_TELEMETRY, "SERVO_OUTPUT_RAW", "PARAM_VALUE", "SYSTEM_TIME"}
+        while (message := link.recv_match()) is not None:
+            kind, system = message.get_type(), message.get_srcSystem()
+            if kind not in wanted:
+                unread[kind] += 1
                 continue
-            group = rows[kind]
+            if kind == "PARAM_VALUE":
+                every[system][message.param_id] = message.param_value
+                continue
+            group = rows[system, kind, message.get_srcComponent()]
             group["_time"].append(message._timestamp)
             for name in message.get_fieldnames():
                 value = getattr(message, name)
                 if isinstance(value, int | float):
                     group[name].append(float(value))
+        link.close()
     except Exception as error:
         problem = f"cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
         raise InputError(path, "", problem, "give a whole telemetry log") from None
-    tables = {kind: {name: np.array(values) for name, values in group.items()} for kind, group in rows.items()}
+    findings = not_used("messages", unread)
+    system, chosen = _one_vehicle(rows, findings)
+    tables = {kind: {name: np.array(values) for name, values in group.items()} for kind, group in chosen.items()}
     streams = []
     for kind, table in tables.items():
         for field, (factor, unit, quantity) in _TELEMETRY.get(kind, {}).items():
@@ -243,10 +303,28 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
         pulses = {
             f"C{number}": servos[f"servo{number}_raw"] for number in range(1, 17) if f"servo{number}_raw" in servos
         }
-        streams += _servo_orders(servos["_time"], pulses, params)
+        streams += _servo_orders(servos["_time"], pulses, every[system])
     if not streams:
         raise InputError(
             path, "", "no message of it is understood", "give a telemetry log with positions and attitudes"
         )
     counts = {"messages": sum(len(table["_time"]) for table in tables.values())}
-    return VesselLog(path, "MAVLink telemetry", tuple(streams), counts)
+    return VesselLog(path, "MAVLink telemetry", tuple(streams), counts, tuple(findings))
+
+
+def _one_vehicle(
+    rows: Mapping[_Sender, dict[str, array[float]]], findings: list[LogFinding]
+) -> tuple[int, dict[str, dict[str, array[float]]]]:
+    """The system with the most messages, and its messages by kind, each of the component that sends the most of it."""
+    sizes: Counter[int] = Counter()
+    for (system, kind, _), group in rows.items():
+        sizes[system] += len(group["_time"]) if kind in _TELEMETRY else 0
+    vehicles = sorted((system for system in sizes if sizes[system]), key=lambda system: (-sizes[system], system))
+    if not vehicles:
+        return 0, {}
+    if len(vehicles) > 1:
+        others = ", ".join(f"{system} ({sizes[system]} messages)" for system in vehicles[1:])
+        text = f"the log is of {len(vehicles)} vehicles: system {vehicles[0]} ({sizes[vehicles[0]]} messages) is read, "
+        findings.append(LogFinding("fault", f"{text}and not {others}", evidence={"system": vehicles[0]}))
+    own = [(kind, group) for (system, kind, _), group in rows.items() if system == vehicles[0]]
+    return vehicles[0], dict(sorted(own, key=lambda entry: len(entry[1]["_time"])))

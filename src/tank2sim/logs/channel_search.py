@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -102,6 +103,41 @@ _FASTEST_SHAFT_HZ = 100.0
 _LARGEST_HEEL_RAD = 0.8
 """Heel beyond which a record without a unit is in deg: 46 deg in rad (project choice)."""
 
+_VECTORS = (("u_ground", "v_ground"), ("u_water", "v_water"), ("v_north", "v_east"))
+"""Quantities that are the components of one velocity."""
+
+_STEERING = ("rudder_angle", "rudder_order", "rpm", "rpm_order")
+"""Quantities of which a vessel may have two, each of its own."""
+
+_LEAST_ZERO = 10.0
+"""Rudder on straight legs, deg or %, from which a zero of the record is taken out. Project choice: wind and a single
+propeller ask for some degrees (SNAME, PNA vol. III, IX.17); servos rest at 90 deg, sensors amid their range."""
+
+_LEAST_HELM = 4.0
+"""Rudder on straight legs, deg, that is doubted. Project choice: from here on a held rudder is taken to turn."""
+
+LARGEST_RUDDER_RAD = math.radians(75.0)
+"""Angle that no rudder goes beyond: Schilling rudders go to 70 or 75 deg."""
+
+_SHOWN = 0.6
+"""Agreement of a rudder with the turn from which its sign and zero are shown. Project choice: waves and currents turn
+a ship too."""
+
+_STRAIGHT_S = 10.0
+"""Time before and after for which a straight leg has been one, s. Project choice: rudders cross their zero faster."""
+
+_LEAST_ZERO_SHARE = 0.4
+"""The same of a rudder of unknown unit, as a share of its range (project choice): it hardly crosses its zero."""
+
+_SERVO_DEG = 90.0
+"""Servos rest at 90 deg of 180, or at 180 of 360."""
+
+_STRAIGHT_SHARE = 0.1
+"""Rate of turn on straight legs, as a share of its 99th percentile (project choice)."""
+
+_LEAST_STRAIGHT = 0.02
+"""Share of a log that must be straight legs to show the zero of a rudder (project choice)."""
+
 _BASE = {"format": 0.95, "name": 0.75, "": 0.6}
 _AGREED = {"format": 0.99, "name": 0.96, "": 0.9}
 _CONTRADICTED = 0.2
@@ -120,6 +156,7 @@ def find_channels(streams: Iterable[LogStream]) -> ChannelSet:
     search.headings()
     search.rates()
     search.speeds()
+    search.vectors()
     search.unnamed()
     search.unnamed_thrusters()
     search.steering()
@@ -454,6 +491,18 @@ class _Search:
                 self.fault(stream, why)
             self.add(stream, confidence, why, unit=stream.unit, sign=sign)
 
+    def vectors(self) -> None:
+        """Refuse both components of a velocity where the motion contradicts one: their frame is another."""
+        for pair in _VECTORS:
+            both = [channel for channel in self.found if channel.quantity in pair]
+            refused = {(c.quantity, _source(c.stream)) for c in both if c.confidence < DIFFERS}
+            for channel in both:
+                other = pair[1 - pair.index(channel.quantity)], _source(channel.stream)
+                if channel.confidence >= DIFFERS and other in refused:
+                    text = "the other component of its velocity is contradicted, so neither is used"
+                    self.fault(self._stream(channel.stream), text)
+                    self._doubt([channel.stream], "the other component is contradicted")
+
     def _heading_at(self, at: Array) -> Array:
         if not len(self.motion.heading_time_s):
             return np.full(len(at), np.nan)
@@ -568,13 +617,41 @@ class _Search:
             self.fault(self._stream(angle.stream), f"holds its values as an order does, and {order.stream} does not")
             self._doubt((angle.stream, order.stream), "order and angle seem exchanged")
 
+    def _zero(self, stream: LogStream, evidence: ContentEvidence) -> float:
+        """What a rudder records on straight legs; 0 where that is near its zero, or nothing shows it.
+
+        Of a straight leg, the rate of turn is small, and so it was a time before: the rudder does not only cross.
+        """
+        time, rate = self.rate
+        if stream.unit == "1" or not len(rate) or (evidence.agreement or 0.0) < _SHOWN:
+            return 0.0
+        values = interpolated(time, stream.time_s, stream.values, 10.0)
+        small = np.abs(rate) < _STRAIGHT_SHARE * float(np.percentile(np.abs(rate), 99))
+        reach = max(1, round(_STRAIGHT_S / usual_step(time)))
+        straight = np.convolve(small, np.ones(2 * reach + 1), "same") > 2 * reach
+        straight &= np.isfinite(values)
+        if straight.sum() < max(FEW_SAMPLES, _LEAST_STRAIGHT * len(time)):
+            return 0.0
+        zero = float(np.median(values[straight]))
+        span = float(np.ptp(values[np.isfinite(values)]))
+        size = abs(zero) * math.degrees(QUANTITIES["rudder_angle"].units.get(stream.unit or "deg", 1.0))
+        words = f"{stream.name} is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
+        if size >= _LEAST_ZERO if stream.unit else abs(zero) > _LEAST_ZERO_SHARE * span:
+            text = f"{words}, which is taken as its zero (offset in channels.toml)"
+            self.findings.append(LogFinding("note", text, stream.name, {"zero": zero}))
+            return zero
+        if size > _LEAST_HELM:
+            self.fault(stream, f"at {zero:.3g} {stream.unit or 'deg'} on straight legs: helm against wind, or its zero")
+        return 0.0
+
     def _rudder(self, stream: LogStream, evidence: ContentEvidence) -> None:
+        zero = self._zero(stream, evidence)
         if evidence.agreement is not None and evidence.agreement < DIFFERS and np.ptp(stream.values) == 0:
             evidence = UNTESTED
-        confidence, why = self.judged(stream, evidence, agrees=0.6)
-        unit = stream.unit or rudder_unit(stream.values)
+        confidence, why = self.judged(stream, evidence, agrees=_SHOWN)
+        unit = stream.unit or rudder_unit(stream.values - zero)
         stated, sign = sign_of_name(stream.name), 1
-        shown = evidence.agreement is not None and evidence.agreement >= 0.6
+        shown = evidence.agreement is not None and evidence.agreement >= _SHOWN
         if stated:
             sign = stated
             if shown and evidence.sign != stated:
@@ -591,7 +668,16 @@ class _Search:
             confidence, why = min(confidence, _DOUBTED), f"{why}; deg by its size, and it may be in %"
         if stream.quantity == "rudder_angle" and stream.stated_by == "name" and _held_share(stream) > _HOLDS:
             confidence, why = min(confidence, _DOUBTED), f"{why}; it holds its values as an order does"
-        self.add(stream, confidence, why, unit=unit, sign=sign)
+        most = float(np.nanpercentile(np.abs(stream.values - zero), 99.9)) * QUANTITIES["rudder_angle"].units.get(
+            unit, 0
+        )
+        if unit in ("deg", "rad") and most > LARGEST_RUDDER_RAD:
+            confidence, why = min(confidence, 0.6), f"{why}; it goes to {math.degrees(most):.3g} deg, as no rudder does"
+        if zero and not stream.unit and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
+            confidence, why = min(confidence, 0.6), f"{why}; its unit is known by its size alone"
+        if zero:
+            confidence, why = min(confidence, _BASE["name"]), f"{why}; {zero:.4g} on straight legs is taken as its zero"
+        self.add(stream, confidence, why, unit=unit, sign=sign, offset=zero)
 
     def _unnamed_rudder(self) -> None:
         """The stream without a name that leads the turn as a rudder does; none where no rate of turn is known."""
@@ -634,7 +720,8 @@ class _Search:
                 continue
             share = QUANTITIES["rudder_order"].units[channel.unit]
             angle = next((c for c in self.found if c.quantity == "rudder_angle" and c.unit in ("deg", "rad")), None)
-            scale, confidence, why = FULL_RUDDER_DEG * share, min(channel.confidence, 0.75), channel.why
+            full = FULL_RUDDER_DEG / max(1 - abs(share * channel.offset), 0.5)  # 50 of 0 to 100 % leaves 50 to a side
+            scale, confidence, why = full * share, min(channel.confidence, 0.75), channel.why
             if angle is not None and angle.confidence >= USED_FROM:
                 ratio = self._ratio(angle, channel)
                 if ratio is not None:
@@ -754,7 +841,8 @@ class _Search:
             self.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
 
     def lost_signs(self) -> None:
-        """Report revolutions that stay ahead while the vessel goes astern: many engines count without a sign."""
+        """Report revolutions that stay ahead while the vessel goes astern, for many engines count without a sign, and
+        refuse revolutions astern while it goes ahead."""
         heading = self._best("heading")
         if heading is None or heading.confidence < SURE_FROM:
             return
@@ -762,9 +850,14 @@ class _Search:
         angle = self._heading_at(at)
         ahead = motion.v_north_mps * np.cos(angle) + motion.v_east_mps * np.sin(angle)
         fast = _ASTERN_SHARE * float(np.percentile(motion.speed_mps, 95)) if len(at) else 0.0
-        for stream in self.named("rpm", "rpm_port", "rpm_starboard"):
+        for stream in self.named("rpm", "rpm_port", "rpm_starboard", "rpm_order"):
             values = interpolated(at, stream.time_s, stream.values, 10.0)
             turning = values > _ASTERN_SHARE * float(np.percentile(stream.values, 95))
+            shown = values[(ahead > max(fast, LEAST_SPEED_MPS)) & np.isfinite(values)]
+            if len(shown) > FEW_SAMPLES and (shown < 0).mean() > AGREES:
+                self.fault(stream, "is negative while the vessel goes ahead: its sign is the other one")
+                self._doubt([stream.name], "the motion contradicts its sign")
+                continue
             astern = (ahead < -max(fast, LEAST_SPEED_MPS)) & turning & (stream.values.min() >= 0)
             if astern.sum() * usual_step(at) > _ASTERN_S:
                 text = (
@@ -782,10 +875,26 @@ class _Search:
             if use:
                 used.discard(channel.stream + channel.quantity)
             channels.append(self._of_pulses(replace(channel, use=use)))
+        self._twins(channels)
         self._set_back(channels)
         order = {name: place for place, name in enumerate(QUANTITIES)}
         channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
         return ChannelSet(tuple(channels), tuple(self.findings))
+
+    def _twins(self, channels: list[LogChannel]) -> None:
+        """Name the second rudder, order or shaft that is as good and not used."""
+        for used in channels:
+            for other in channels:
+                same = used.use and used.quantity in _STEERING and other.quantity == used.quantity
+                if not same or other.use or other.confidence < USED_FROM:
+                    continue
+                first, second = self._stream(used.stream), self._stream(other.stream)
+                values = np.interp(first.time_s, second.time_s, other.si(second.values))
+                factor = QUANTITIES[used.quantity].units[used.unit]
+                apart = float(np.median(np.abs(used.si(first.values) - values))) / factor
+                text = f"{used.stream} is used, and not {other.stream}, another {QUANTITIES[used.quantity].words}, "
+                text += f"{apart:.3g} {used.unit} apart (median)"
+                self.findings.append(LogFinding("note", text, other.stream, {"apart": apart}))
 
     def _set_back(self, channels: list[LogChannel]) -> None:
         """Give the later of heading and rate of turn its delay, where it is certain: neither can be early."""
@@ -818,6 +927,11 @@ def _paired(first: LogStream, second: LogStream) -> tuple[LogStream, LogStream]:
 def _common_beginning(first: str, second: str) -> int:
     """Letters with which both names begin."""
     return next((place for place, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), len(first))
+
+
+def _source(name: str) -> str:
+    """The message of a stream without the name of its field: ``130578 from 5`` of ``130578.speed from 5``."""
+    return re.sub(r"\.\S*", "", name) if "." in name else ""
 
 
 def _held_share(stream: LogStream) -> float:

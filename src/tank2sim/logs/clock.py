@@ -14,12 +14,53 @@ from tank2sim.records.signals.sampling import GAP_STEPS
 _DOUBLED = 0.2
 """Share of samples at the time of another from which two instruments are suspected. Project choice."""
 
-_DOUBLED_STEPS = 3.0
+DOUBLED_STEPS = 3.0
 """Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone
 differs by one to two."""
 
+_ROLLOVER_S = 1024 * 604800.0
+"""Time after which the week number of GPS begins anew, s (IS-GPS-200, 20.3.3.3.1.1)."""
+
+_DAY_S = 86400.0
+"""Difference of two clocks, s, from which one is wrong by more than a time zone."""
+
+TWO_DIGITS_FROM = 80
+"""Years of two digits from here on are of the 20th century: GPS time begins in 1980 (IS-GPS-200, 3.3.4)."""
+
 FALL_STEPS = 1.5
 """Steps by which a clock falls where it was set back. Project choice: two samples that changed places fall by one."""
+
+
+def full_year(year: int) -> int:
+    """The year of a year of two digits."""
+    return year + (1900 if year >= TWO_DIGITS_FROM else 2000)
+
+
+def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
+    """What to add to a receiver's clock that is ahead of the recorder's by `ahead_s`, and what to say of it.
+
+    Whole multiples of 1024 weeks are the receiver's fault, for its week number has ten bits; of any other difference
+    the receiver is right.
+    """
+    turns = round(-ahead_s / _ROLLOVER_S)
+    rest = ahead_s + turns * _ROLLOVER_S
+    if turns and abs(rest) < _DAY_S:
+        text = f"the receiver's date is {1024 * abs(turns)} weeks off that of the recorder, which is taken"
+        return turns * _ROLLOVER_S, [LogFinding("note", text, evidence={"weeks": 1024 * turns})]
+    if abs(ahead_s) > _DAY_S:
+        text = f"the recorder's clock is {abs(ahead_s) / _DAY_S:.4g} days off that of the receiver, which is taken"
+        return 0.0, [LogFinding("note", text, evidence={"days": ahead_s / _DAY_S})]
+    return 0.0, []
+
+
+def board_start(lag_s: Array, receiver: str, findings: list[LogFinding]) -> float:
+    """Time of a board at UTC 0, s, by its clock less UTC at each fix (n,); leaps of the receiver are a fault."""
+    if (spread := float(np.ptp(lag_s))) > 1.0:
+        text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
+        findings.append(LogFinding("fault", text, receiver))
+        return float(np.median(lag_s))
+    # The message is written after the fix was measured: the least difference has the least delay.
+    return float(lag_s.min())
 
 
 def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
@@ -75,11 +116,16 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     if repeated > _DOUBLED * len(time):
         apart = np.abs(np.diff(values))[~new[1:]]
         steps = np.abs(np.diff(values[new]))
-        if np.median(apart) > _DOUBLED_STEPS * max(float(np.median(steps)), 1e-12):
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        if np.median(apart) > DOUBLED_STEPS * max(usual, 1e-12):
             text = (
                 f"{stream.name}: two values at one time, {np.median(apart):.3g} apart (median): two instruments in one"
             )
             findings.append(LogFinding("fault", text, stream.name))
+        elif apart.any():
+            share = 100 * repeated / len(time)
+            text = f"{stream.name}: {share:.0f} % of its samples have the time of another, and are left out"
+            findings.append(LogFinding("note", text, stream.name))
     tidy = LogStream(stream.name, time[new], values[new], stream.unit, stream.quantity, stream.stated_by)
     return tidy, repeated, findings
 

@@ -190,6 +190,8 @@ def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quanti
     good = np.isfinite(other) & motion.moving
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
+    if not other[good].any():
+        return ContentEvidence(0.0, text="it stays at 0 while the positions move")
     ratio = speed[good] / np.where(np.abs(other[good]) > 1e-9, np.abs(other[good]), np.nan)
     scale = float(np.nanmedian(ratio))
     spread = float(np.nanmedian(np.abs(ratio / scale - 1))) if np.isfinite(scale) and scale > 0 else math.inf

@@ -10,7 +10,8 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, optional_library
+from tank2sim.logs.clock import board_start
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, not_used, optional_library
 
 _FIELDS: dict[str, dict[str, tuple[str, str]]] = {
     "sensor_gps": {
@@ -43,7 +44,8 @@ _AIRFRAME_ROVER_DIFFERENTIAL = 6
 
 
 def read_px4_ulog(path: Path) -> VesselLog:
-    """Read a ULog. Times are those of the board, set to UTC by the GPS with the least delay.
+    """Read a ULog. Times are those of the board, set to UTC by the GPS with the least delay; without a GPS that
+    has a UTC the log has no date.
 
     ``actuator_motors`` and ``actuator_servos`` are orders as shares of their range: the one servo is the rudder, one
     motor the propeller, two motors the right and the left one where CA_AIRFRAME says that the difference of two motors
@@ -52,7 +54,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
     Raises
     ------
     InputError
-        The file is not a ULog, or holds no UTC of a GPS.
+        The file is not a ULog, or no topic of it is understood.
     """
     library = optional_library("pyulog", path)
     try:
@@ -65,34 +67,33 @@ def read_px4_ulog(path: Path) -> VesselLog:
         topics = {(name, instance): data for (name, instance), data in topics.items() if name != "sensor_gps"}
     receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
     gps = next((data for data in receivers if _utc_of(data).any()), None)
+    boot, findings = 0.0, list[LogFinding]()
     if gps is None:
-        raise InputError(path, "", "holds no UTC of a GPS", "log sensor_gps")
-    boot, findings = _boot(gps)
+        findings.append(LogFinding("note", "no GPS of it has a UTC: the trials have no date"))
+    else:
+        known = gps["time_utc_usec"] > 0
+        boot = board_start(
+            (gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6), "sensor_gps", findings
+        )
     airframe = int(log.initial_parameters.get("CA_AIRFRAME", -1))
     streams = list(_streams(topics, boot, airframe))
     if not streams:
         raise InputError(path, "", "no topic of it is understood", "log sensor_gps, vehicle_attitude, actuator_*")
+    read = {stream.name.split(".")[0].split("[")[0] for stream in streams}
+    findings += not_used(
+        "topics", {topic.name: len(topic.data["timestamp"]) for topic in log.data_list if topic.name not in read}
+    )
     counts = {"messages": sum(len(data["timestamp"]) for data in topics.values()), "dropouts": len(log.dropouts)}
     if log.file_corruption:
         findings.append(LogFinding("fault", "parts of the file are corrupted and left out"))
     if lost := sum(dropout.duration for dropout in log.dropouts):
         findings.append(LogFinding("note", f"{len(log.dropouts)} dropouts of the logger, {lost / 1000:.3g} s in all"))
-    return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings))
+    return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings), gps is not None)
 
 
 def _utc_of(data: dict[str, Any]) -> Array:
     """UTC of the fixes of a receiver (n,), us since 1970; 0 where it is not known."""
     return np.asarray(data.get("time_utc_usec", np.zeros(len(data["timestamp"]))))
-
-
-def _boot(gps: dict[str, Any]) -> tuple[float, list[LogFinding]]:
-    """Time of the board at UTC 0, s, and what is wrong with the receiver's clock."""
-    known = gps["time_utc_usec"] > 0
-    lag = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6
-    if np.ptp(lag) > 1.0:
-        text = f"the receiver's clock leaps by {np.ptp(lag):.3g} s against that of the board, which is taken"
-        return float(np.median(lag)), [LogFinding("fault", text, "sensor_gps")]
-    return float(lag.min()), []
 
 
 def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airframe: int) -> Iterator[LogStream]:

@@ -184,7 +184,7 @@ _PATTERNS: tuple[tuple[str, str, str], ...] = (
         r"|kurs (?:rzeczywisty|zyroskopowy|zyrokompasowy)|rumo (?:verdadeiro|da giro)|aproamento"
         r"|(?:kompass)?kurs rattvisande"
         r"|stavad kurs|styret kurs|keulasuunta|hyrrasuunta|pruva)\b",
-        r"\b(rate|speed|error|err|desired|des|set|cmd|ref|control|mag|u|r|e|x|y|z|fondo?|fundo|grunn|grond|suolo|grund)\b",
+        r"\b(rate|speed|acc|accel\w*|error|err|desired|des|set|cmd|ref|control|mag|u|r|e|x|y|z|fondo?|fundo|grunn|grond|suolo|grund)\b",
     ),
     (
         "cog",

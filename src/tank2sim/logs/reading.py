@@ -7,13 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tank2sim.errors import InputError
-from tank2sim.logs.ardupilot import read_ardupilot_bin, read_ardupilot_tlog
+from tank2sim.logs.ardupilot import looks_like_tlog, read_ardupilot_bin, read_ardupilot_tlog
 from tank2sim.logs.nmea0183 import looks_like_nmea0183, read_nmea0183
 from tank2sim.logs.nmea2000 import looks_like_nmea2000, read_nmea2000
 from tank2sim.logs.px4 import read_px4_ulog
 from tank2sim.logs.ros import read_ros_bag
 from tank2sim.logs.streams import VesselLog
 from tank2sim.logs.table import read_table_log
+from tank2sim.records.text_layout import decoded_text
 
 _HEAD_BYTES = 8192
 
@@ -25,6 +26,25 @@ _MAGIC: tuple[tuple[bytes, Callable[[Path], VesselLog]], ...] = (
     (b"\xa3\x95\x80", read_ardupilot_bin),
 )
 """First bytes of binary formats (their specifications), and the reader."""
+
+_KNOWN = "ROS bags, MCAP, ULog, ArduPilot .bin, .log and .tlog, NMEA 0183, NMEA 2000 (text) and CSV"
+
+_RAW = "record the raw frames (candump -L, or the input of the analyzer)"
+_FOREIGN: tuple[tuple[bytes, str, str], ...] = (
+    (rb"\x1f\x8b", "is compressed (gzip)", "unpack it"),
+    (rb"PK\x03\x04", "is a ZIP archive or a spreadsheet", "unpack it, or save it as CSV"),
+    (rb'\s*\{(?=.*"pgn")', "is JSON of NMEA 2000 (canboat analyzer)", _RAW),
+    (rb"\d{4}-\d\d-\d\d[-T ][\d:.]+Z?\s+\d\s+\d+\s+\d+\s+\d{5,6}\s+\w", "is text of the canboat analyzer", _RAW),
+    (
+        rb'(\d{13};[^;]*;)?\s*\{(?=.*"(updates|values|context)")',
+        "is JSON of Signal K",
+        "record its raw input, or save CSV",
+    ),
+    (rb"\d{13};[^;]*;\s*\{", "is a log of Signal K with JSON", "record NMEA 0183 or raw frames of NMEA 2000"),
+    (rb"\s*[{\[]", "is JSON", "save it as CSV, a row a sample"),
+    (rb"\s*<(\?xml|gpx|kml|!DOCTYPE|html)", "is XML or HTML", "save it as CSV, a row a sample"),
+)
+"""Beginnings of files that are no log that is read, what they are, and what to give in their place."""
 
 
 def read_log(path: Path | str) -> VesselLog:
@@ -50,15 +70,28 @@ def read_log(path: Path | str) -> VesselLog:
     for magic, reader in _MAGIC:
         if head.startswith(magic):
             return reader(path)
-    if path.suffix.lower() == ".tlog":
+    if looks_like_tlog(head):
         return read_ardupilot_tlog(path)
-    if path.suffix.lower() == ".log" and re.match(rb"FMT,\s*128", head):
-        return read_ardupilot_bin(path)
-    if looks_like_nmea2000(head):
-        return read_nmea2000(path)
-    if looks_like_nmea0183(head):
-        return read_nmea0183(path)
-    if b"\0" in head and head[:2] not in (b"\xff\xfe", b"\xfe\xff"):  # the marks of UTF-16, as spreadsheets export
-        known = "ROS bags, MCAP, ULog, ArduPilot .bin and .tlog, NMEA 0183, NMEA 2000 (text) and CSV"
-        raise InputError(path, "", "is of no known format, or its beginning is missing", f"known are {known}")
+    return _read_text(path, head)
+
+
+def _read_text(path: Path, head: bytes) -> VesselLog:
+    """Read a log of text, whatever its encoding, or refuse it by what it is."""
+    text, encoding = decoded_text(head, complete=False)
+    plain = text.encode("latin-1", errors="replace") if encoding.startswith("utf-16") else head
+    plain = plain.removeprefix(b"\xef\xbb\xbf")
+    for fits, reader in (
+        (re.compile(rb"^FMT,\s*\d+,\s*\d+,\s*\w+,", re.MULTILINE).search, read_ardupilot_bin),
+        (looks_like_nmea2000, read_nmea2000),
+        (looks_like_nmea0183, read_nmea0183),
+    ):
+        if fits(plain):
+            return reader(path)
+    for beginning, problem, remedy in _FOREIGN:
+        if re.match(beginning, plain):
+            raise InputError(path, "", problem, f"{remedy}; known are {_KNOWN}")
+    if b"\0" in plain and path.suffix.lower() == ".tlog":  # its first message is cut
+        return read_ardupilot_tlog(path)
+    if b"\0" in plain:
+        raise InputError(path, "", "is of no known format, or its beginning is missing", f"known are {_KNOWN}")
     return read_table_log(path)

@@ -7,9 +7,10 @@ become north, east, and ahead, starboard; a yaw from east to the left becomes a 
 from __future__ import annotations
 
 import math
+import tempfile
 from array import array
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,23 @@ from tank2sim.logs.quantities import QUANTITIES, plain_words, quantity_of_name
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, optional_library
 from tank2sim.records.spelt_units import split_unit
 
-LONGEST_VECTOR = 8
-"""Entries of an array up to which each is a stream. Project choice: actuators and joints are few, scans and pictures
-are not."""
+LONGEST_VECTOR = 32
+"""Entries of an array up to which each is a stream. Project choice: outputs of MAVROS are 16 or 18, joints and motors
+fewer; scans and pictures have hundreds."""
 
 _OFF_BY_S = 3600.0
 """Difference of the time in a header from the time of recording beyond which the header's is not UTC. Project choice:
 latencies are seconds; a simulated or unset clock is off by years."""
+
+_PACE = 0.01
+"""Relative difference of the paces of two clocks from which one is simulated. Project choice: clocks of computers
+differ by 1e-4, and the delays of a log of a minute by less than a second."""
+
+_SUFFIXES = {b"#ROS": ".bag", b"SQLi": ".db3", b"\x89MCA": ".mcap"}
+"""Endings that the library needs, by the first bytes of a file."""
+
+_WORLD_FRAMES = ("map", "odom", "world", "enu", "earth", "local_origin", "utm")
+"""Names of frames that are fixed to the earth: east, north, up (REP 103, REP 105)."""
 
 _OMITTED = ("header", "covariance", "seq", "status", "layout", "covariance_type")
 _GROUND_WORDS = ("gps", "gnss", "vel", "fix", "navsat", "enu")
@@ -37,9 +48,10 @@ _GROUND_WORDS = ("gps", "gnss", "vel", "fix", "navsat", "enu")
 def read_ros_bag(path: Path) -> VesselLog:
     """Read a ROS 1 bag, a ROS 2 bag (its folder or file) or an MCAP file.
 
-    Each number of each message becomes a stream, arrays of more than :data:`LONGEST_VECTOR` entries excepted. Times are
-    those of the headers where there are any, and of the recording elsewhere. Fixes without a status of a fix hold no
-    value.
+    Each number of each message becomes a stream, arrays of more than :data:`LONGEST_VECTOR` entries excepted, which are
+    named. Times are those of the headers where there are any, and of the recording elsewhere; where the headers run at
+    another pace, as those of a simulation do, theirs are taken for all, and the log has no date. Fixes without a status
+    of a fix hold no value.
 
     Raises
     ------
@@ -53,7 +65,10 @@ def read_ros_bag(path: Path) -> VesselLog:
     findings: list[LogFinding] = []
     failed: dict[str, str] = {}
     try:
-        with highlevel.AnyReader([path], default_typestore=store) as reader:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            highlevel.AnyReader([_named(path, Path(folder))], default_typestore=store) as reader,
+        ):
             for connection, received_ns, raw in reader.messages():
                 try:
                     message = reader.deserialize(raw, connection.msgtype)
@@ -70,11 +85,48 @@ def read_ros_bag(path: Path) -> VesselLog:
         remedy = "it may be cut off: repair it with 'rosbag reindex' or 'mcap recover'"
         raise InputError(path, "", problem, remedy) from None
     findings += [LogFinding("note", f"{topic} cannot be decoded ({why})", topic) for topic, why in failed.items()]
-    streams = [stream for topic in topics.values() for stream in topic.streams(findings)]
+    simulated = _simulated_times(topics.values(), findings)
+    streams = [stream for topic in topics.values() for stream in topic.streams(simulated, findings)]
     if not streams:
         raise InputError(path, "", "no message of it holds a number", "record topics with measured values")
     counts = {"messages": sum(len(topic.received) for topic in topics.values()), "undecoded_topics": len(failed)}
-    return VesselLog(path, "ROS bag" if path.suffix != ".mcap" else "MCAP", tuple(streams), counts, tuple(findings))
+    form = "MCAP" if _suffix(path) == ".mcap" else "ROS bag"
+    return VesselLog(path, form, tuple(streams), counts, tuple(findings), simulated is None)
+
+
+def _named(path: Path, folder: Path) -> Path:
+    """The bag under a name that ends as its first bytes say, for the library goes by the name."""
+    if path.is_dir() or (suffix := _suffix(path)) == path.suffix:
+        return path
+    link = folder / f"log{suffix}"
+    link.symlink_to(path.resolve())
+    return link
+
+
+def _suffix(path: Path) -> str:
+    """The ending that a bag should have, by its first bytes."""
+    if path.is_dir():
+        return ""
+    with path.open("rb") as file:
+        return _SUFFIXES.get(file.read(4), path.suffix)
+
+
+def _simulated_times(topics: Iterable[_Topic], findings: list[LogFinding]) -> tuple[Array, Array] | None:
+    """Times of recording and of the headers (n,), s, where these run at another pace; None where they do not."""
+    pairs = [np.column_stack(topic.clock) for topic in topics if topic.stamped and len(topic.received) > 1]
+    both = np.concatenate(pairs) if pairs else np.zeros((0, 2))
+    both = both[both[:, 1] > 0]
+    if len(both) < 2 or abs(float(np.median(both[:, 1] - both[:, 0]))) < _OFF_BY_S:
+        return None
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    spans = np.ptp(both, axis=0)
+    if not spans.all() or abs(spans[1] / spans[0] - 1) < _PACE:
+        return None
+    text = (
+        f"the times of the headers run {spans[1] / spans[0]:.3g} times as fast as the recording, as of a simulation: "
+    )
+    findings.append(LogFinding("note", f"{text}they are taken, and the trials have no date"))
+    return both[:, 0], both[:, 1]
 
 
 class _Topic:
@@ -84,15 +136,35 @@ class _Topic:
         self.name, self.kind = name, kind.replace("/msg/", "/")
         self.paths = list(_numbers_of(message))
         self.get = [_getter(path) for path in self.paths]
-        self.stamped = hasattr(message, "header") and hasattr(message.header, "stamp")
+        self.stamped = hasattr(getattr(message, "header", message), "stamp")
+        self.frame = str(getattr(getattr(message, "header", None), "frame_id", "")).strip("/").lower()
+        self.child = str(getattr(message, "child_frame_id", "")).strip("/").lower()
         self.received, self.stamps = array("d"), array("d")
         self.columns: dict[str, array[float]] = defaultdict(lambda: array("d"))
         self.valid = array("b")
+        self.lists = list(_lists_of(message))
+        self.longest = self._length(message)
+        self.scans = {path: size for path, size in self._sizes(message) if size > LONGEST_VECTOR}
+
+    def _sizes(self, message: Any) -> Iterator[tuple[str, int]]:
+        return ((path, len(attrgetter(path)(message))) for path in self.lists)
+
+    def _length(self, message: Any) -> int:
+        """Entries of all lists that are short enough to be streams."""
+        return sum(size for _, size in self._sizes(message) if size <= LONGEST_VECTOR)
 
     def take(self, message: Any, received_ns: int) -> None:
+        if self.lists and self._length(message) > self.longest:  # lists are often empty at first
+            self.longest = self._length(message)
+            for path in _numbers_of(message):
+                if path not in self.paths:
+                    self.paths.append(path)
+                    self.get.append(_getter(path))
+                    self.columns[path].extend([math.nan] * len(self.received))
         self.received.append(received_ns * 1e-9)
         if self.stamped:
-            self.stamps.append(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
+            stamp = getattr(message, "header", message).stamp
+            self.stamps.append(stamp.sec + stamp.nanosec * 1e-9)
         for path, get in zip(self.paths, self.get, strict=True):
             try:
                 self.columns[path].append(float(get(message)))
@@ -100,11 +172,17 @@ class _Topic:
                 self.columns[path].append(math.nan)
         self.valid.append(getattr(getattr(message, "status", None), "status", 0) >= 0)
 
-    def _time(self, findings: list[LogFinding]) -> Array:
-        received = np.frombuffer(self.received, dtype=float)
+    @property
+    def clock(self) -> tuple[Array, Array]:
+        """Times of recording and of the headers (n,), s."""
+        return np.frombuffer(self.received, dtype=float), np.frombuffer(self.stamps, dtype=float)
+
+    def _time(self, simulated: tuple[Array, Array] | None, findings: list[LogFinding]) -> Array:
+        received, stamps = self.clock
+        if simulated is not None:
+            return np.where(stamps > 0, stamps, np.nan) if self.stamped else np.interp(received, *simulated)
         if not self.stamped:
             return received
-        stamps = np.frombuffer(self.stamps, dtype=float)
         if abs(float(np.median(stamps - received))) < _OFF_BY_S:
             return stamps
         if (stamps != 0).any():
@@ -112,8 +190,11 @@ class _Topic:
             findings.append(LogFinding("note", text, self.name))
         return received
 
-    def streams(self, findings: list[LogFinding]) -> Iterator[LogStream]:
-        time = self._time(findings)
+    def streams(self, simulated: tuple[Array, Array] | None, findings: list[LogFinding]) -> Iterator[LogStream]:
+        time = self._time(simulated, findings)
+        for path, size in self.scans.items():
+            text = f"{self.name}.{path} has {size} entries, more than {LONGEST_VECTOR}, and is not read"
+            findings.append(LogFinding("note", text, self.name))
         valid = np.frombuffer(self.valid, dtype=np.int8) > 0
         columns = {
             path: np.where(valid, np.frombuffer(values, dtype=float), np.nan) for path, values in self.columns.items()
@@ -154,9 +235,7 @@ class _Topic:
                 ("x", columns["pose.pose.position.y"], "m", "x"),
                 ("y", columns["pose.pose.position.x"], "m", "y"),
                 *_attitude(columns, "pose.pose.orientation"),
-                ("u_ground", columns["twist.twist.linear.x"], "m/s", "u_ground"),
-                ("v_ground", -columns["twist.twist.linear.y"], "m/s", "v_ground"),
-                ("yaw_rate", -columns["twist.twist.angular.z"], "rad/s", "yaw_rate"),
+                *_velocity(columns, "twist.twist.", self.child in _WORLD_FRAMES),
             ]
         if kind in ("Twist", "TwistStamped", "TwistWithCovarianceStamped"):
             prefix = {"Twist": "", "TwistStamped": "twist.", "TwistWithCovarianceStamped": "twist.twist."}[kind]
@@ -164,14 +243,8 @@ class _Topic:
             words = plain_words(self.name).split()
             if ahead is None or left is None or {"cmd", "command", "setpoint"} & set(words):
                 return []
-            if set(words) & set(_GROUND_WORDS):
-                return [("v_north", left, "m/s", "v_north"), ("v_east", ahead, "m/s", "v_east")]
-            rate = -columns[f"{prefix}angular.z"]
-            return [
-                ("u_ground", ahead, "m/s", "u_ground"),
-                ("v_ground", -left, "m/s", "v_ground"),
-                ("yaw_rate", rate, "rad/s", "yaw_rate"),
-            ]
+            of_world = bool(set(words) & set(_GROUND_WORDS)) or self.frame in _WORLD_FRAMES
+            return _velocity(columns, prefix, of_world)
         if kind in ("Pose", "PoseStamped", "PoseWithCovarianceStamped"):
             prefix = {"Pose": "", "PoseStamped": "pose.", "PoseWithCovarianceStamped": "pose.pose."}[kind]
             return [
@@ -180,6 +253,16 @@ class _Topic:
                 *_attitude(columns, f"{prefix}orientation"),
             ]
         return []
+
+
+def _velocity(columns: dict[str, Array], prefix: str, of_world: bool) -> list[tuple[str, Array, str, str]]:
+    """Velocity and rate of turn of a twist, of the body or of the world (without a rate where that is 0)."""
+    x, y, rate = columns[f"{prefix}linear.x"], columns[f"{prefix}linear.y"], -columns[f"{prefix}angular.z"]
+    turn = [("yaw_rate", rate, "rad/s", "yaw_rate")]
+    if of_world:
+        named = [("v_north", y, "m/s", "v_north"), ("v_east", x, "m/s", "v_east")]
+        return [*named, *(turn if np.nanmax(np.abs(rate), initial=0.0) > 0 else [])]
+    return [("u_ground", x, "m/s", "u_ground"), ("v_ground", -y, "m/s", "v_ground"), *turn]
 
 
 def _attitude(columns: dict[str, Array], prefix: str) -> list[tuple[str, Array, str, str]]:
@@ -210,6 +293,20 @@ def _numbers_of(message: Any, prefix: str = "") -> Iterator[str]:
                 yield from (f"{path}[{place}]" for place in range(len(value)))
         elif hasattr(value, "__dataclass_fields__"):
             yield from _numbers_of(value, f"{path}.")
+
+
+def _lists_of(message: Any, prefix: str = "") -> Iterator[str]:
+    """Paths of the lists of numbers of a message, whatever their length."""
+    for name in getattr(message, "__dataclass_fields__", {}):
+        value = getattr(message, name)
+        if name.startswith("__") or name in _OMITTED or name.endswith("_covariance"):
+            continue
+        if hasattr(value, "__dataclass_fields__"):
+            yield from _lists_of(value, f"{prefix}{name}.")
+        elif isinstance(value, np.ndarray) or (
+            isinstance(value, list) and all(isinstance(item, int | float | np.number) for item in value)
+        ):
+            yield f"{prefix}{name}"
 
 
 def _getter(path: str) -> Any:

@@ -91,6 +91,14 @@ class VesselLog:
     dated: bool = True
 
 
+def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
+    """A note of the kinds of sentences or messages of a log that are not used, each with its number; none of none."""
+    if not kinds:
+        return []
+    listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
+    return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))]
+
+
 def optional_library(name: str, path: Path) -> ModuleType:
     """Import a library of the extra ``tank2sim[logs]``.
 

@@ -41,6 +41,10 @@ STOPPED_SHARE = 0.05
 RESTING_MPS = 0.25
 """Speed below which a vessel rests, m/s: drifting with wind and current."""
 
+UNDER_WAY_MPS = 1.0
+"""Steady speed from which a vessel does not rest though its propulsion is stopped, m/s. Project choice: twice what
+currents usually are; sails or an engine that is not in the log drive it."""
+
 SPEED_CHANGE = 0.15
 """Relative change of speed in a piece without steering from which it is an acceleration. Project choice."""
 
@@ -163,6 +167,8 @@ def _signals(voyage: Voyage) -> _Signals | None:
     entry, threshold = steering
     step = float(np.clip(usual_step(entry.time_s), 0.2, 1.0))
     time = np.arange(entry.time_s[0], entry.time_s[-1], step)
+    if len(time) < LEAST_TRIAL_ROWS:  # many samples of a few instants
+        return None
     steer = median_filter(_on_grid(time, entry), size=3, mode="nearest")
     propulsion, full = _propulsion(series, time)
     heading = series.get("heading", series.get("magnetic_heading"))
@@ -231,7 +237,8 @@ def _rate(series: Mapping[str, QuantitySeries]) -> QuantitySeries | None:
     heading = series.get("heading", series.get("magnetic_heading"))
     if heading is None:
         return None
-    return QuantitySeries(*differenced(heading.time_s, heading.values, 2.0))
+    time, rate = differenced(heading.time_s, heading.values, 2.0)
+    return QuantitySeries(time, rate) if len(time) else None
 
 
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:
@@ -294,7 +301,9 @@ def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
         if turning:
             kind = StretchKind.PIVOT if signals.threshold != HELD_RUDDER_RAD else StretchKind.TURN
         else:
-            kind = StretchKind.COAST if moved and change > SPEED_CHANGE else StretchKind.REST
+            sailing = len(known) > 0 and float(np.median(known)) > UNDER_WAY_MPS
+            slow = StretchKind.STEADY if sailing else StretchKind.REST
+            kind = StretchKind.COAST if moved and change > SPEED_CHANGE else slow
     elif turning:
         kind = StretchKind.TURN
     elif moved and change > SPEED_CHANGE:

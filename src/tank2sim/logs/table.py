@@ -13,6 +13,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM
 from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, unit_of_signal_k
 from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
 from tank2sim.records.spelt_units import split_unit
@@ -41,6 +42,35 @@ _DAYS = ((36_526.0, 51_544.0, 25_569.0), (730_486.0, 745_504.0, 719_529.0))
 _LONGEST_IN_DAYS = 31.0
 """Longest log whose times are taken for days. Project choice: seconds of so large a number count from a beginning, and
 then differ by more."""
+
+_FIRST_DAY, _LAST_DAY = 19800101, 21001231
+"""Least and largest date yyyymmdd. Project choice: GPS time begins in 1980."""
+
+_CLOCK_DIGITS = 3
+"""Least number of different seconds of a minute of a clock in digits. Project choice: counts by 50 have two."""
+
+_COUNTS = (
+    (r"ms|msec|milli\w*", 1e-3),
+    (r"us|usec|micro\w*", 1e-6),
+    (r"ns|nano\w*", 1e-9),
+    (r"min|mins|minutes?", 60.0),
+    (r"h|hr|hrs|hours?", 3600.0),
+    (r"s|sec|secs|seconds?", 1.0),
+)
+"""Words for the unit in which a column counts time, and its seconds."""
+
+_BEGINNING = 10
+"""Percentile of times that are since 1970 already; counts since a start are less. Project choice: some cells are 0."""
+
+_DOUBTFUL_STEP, _SLOWEST_STEP_S = 5.0, 100.0
+"""Step of a count without a unit from which its unit is looked for, and from which it is not s. Project choice: logs
+have a row a second or more; a row in 100 s shows no manoeuvre."""
+
+_SLOWEST_MPS = 0.05
+"""Speed of a track, m/s, below which its times are in a smaller unit. Project choice: receivers at rest wander so."""
+
+_MOST = 0.5
+"""Share of the rows of a time that have a value of a column that is sampled row by row. Project choice."""
 
 _ROWS_OF_A_SIGNAL = 10
 """Least rows of a name in a column that is taken for one of names of signals. Project choice: remarks are rarer."""
@@ -90,7 +120,6 @@ def read_table_log(path: Path) -> VesselLog:
     except (ValueError, csv.Error) as error:
         raise InputError(path, "", f"is not a table ({' '.join(str(error).split())})", "give a CSV") from None
     rows = len(frame)
-    frame = frame.drop_duplicates(ignore_index=True)
     with path.open("rb") as file:
         body = itertools.islice(file, layout.skip, None)
         skipped = max(0, sum(1 for line in body if line.strip() and not line.startswith(b"#")) - rows)
@@ -99,16 +128,28 @@ def read_table_log(path: Path) -> VesselLog:
         findings.append(
             LogFinding("note", f"rows have cells beyond the {len(layout.names)} columns; they are not read")
         )
-    time, dated, used = _time(path, frame, findings)
+    time, dated, used = _time(path, frame, layout, findings)
     if not np.isfinite(time).any():
         name = sorted(used, key=list(frame.columns).index)[-1]
         first = _first_cell(frame[name])
         remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
         raise InputError(path, f"column {name}", f"holds no time that can be read, as {first[:40]!r}", remedy)
-    streams = _by_signal(frame.drop(columns=list(used)), time) or [
-        _stream(name, unit, time, values)
+    values = frame.drop(columns=list(used))
+    by_signal = _by_signal(values, time)
+    spread = None if by_signal else _spread(time, values)
+    if spread is not None:
+        time, each = spread
+        name = sorted(used, key=list(frame.columns).index)[-1]
+        text = f"{name} has {each} rows at each time (median): they are spread evenly between them"
+        findings.append(LogFinding("note", text, name, {"rows": each}))
+    else:
+        new = ~frame.duplicated().to_numpy()
+        frame, time, values = frame[new], time[new], values[new]
+        by_signal = _by_signal(values, time)
+    streams = by_signal or [
+        _stream(name, unit, time, numbers)
         for name, unit in zip(layout.names, layout.units, strict=True)
-        if name not in used and (values := _numbers(frame[name], layout.comma)) is not None
+        if name not in used and (numbers := _numbers(frame[name], layout.comma)) is not None
     ]
     if not streams:
         raise InputError(path, "", "has no column of numbers next to its time", "give a table of measured values")
@@ -135,6 +176,36 @@ def _by_signal(frame: pd.DataFrame, time: Array) -> list[LogStream]:
     return [_stream(name, "", time[rows], values[rows]) for name, rows in rows_of.items()]
 
 
+def _spread(time: Array, values: pd.DataFrame) -> tuple[Array, int] | None:
+    """Times (rows,) of a clock that is coarser than the rows, each row by its place among those of its time.
+
+    None where most times have one row, or the rows of a time are those of several instruments.
+    """
+    begins = np.flatnonzero(np.diff(time, prepend=np.nan) != 0)
+    counts = np.diff(np.append(begins, len(time)))
+    each = int(np.median(counts[1:-1])) if len(counts) > 2 else 1
+    if each < 2 or not np.isfinite(time).all() or (np.diff(time) < 0).any():
+        return None
+    runs = np.repeat(np.arange(len(counts)), counts)
+    moves = False
+    for _, column in values.select_dtypes("number").items():
+        numbers = column.to_numpy(dtype=float)
+        inside = np.abs(np.diff(numbers))[np.diff(runs) == 0]
+        outside = np.nanmedian(np.abs(np.diff(numbers[begins]))) if np.isfinite(np.diff(numbers[begins])).any() else 0.0
+        inside = inside[np.isfinite(inside)]
+        if len(inside) and np.median(inside) > DOUBLED_STEPS * outside > 0:
+            return None
+        moves = moves or (len(inside) > _MOST * (len(time) - len(counts)) and bool(inside.any()))
+    if not moves:
+        return None
+    steps = np.diff(time[begins])
+    step = float(np.median(steps))
+    lengths = np.append(np.minimum(steps, 2 * step), step)
+    full = np.maximum(counts, each * (np.arange(len(counts)) % (len(counts) - 1) == 0))  # the first and last are cut
+    place = np.arange(len(time)) - begins[runs] + np.where(runs == 0, full[0] - counts[0], 0)
+    return time + place * (lengths / full)[runs], each
+
+
 def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
     """A column with the quantity that its name suggests, unless its unit is of another kind."""
     quantity = quantity_of_name(name)
@@ -158,7 +229,9 @@ def _layout(path: Path) -> tuple[TextLayout, str]:
     return text_layout(path, lines), encoding
 
 
-def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[Array, bool, set[str]]:
+def _time(
+    path: Path, frame: pd.DataFrame, layout: TextLayout, findings: list[LogFinding]
+) -> tuple[Array, bool, set[str]]:
     """Times (rows,), whether they are UTC, and the columns that they are made of."""
     import pandas as pd
 
@@ -166,13 +239,21 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
     dates = [
         name
         for name in frame.columns
-        if _DATE_WORDS.search(_plain(name)) and name not in named and _DATE.match(_first_cell(frame[name]))
+        if _DATE_WORDS.search(_plain(name))
+        and name not in named
+        and (_DATE.match(_first_cell(frame[name])) or _days_of_numbers(frame[name]) is not None)
     ]
     clocks = [name for name in frame.columns if name not in (*named, *dates) and _looks_like_time(frame[name])]
     for name in [*named, *dates, *clocks, *frame.columns[:1]]:
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
             values = column.to_numpy(dtype=float)
+            counted = _stated_count(name, layout) is not None
+            if not counted and name not in dates and (clock := _clock_of_numbers(values)) is not None:
+                if not dates:
+                    continue
+                day = _days(path, dates[0], frame[dates[0]], _zone_s(name, findings))
+                return day + clock, True, {name, dates[0]}
             seconds = _epoch_seconds(name, values, findings)
             if seconds is not None:
                 return seconds, True, {name, *dates}
@@ -188,13 +269,29 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
         if re.match(r"\d{1,4}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d", first):
             return _seconds(_dates(path, name, column), offset), True, {name}
         if dates and re.match(r"\d{1,2}:\d\d", first):
-            days = _seconds(_dates(path, dates[0], frame[dates[0]]), offset)
-            return days + _clock(column), True, {name, dates[0]}
-    for name in [*named, *clocks]:
-        if re.match(r"\d{1,2}:\d\d", _first_cell(frame[name])):
+            return _days(path, dates[0], frame[dates[0]], offset) + _clock(column), True, {name, dates[0]}
+    return _undated_time(path, frame, layout, [named, clocks], findings)
+
+
+def _undated_time(
+    path: Path, frame: pd.DataFrame, layout: TextLayout, columns: list[list[str]], findings: list[LogFinding]
+) -> tuple[Array, bool, set[str]]:
+    """Times (rows,) of a table without a date: of the day, or a count from the beginning; else as :func:`_time`.
+
+    `columns` are those whose names, and those whose cells are of times.
+    """
+    import pandas as pd
+
+    named, clocks = columns
+    for name in [*named, *clocks, *frame.columns[:1]]:
+        column = _as_numbers(frame[name])
+        of_day = _clock(column) if re.match(r"\d{1,2}:\d\d", _first_cell(column)) else None
+        if pd.api.types.is_numeric_dtype(column) and _stated_count(name, layout) is None:
+            of_day = _clock_of_numbers(column.to_numpy(dtype=float))
+        if of_day is not None:
             text = f"{name} has times of day without a date: the trials have no date"
             findings.append(LogFinding("note", text, name))
-            return _over_midnight(_clock(frame[name])), False, {name}
+            return _over_midnight(of_day), False, {name}
     for name in named or list(frame.columns[:1]):
         column = _as_numbers(frame[name])
         if pd.api.types.is_numeric_dtype(column):
@@ -203,17 +300,24 @@ def _time(path: Path, frame: pd.DataFrame, findings: list[LogFinding]) -> tuple[
             if len(steps) and (steps >= 0).mean() > 0.9:
                 text = f"{name} counts from the beginning of the log: the trials have no date"
                 findings.append(LogFinding("note", text, name))
-                return values * _relative_scale(name, values), False, {name}
+                scale = _stated_count(name, layout) or _count_by_motion(name, values, frame, findings)
+                return values * scale, False, {name}
+    problem = "it is no log of a known format, and as a table there is no column of time"
     remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
-    raise InputError(path, "header", "there is no column of time", remedy)
+    raise InputError(path, "header", problem, remedy)
 
 
 def _epoch_seconds(name: str, values: Array, findings: list[LogFinding]) -> Array | None:
     """Seconds (rows,) since 1970 of numbers that count s, ms, us or ns since then, or days; None if they do not."""
-    size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 0.0
+    known = values[np.isfinite(values)]
+    size = float(np.median(np.abs(known))) if len(known) else 0.0
     for least, largest, factor in _EPOCHS:
-        if least <= size <= largest:
+        counts = least <= size <= largest and np.percentile(known, _BEGINNING) >= least
+        if counts and (len(known) < 2 or np.median(np.diff(known)) * factor < _SLOWEST_STEP_S):
             return values * factor
+    moments = _moments_of_numbers(values)
+    if moments is not None:
+        return moments - _zone_s(name, findings)
     for least, largest, day in _DAYS:
         if least <= size <= largest and np.nanmax(values) - np.nanmin(values) < _LONGEST_IN_DAYS:
             return (values - day) * 86400 - _zone_s(name, findings)
@@ -238,16 +342,115 @@ def _first_cell(column: pd.Series[Any]) -> str:
     return next((str(value) for value in column.dropna()[:1]), "")
 
 
-def _relative_scale(name: str, values: Array) -> float:
-    words = _plain(name)
-    for pattern, factor in (
-        (r"\b(ms|msec|milli\w*)\b", 1e-3),
-        (r"\b(us|usec|micro\w*)\b", 1e-6),
-        (r"\b(ns|nano\w*)\b", 1e-9),
-    ):
-        if re.search(pattern, words):
-            return factor
-    return 1.0
+def _stated_count(name: str, layout: TextLayout) -> float | None:
+    """Seconds of the unit in which a column counts by its name or its unit; None where neither says."""
+    words = _plain(f"{name} {layout.units[layout.names.index(name)]}")
+    return next((factor for pattern, factor in _COUNTS if re.search(rf"\b({pattern})\b", words)), None)
+
+
+def _count_by_motion(name: str, values: Array, frame: pd.DataFrame, findings: list[LogFinding]) -> float:
+    """Seconds of the unit in which a column counts, by the speed of the track, or else by the step."""
+    step = float(np.median(np.diff(values[np.isfinite(values)])))
+    if step < _DOUBTFUL_STEP:
+        return 1.0
+    speed = _track_speed(values, frame)
+    if speed is None:
+        if step < _SLOWEST_STEP_S:
+            return 1.0
+        text = f"{name} states no unit, and a row in {step:.4g} s shows no manoeuvre: it is taken to count ms"
+        findings.append(LogFinding("fault", text, name))
+        return 1e-3
+    factor = next((factor for factor in (1.0, 1e-3, 1e-6, 1e-9) if speed > _SLOWEST_MPS * factor), 1.0)
+    if factor < 1:
+        text = f"{name} states no unit; in s the vessel would make {speed:.2g} m/s, so it counts in {factor:g} s"
+        findings.append(LogFinding("note", text, name, {"unit_s": factor}))
+    return factor
+
+
+def _track_speed(values: Array, frame: pd.DataFrame) -> float | None:
+    """Speed of the positions of a table, 95th percentile, m in the unit of its time; None without positions."""
+    columns = {quantity_of_name(name): name for name in frame.columns}
+    for north, east, metres in (("latitude", "longitude", 111_000.0), ("x", "y", 1.0)):
+        if north in columns and east in columns:
+            a, b = (_numbers(frame[columns[name]], False) for name in (north, east))
+            if a is None or b is None:
+                continue
+            shrink = float(np.cos(np.radians(np.nanmedian(a)))) if metres > 1 else 1.0
+            way = metres * np.hypot(np.diff(a), shrink * np.diff(b))
+            step = np.diff(values)
+            good = np.isfinite(way) & (step > 0)
+            return float(np.percentile(way[good] / step[good], 95)) if good.any() else None
+    return None
+
+
+def _clock_of_numbers(values: Array) -> Array | None:
+    """Seconds of the day (rows,) of numbers hhmmss, hhmmsscc or hhmmssmmm, or fractions of a day; None of a count.
+
+    The digits of minutes and seconds of a clock stay below 60, where a count goes on to 99.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < _ROWS_OF_A_SIGNAL or known.min() < 0 or np.ptp(known) == 0:
+        return None
+    if known.max() <= 1:
+        return np.asarray(values * 86400)
+    for scale in (1.0, 1e-2, 1e-3):
+        digits = values * scale
+        seconds, minutes = digits % 100, digits // 100 % 100
+        if known.max() * scale < 240000 and np.nanmax(seconds) < 60 and np.nanmax(minutes) < 60:
+            crosses = np.ptp(known * scale // 100) > 0 and len(np.unique(known * scale % 100 // 1)) >= _CLOCK_DIGITS
+            return np.asarray(digits // 10000 * 3600 + minutes * 60 + seconds) if crosses else None
+    return None
+
+
+def _moments_of_numbers(values: Array) -> Array | None:
+    """Seconds (rows,) since 1970 of numbers yyyymmddhhmmss, with milliseconds or not; None of others."""
+    size = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+    for scale in (1.0, 1e-3):
+        if _FIRST_DAY * 1e6 <= size * scale < _LAST_DAY * 1e6:
+            days = _calendar_days(values * scale // 1e6)
+            clock = _clock_of_numbers(values * scale % 1e6)
+            return None if days is None or clock is None else days + clock
+    return None
+
+
+def _days_of_numbers(column: pd.Series[Any]) -> Array | None:
+    """Seconds (rows,) since 1970 of dates yyyymmdd, ddmmyy (as in NMEA 0183) or yymmdd, or of spreadsheets."""
+    import pandas as pd
+
+    if not pd.api.types.is_numeric_dtype(column):
+        return None
+    values = column.to_numpy(dtype=float)
+    size = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+    least, largest, day = _DAYS[0]
+    if _FIRST_DAY <= size <= _LAST_DAY:
+        return _calendar_days(values)
+    if size > 991299 or size < 10100:
+        return None
+    first, middle, last = values // 10000, values // 100 % 100, values % 100
+    forwards = [first, middle, last] if "yymmdd" in str(column.name).lower() else [last, middle, first]
+    for year, month, date in (forwards, forwards[::-1]):
+        full = year + np.where(year >= TWO_DIGITS_FROM, 1900, 2000)
+        if (days := _calendar_days(full * 10000 + month * 100 + date)) is not None:
+            return days
+    return (values - day) * 86400 if least <= size <= largest else None
+
+
+def _calendar_days(values: Array) -> Array | None:
+    """Seconds (rows,) since 1970 of dates yyyymmdd; None unless all are."""
+    import pandas as pd
+
+    known = np.isfinite(values)
+    text = pd.Series(values[known]).astype(int).astype(str)
+    moments = pd.to_datetime(text, format="%Y%m%d", utc=True, errors="coerce")
+    out = np.full(len(values), np.nan)
+    out[known] = _seconds(moments, 0.0)
+    return out if known.any() and not moments.isna().any() else None
+
+
+def _days(path: Path, name: str, column: pd.Series[Any], offset_s: float) -> Array:
+    """Seconds (rows,) since 1970 of a column of dates in text or numbers."""
+    numbers = _days_of_numbers(column)
+    return _seconds(_dates(path, name, column), offset_s) if numbers is None else numbers - offset_s
 
 
 def _plain(name: str) -> str:
@@ -292,7 +495,9 @@ def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
         raise InputError(
             path, f"column {name}", f"{example!r} may be day/month or month/day", "write dates as ISO 8601"
         )
-    year = parts[order[0]].where(parts[order[0]].str.len() == 4, "20" + parts[order[0]])
+    short = pd.to_numeric(parts[order[0]], errors="coerce")
+    century = short.ge(TWO_DIGITS_FROM).map({True: "19", False: "20"})
+    year = parts[order[0]].where(parts[order[0]].str.len() == 4, century + parts[order[0]])
     joined = year + "-" + parts[order[1]].str.zfill(2) + "-" + parts[order[2]].str.zfill(2)
     clock = _of_24_hours(parts[3].fillna(""))
     joined = joined.where(clock == "", joined + "T" + clock)

@@ -14,6 +14,7 @@ from tank2sim.logs.channel_search import find_channels
 from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
+from tank2sim.logs.missing import without_missing
 from tank2sim.logs.parts import joined_parts
 from tank2sim.logs.pulses import pulses_of
 from tank2sim.logs.quantities import QUANTITIES
@@ -24,6 +25,10 @@ from tank2sim.records.signals.sampling import GAP_STEPS
 
 _GAP_LEAST_S = 3.0
 """Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds."""
+
+LONGEST_VOYAGE_S = 1e7
+"""Longest time that a log may span, s. Project choice: four months; more is a clock that was not set, and the even
+grids of so long a time would exhaust the memory."""
 
 _GAPS_LISTED = 5
 """Gaps of a channel that are listed one by one. Project choice: more are a rate of loss."""
@@ -89,19 +94,14 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     parts = joined_parts(logs)
     findings = [finding for log in parts for finding in log.findings]
     counts: dict[str, dict[str, int]] = {log.path.name: dict(log.counts) for log in logs}
-    streams: list[LogStream] = []
-    for log in parts:
-        repeated = 0
-        for stream in log.streams:
-            tidy, doubled, found_in_time = tidied(stream)
-            repeated += doubled
-            findings += found_in_time
-            tidy, _ = pulses_of(tidy)
-            if len(tidy.values):
-                name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
-                streams.append(replace(tidy, name=name))
-        counts[log.path.name]["repeated_samples"] = repeated
+    streams = _tidied_streams(parts, counts, findings)
     findings = _gathered(findings)
+    span = max((float(s.time_s[-1]) for s in streams), default=0) - min(
+        (float(s.time_s[0]) for s in streams), default=0
+    )
+    if span > LONGEST_VOYAGE_S:
+        problem = f"its times span {span:.3g} s: they are in another unit, or some are wrong"
+        raise InputError(logs[0].path, "", problem, "name the unit in the column of time, or remove the wrong rows")
     if len({log.dated for log in logs}) > 1:
         odd = next(log for log in logs if not log.dated)
         raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
@@ -119,6 +119,9 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
                 )
             stream = named[channel.stream]
             series[channel.quantity] = QuantitySeries(stream.time_s - channel.delay_s, channel.si(stream.values))
+    if not any(len(stream.values) > 1 for stream in streams):
+        remedy = "give a log with values at several times, that rise"
+        raise InputError(logs[0].path, "", "has values at one time alone, or none", remedy)
     if not series:
         problem = "no channel of it is understood"
         remedy = f"say which is what in a channels file (--channels), as docs/logs.md shows: {_listed(named)}"
@@ -131,6 +134,28 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     begin = min(float(entry.time_s[0]) for entry in series.values())
     end = max(float(entry.time_s[-1]) for entry in series.values())
     return Voyage(tuple(logs), found, series, origin, begin, end, tuple(findings), counts)
+
+
+def _tidied_streams(
+    parts: Sequence[VesselLog], counts: dict[str, dict[str, int]], findings: list[LogFinding]
+) -> list[LogStream]:
+    """Streams of all logs with rising times and values alone; what was left out is counted and found."""
+    streams: list[LogStream] = []
+    for log in parts:
+        repeated = 0
+        for stream in log.streams:
+            known, missing = without_missing(stream)
+            tidy, doubled, found_in_time = tidied(known)
+            repeated += doubled
+            findings += [*missing, *found_in_time]
+            tidy, _ = pulses_of(tidy)
+            if stream.quantity and len(stream.values) and not len(tidy.values):
+                findings.append(LogFinding("note", f"{stream.name}: holds no valid value", stream.name))
+            if len(tidy.values):
+                name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
+                streams.append(replace(tidy, name=name))
+        counts[log.path.name]["repeated_samples"] = repeated
+    return streams
 
 
 def _gathered(findings: list[LogFinding]) -> list[LogFinding]:

@@ -26,6 +26,9 @@ _REGULAR = 0.8
 """Share of these rows that must have the usual number of cells. Project choice: a footer and damaged rows are few."""
 _MOSTLY = 0.5
 """Share of numbers from which a row is one of values: logs have dates and words next to them."""
+_LATIN = 0.9
+"""Share of letters of one byte from which text is UTF-16 without its mark. Project choice: names are in any alphabet,
+numbers are not."""
 _UNIT_NUMBERS = ("1/min", "1/s")
 """Units that begin with a digit."""
 
@@ -65,6 +68,10 @@ def decoded_text(data: bytes, *, complete: bool = True) -> tuple[str, str]:
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace"), "utf-16"
+    for zero, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        zeros = data[zero::2]
+        if zeros.count(0) > _LATIN * len(zeros) > 0 and not data[1 - zero :: 2].count(0):
+            return data.decode(encoding, errors="replace"), encoding
     try:
         return data.decode("utf-8-sig"), "utf-8-sig"
     except UnicodeDecodeError as error:
