@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -198,6 +199,77 @@ def read_exact_text(path: Path) -> str:
         raise InputError(path, f"byte {error.start}", "is not UTF-8 text", "save it as UTF-8") from None
     except OSError as error:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+
+
+_DEEPEST = 100
+"""Lists and objects within each other that a file may have. Project choice: ten times as deep as any result, a tenth of
+what ends a recursion."""
+
+
+def refuse_deep(content: object, source: Path | str) -> None:
+    """Refuse a document whose lists and objects are nested so deeply that no function can go through it.
+
+    Raises
+    ------
+    InputError
+        It is nested more than :data:`_DEEPEST` deep.
+    """
+    level = [content]
+    for _ in range(_DEEPEST):
+        inner = [each.values() if isinstance(each, dict) else each for each in level if isinstance(each, dict | list)]
+        if not inner:
+            return
+        level = [item for items in inner for item in items]
+    raise InputError(source, "", f"is nested more than {_DEEPEST} deep", "write it without so many brackets")
+
+
+def parsed_json(text: str, source: Path | str, remedy: str) -> Any:
+    """The content of a JSON text that a user gave; `remedy` says what to give.
+
+    Raises
+    ------
+    InputError
+        It is not JSON, is nested too deeply, or holds what no page or file can: half of a character.
+    """
+    try:
+        content = json.loads(text)
+        refuse_deep(content, source)
+        json.dumps(content, ensure_ascii=False).encode()
+    except json.JSONDecodeError as error:
+        raise InputError(source, f"line {error.lineno}", f"is not JSON ({error.msg})", remedy) from None
+    except UnicodeEncodeError:
+        problem = "holds half of a character (a lone surrogate, \\ud800 to \\udfff)"
+        raise InputError(source, "", problem, remedy) from None
+    except RecursionError:
+        raise InputError(source, "", "is nested too deeply", remedy) from None
+    except ValueError:
+        raise InputError(source, "", "is not JSON: an integer has thousands of digits", remedy) from None
+    return content
+
+
+@contextmanager
+def named_in(source: Path | str, file: Path) -> Iterator[None]:
+    """While a file is read because another one, `source`, names it: a refusal does not quote a foreign file.
+
+    Who writes a campaign or a card may name any file of this machine; what is in one outside the folder of `source` is
+    not shown. The message has the name and the line.
+
+    Raises
+    ------
+    InputError
+        As raised within, without what it quotes if the file is foreign; or the file is a device or a pipe.
+    """
+    if file.exists() and not file.is_file():
+        raise InputError(file, "", f"is not a file, and {source} names it", "name a file")
+    try:
+        yield
+    except InputError as fault:
+        if file.resolve().is_relative_to(Path(source).parent.resolve()) or not file.is_file():
+            raise
+        line = re.match(r"line \d+", fault.place)
+        problem = f"cannot be used; it is outside the folder of {source}, which names it, and is not quoted here"
+        remedy = "put a copy into that folder to see what is wrong with it"
+        raise InputError(file, line[0] if line else "", problem, remedy) from None
 
 
 def writable_folder(path: Path) -> Path:

@@ -37,12 +37,12 @@ def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) ->
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [('{"name": 1}', "is not a result"), ("{", "is not JSON"), ("\xff", "is not JSON"), (None, "cannot be read")],
+    [('{"name": 1}', "is not a result"), ("{", "is not JSON"), ("\xff", "is not UTF-8"), (None, "does not exist")],
 )
 def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path, text: str | None, said: str) -> None:
     if text is not None:
         (tmp_path / "x.json").write_text(text, encoding="latin-1")
-    refused(tank2sim("report", "x.json", "-o", "x.html", cwd=tmp_path), "x.json", said, "--json")
+    refused(tank2sim("report", "x.json", "-o", "x.html", cwd=tmp_path), "x.json", said)
     assert not (tmp_path / "x.html").exists()
 
 

@@ -23,6 +23,7 @@ import click
 
 from tank2sim import __version__
 from tank2sim.errors import InputError, close_name
+from tank2sim.escaping import one_line
 from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
@@ -114,6 +115,7 @@ def tank2sim(ctx: click.Context) -> None:
 
 def main() -> None:
     """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
+    _open_closed_streams()
     keep_freed_memory()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, so that nothing is left half-written
     with warnings.catch_warnings():
@@ -127,6 +129,20 @@ def main() -> None:
         code = code or _unwritable(error)
         _silence()
     sys.exit(code)
+
+
+def _open_closed_streams() -> None:
+    """Give a process that was started without standard streams (``>&-``) ones that go nowhere.
+
+    The next file that it opened would else be standard output, and what is printed would be written into it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8"))
 
 
 def _run() -> int:
@@ -183,5 +199,6 @@ def _unwritable(error: OSError) -> int:
 
 
 def _refuse(message: str, code: int = 2) -> int:
-    print(f"tank2sim: {' '.join(message.split())}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # the error stream may be full or closed: the exit code still says it
+        print(f"tank2sim: {one_line(message)}", file=sys.stderr)
     return code

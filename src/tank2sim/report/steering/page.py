@@ -16,8 +16,9 @@ from markupsafe import Markup
 from tank2sim import __version__
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
+from tank2sim.escaping import json_in_html
 from tank2sim.fmu.interface import interface
-from tank2sim.report.kit.page import json_in_html, resource_text
+from tank2sim.report.kit.page import resource_text
 from tank2sim.report.steering.ghost import Ghost
 from tank2sim.report.steering.members import NO_COVARIANCE
 from tank2sim.report.steering.scenario import Scenario
