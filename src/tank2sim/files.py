@@ -57,8 +57,8 @@ def write_together(
     Raises
     ------
     InputError
-        One of the targets is an input, is given twice or is a folder, or its folder is missing or cannot be written;
-        then nothing has been written.
+        One of the targets is an input, is given twice or is a folder, or its folder is missing or cannot be written,
+        or its name ends like a file of another kind; then nothing has been written.
     """
     targets = [_target(path if isinstance(path, Path) else Path(path)) for path in contents]
     _refuse_doubled(targets)
@@ -69,6 +69,8 @@ def write_together(
     try:
         for target, content in zip(targets, contents.values(), strict=True):
             data = content.encode("utf-8") if isinstance(content, str) else content
+            if target.replaceable:
+                refuse_other_ending(target.given, _endings_of(data))
             if target.replaceable:
                 ready.append((_temporary(target, data), target))
             else:
@@ -296,6 +298,47 @@ def _umask() -> int:
     value = os.umask(0)
     os.umask(value)
     return value
+
+
+PAGE, PICTURE, CARD, TABLE, JSON = (".html", ".htm"), (".png", ".svg", ".pdf"), (".toml",), (".csv", ".txt"), (".json",)
+FMU, SYSTEM, MATLAB, PYTHON, MODEL = (".fmu",), (".ssp",), (".m",), (".py",), (".sdf", ".xml", ".world")
+"""How the names of files of each kind end. Any other ending, and none, is taken for any kind."""
+
+_TEXTS = {*CARD, *TABLE, *MATLAB, *PYTHON, *MODEL}
+_ENDINGS = {*PAGE, *PICTURE, *JSON, *FMU, *SYSTEM, *_TEXTS, ".zip", ".xlsx", ".jpg", ".jpeg", ".gif"}
+_BEGINNINGS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
+    (rb"\x89PNG", (".png",)),
+    (rb"%PDF-", (".pdf",)),
+    (rb"<svg", (".svg",)),
+    (rb"PK\x03\x04", (*FMU, *SYSTEM, ".zip")),
+    (rb"(?i)<!doctype html", PAGE),
+    (rb"\{", JSON),
+    (rb"<", MODEL),
+    (rb"function \[", MATLAB),
+    (rb'"""', PYTHON),
+    (rb"""(?:[^\n]*\n)*?format = ["']tank2sim-""", CARD),
+)
+"""How contents begin, and how the names of their files end."""
+
+
+def refuse_other_ending(path: Path, endings: Iterable[str]) -> None:
+    """Refuse a name that ends as files of another kind do.
+
+    Raises
+    ------
+    InputError
+        It ends like a known kind of file, and none of `endings`; those that are possible are named.
+    """
+    ending, possible = path.suffix.lower(), list(endings)
+    if ending in _ENDINGS and ending not in possible:
+        remedy = f"let its name end in {' or '.join(possible)}" if possible else "give the name of a folder"
+        raise InputError(path, "", f"ends in {ending}, and something else is written there", remedy)
+
+
+def _endings_of(content: bytes) -> Iterable[str]:
+    """Endings of the names of files with this content."""
+    head = content[:4096].removeprefix(BYTE_ORDER_MARK.encode()).lstrip()
+    return next((endings for begins, endings in _BEGINNINGS if re.match(begins, head)), sorted(_TEXTS))
 
 
 SCHEMA_VERSION = 1

@@ -272,7 +272,7 @@ def test_an_fmu_bounds_its_states_by_the_number_of_the_simulation(hull: Model, m
     ],
     ids=["empty", "text", "without its functions"],
 )
-@pytest.mark.parametrize("from_the_start", [True, False])
+@first_fast("from_the_start", [True, False])
 def test_a_library_that_does_not_work_is_not_exported(
     text: str, from_the_start: bool, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -131,7 +131,7 @@ class Result(ABC):
         return {}
 
     def plot(self, path: str | Path | None = None, name: str | None = None) -> alt.TopLevelMixin:
-        """One chart of the result (Altair), also written to `path` as PNG.
+        """One chart of the result (Altair), also written to `path` as PNG, SVG or PDF, by its ending.
 
         Parameters
         ----------
@@ -153,14 +153,14 @@ class Result(ABC):
             )
         chart = charts[name] if name is not None else next(iter(charts.values()))
         if path is not None:
-            write_together({Path(path): self.picture(name)})
+            write_together({Path(path): self.picture(name, ending=Path(path).suffix)})
         return chart
 
-    def picture(self, name: str | None = None) -> bytes:
-        """One chart of the result as PNG."""
-        from tank2sim.report.kit.charts import chart_png
+    def picture(self, name: str | None = None, *, ending: str = ".png") -> bytes:
+        """One chart of the result as PNG, or as SVG or PDF if that is the `ending` of its file's name."""
+        from tank2sim.report.kit.charts import chart_picture
 
-        return chart_png(self.plot(name=name))
+        return chart_picture(self.plot(name=name), ending)
 
     def layout(self) -> Page:
         """Return sections, tables and charts of the page, made from :meth:`to_dict` alone.

@@ -10,9 +10,10 @@ from tank2sim.analysis.heading.designs import DESIGNS
 from tank2sim.analysis.heading.study import LARGEST_CHANGE_DEG
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_option, set_option
+from tank2sim.cli.options import OutputFile, page_option, plot_option, set_option
 from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
+from tank2sim.files import FMU
 
 _POSITIVE = click.FloatRange(min=0, min_open=True)
 _NOT_NEGATIVE = click.FloatRange(min=0)
@@ -35,7 +36,7 @@ _CHANGE = click.FloatRange(-LARGEST_CHANGE_DEG, LARGEST_CHANGE_DEG)
 @click.option("--wave-yaw", type=_NOT_NEGATIVE, metavar="DEG", help="Yawing by waves, standard deviation.")
 @click.option("--seed", type=click.IntRange(0), metavar="N", help="Seed of the waves.")
 @click.option("--track", type=click.Path(path_type=Path), metavar="FILE.csv", help="Also keep a track: x_m,y_m.")
-@click.option("--export", type=click.Path(path_type=Path), metavar="AP.fmu", help="Write the controller as an FMU.")
+@click.option("--export", type=OutputFile(FMU), metavar="AP.fmu", help="Write the controller as an FMU.")
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version of FMI.")
 @click.option("--verify", is_flag=True, help="With --export: co-simulate it with the ship's FMU, against one model.")
 @page_option("-o")

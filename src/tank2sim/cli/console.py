@@ -15,7 +15,7 @@ from rich.table import Table
 from tank2sim.api.result import Result, cell_text
 from tank2sim.errors import InputError
 from tank2sim.escaping import file_name, one_line
-from tank2sim.files import STANDARD_OUTPUT, writable_folder, write_together
+from tank2sim.files import JSON, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
 from tank2sim.marks import marked
 
 screen = Console(highlight=False)
@@ -28,6 +28,8 @@ _WIDEST = 1000
 def _standard_output(context: click.Context, parameter: click.Parameter, given: Path | None) -> Path | None:
     if given != Path("-"):
         screen.stderr = False
+        if given:
+            refuse_other_ending(given, JSON)
         return given
     if sys.__stdout__ is None:
         raise InputError("--json", "-", "standard output is closed", "give the name of a file")
@@ -104,7 +106,7 @@ def write_result(
     inputs : paths
         Files that must not be overwritten.
     json_file, page, plot : Path, optional
-        JSON, page (HTML) and main chart (PNG).
+        JSON, page (HTML) and main chart (PNG, SVG or PDF by its ending).
     plots : Path, optional
         Folder for a picture of each chart, and the page as ``report.html``.
     files : mapping or sequence of pairs, optional
@@ -122,7 +124,7 @@ def write_result(
     if page:
         contents[page] = result.page()
     if plot:
-        contents[plot] = result.picture()
+        contents[plot] = result.picture(ending=plot.suffix)
     if plots:
         writable_folder(plots)
         contents |= {plots / f"{file_name(name)}.png": result.picture(name) for name in result.charts()}

@@ -11,7 +11,7 @@ from tank2sim.api.gap_files import folder_made, put, refuse_early
 from tank2sim.api.trial import trial_files
 from tank2sim.bundled import bundled_cards
 from tank2sim.cli.console import json_option, screen, show_notices, show_result
-from tank2sim.cli.options import executor_option
+from tank2sim.cli.options import OutputFile, executor_option
 from tank2sim.cli.progress import showing_stages
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
@@ -33,7 +33,7 @@ from tank2sim.gap.workflow import MOST_EFFECTS
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path),
+    type=OutputFile(()),
     metavar="DIR",
     help="Folder for gap.json, improved.toml, report.html, next_test.csv and corrected/.",
 )

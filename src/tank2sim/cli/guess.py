@@ -9,7 +9,8 @@ import click
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.api.guess import guess as guess_a_ship
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import page_option
+from tank2sim.cli.options import OutputFile, page_option
+from tank2sim.files import CARD
 
 
 @click.command("guess")
@@ -28,7 +29,7 @@ from tank2sim.cli.options import page_option
 @click.option("--name", default="guessed ship", show_default=True, help="Name of the ship on the card.")
 @click.option("--members", type=click.IntRange(100, 1_000_000), default=DEFAULT_MEMBERS, show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the members.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the card.")
 @page_option()
 @json_option
 def command(

@@ -13,10 +13,11 @@ from tank2sim.api.ship import Ship, load
 from tank2sim.api.trial import trial_files
 from tank2sim.cards import CraftCard
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import executor_option, page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, executor_option, page_option, plot_folder_option
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
+from tank2sim.files import CARD
 from tank2sim.identification.trials.identify import BY_RESIDUALS, TRIAL_METHODS
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
@@ -72,7 +73,7 @@ def _of_craft(
     metavar="TRIAL...",
     help="Compare with these; do not fit them.",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card found.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the card found.")
 @click.option(
     "--method",
     type=click.Choice(TRIAL_METHODS),

@@ -11,6 +11,7 @@ import click
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.cli.overrides import parse_changes
 from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
+from tank2sim.files import PAGE, PICTURE, refuse_other_ending
 
 Command = Callable[..., Any]
 
@@ -29,15 +30,33 @@ set_option = click.option(
 )
 """``--set KEY=VALUE``: values by dotted key."""
 
+
+class OutputFile(click.Path):
+    """A file to be written, whose name ends as files of its kind do (:mod:`tank2sim.files`); a folder has no ending."""
+
+    def __init__(self, endings: Sequence[str], **more: Any) -> None:
+        super().__init__(path_type=Path, **more)
+        self.endings = endings
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As of any parameter. Raises InputError if the name ends as files of another kind do."""
+        path = super().convert(value, param, ctx)
+        refuse_other_ending(path, self.endings)
+        return path
+
+
 plot_option = click.option(
-    "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.png", help="Draw the main chart."
+    "--plot",
+    type=OutputFile(PICTURE, dir_okay=False),
+    metavar="FILE.png",
+    help="Draw the main chart: .png, .svg or .pdf.",
 )
 """``--plot FILE.png``."""
 
 plot_folder_option = click.option(
     "--plot",
     "plots",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFile((), file_okay=False),
     metavar="DIR",
     help="Write a picture of each chart, and the page (report.html), into a folder.",
 )
@@ -55,7 +74,7 @@ executor_option = click.option(
 
 def page_option(*names: str) -> Callable[[Command], Command]:
     """``--page FILE.html``, and other names of it where the page is the main result."""
-    path = click.Path(path_type=Path, dir_okay=False)
+    path = OutputFile(PAGE, dir_okay=False)
     return click.option(*names, "--page", "page", type=path, metavar="FILE.html", help="Write the page.")
 
 

@@ -9,7 +9,8 @@ import click
 
 from tank2sim.api.captive_run import TYPE_NAMES, ForceConvention, reduce_runs
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, page_option, plot_folder_option
+from tank2sim.files import TABLE
 
 
 @click.command("run")
@@ -34,13 +35,13 @@ from tank2sim.cli.options import page_option, plot_folder_option
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(TABLE, dir_okay=False),
     metavar="HARMONICS.csv",
     help="Write the Fourier coefficients.",
 )
 @click.option(
     "--cycle",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(TABLE, dir_okay=False),
     metavar="CYCLE.csv",
     help="Write the averaged cycle of the first run.",
 )

@@ -12,8 +12,9 @@ from tank2sim.api.ship import load
 from tank2sim.api.yaw import CONTROLLERS, YawResult, simulate_yaw
 from tank2sim.api.yaw import yaw as identify_yaw
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, page_option, plot_folder_option
 from tank2sim.errors import InputError
+from tank2sim.files import CARD
 from tank2sim.identification.yaw.card import BEST
 from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
@@ -71,7 +72,7 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
     help="Also (7)-(9) for length, beam, draught, depth in m, block coefficient; or a CARD.",
 )
 @click.option("--length-m", type=_POSITIVE, metavar="L", help="Length of the model; else as the records say.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the card.")
 @page_option()
 @plot_folder_option
 @json_option
