@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
@@ -186,6 +187,7 @@ def make_fmu_file(
     return ExportResult(ship, path, made, ssp, files, osp_notices(model) if osp else ())
 
 
+@checked
 def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import PagedResult, Result, ResultTable
 from tank2sim.files import parsed_json, plain_json, read_text, refuse_deep, write_together
 from tank2sim.marks import marked
@@ -78,6 +79,7 @@ class ReportResult(PagedResult):
         return self._layout
 
 
+@checked
 def make_report(result: Result | Mapping[str, object] | str | Path, path: str | Path | None = None) -> ReportResult:
     """Make the page of a result.
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from tank2sim.api.bounds import checked
 from tank2sim.files import json_text, plain_json, schema_name, write_together
 from tank2sim.marks import marked
 
@@ -113,6 +114,7 @@ class Result(ABC):
         plain: dict[str, object] = plain_json({"schema": self.schema, **self.content()})
         return plain
 
+    @checked
     def to_json(self, path: str | Path | None = None, **keys: object) -> str:
         """Return the result as JSON text, also written to `path`; `keys` are added at its end.
 
@@ -130,6 +132,7 @@ class Result(ABC):
         """Charts of the result by name, the main one first; empty where the command draws none."""
         return {}
 
+    @checked
     def plot(self, path: str | Path | None = None, name: str | None = None) -> alt.TopLevelMixin:
         """One chart of the result (Altair), also written to `path` as PNG, SVG or PDF, by its ending.
 
@@ -180,6 +183,7 @@ class Result(ABC):
 
         return render_page(self.layout())
 
+    @checked
     def to_html(self, path: str | Path) -> None:
         """Write :meth:`page` to a file."""
         write_together({Path(path): self.page()})

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 from pydantic import ValidationError
 from tomlkit.exceptions import TOMLKitError
@@ -161,7 +162,11 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
             table = table[section]
             if not isinstance(table, dict | list):
                 raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
-        table[last] = value
+        try:
+            table[last] = value.item() if isinstance(value, np.generic) else value
+        except (TypeError, ValueError):
+            problem = f"cannot be a value of the type {type(value).__name__}"
+            raise InputError(source, key, problem, "give a number, a text or a list of numbers") from None
         if comment is not None and not isinstance(table, tomlkit.items.InlineTable):  # {...} cannot hold comments
             table[last].comment(one_line(comment))
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from tank2sim.api.bounds import ENSEMBLE, Seed, bounds_of
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.cli.overrides import parse_changes
 from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
@@ -29,6 +30,15 @@ set_option = click.option(
     help="A value in place of the card's, by dotted key: derivatives.Yv=-0.012.",
 )
 """``--set KEY=VALUE``: values by dotted key."""
+
+
+def number(kind: Any) -> click.ParamType:
+    """The type of an option that has the bounds of a type of :mod:`tank2sim.api.bounds`."""
+    bounds = bounds_of(kind)
+    assert bounds is not None
+    if bounds.whole:
+        return click.IntRange(int(bounds.low or 0), None if bounds.high is None else int(bounds.high))
+    return click.FloatRange(bounds.low, bounds.high, min_open=bounds.above)
 
 
 class OutputFile(click.Path):
@@ -93,14 +103,14 @@ def ensemble_options(command: Command) -> Command:
         click.option(
             "--ensemble",
             "members",
-            type=_NumberOfShips(2, 10_000_000),
+            type=_NumberOfShips(2, int(ENSEMBLE.high or 0)),
             is_flag=False,
             flag_value=DEFAULT_MEMBERS,
             metavar="N",
             help="Also N ships drawn from the card's errors and their covariance, 2000 if N is left out: bands (5, 50, "
             "95 %).",
         ),
-        click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the ensemble."),
+        click.option("--seed", type=number(Seed), default=0, show_default=True, help="Seed of the ensemble."),
         executor_option,
     )
     for option in reversed(options):

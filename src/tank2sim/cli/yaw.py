@@ -8,11 +8,12 @@ from typing import get_args
 
 import click
 
+from tank2sim.api.bounds import NotNegative, Percent, Positive
 from tank2sim.api.ship import load
 from tank2sim.api.yaw import CONTROLLERS, YawResult, simulate_yaw
 from tank2sim.api.yaw import yaw as identify_yaw
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import OutputFile, page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.errors import InputError
 from tank2sim.files import CARD
 from tank2sim.identification.yaw.card import BEST
@@ -20,7 +21,7 @@ from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.records.yaw import Medium, read_yaw_record
 
-_POSITIVE = click.FloatRange(min=0, min_open=True)
+_POSITIVE = number(Positive)
 
 
 @click.command("yaw")
@@ -39,9 +40,9 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
     metavar="L,B,R,T",
     help="Simulate a ship's motion at model size: length, beam in m, yaw rate in deg/min, s.",
 )
-@click.option("--noise", "noise_A", type=click.FloatRange(min=0), default=0.0, help="Of the simulated current, A.")
+@click.option("--noise", "noise_A", type=number(NotNegative), default=0.0, help="Of the simulated current, A.")
 @click.option("--inertia-kgm2", type=_POSITIVE, metavar="J", help="J_zz of body and rotor; else from records in air.")
-@click.option("--inertia-error-kgm2", type=click.FloatRange(min=0), help="Its standard error.")
+@click.option("--inertia-error-kgm2", type=number(NotNegative), help="Its standard error.")
 @click.option(
     "--torque-constant",
     "torque_constant_NmpA",
@@ -57,7 +58,7 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
 )
 @click.option(
     "--mirror-percent",
-    type=click.FloatRange(0, 1000),
+    type=number(Percent),
     default=25.0,
     show_default=True,
     help="Largest difference of mirror images, % of the largest rate.",
