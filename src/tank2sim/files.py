@@ -313,7 +313,7 @@ _BEGINNINGS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
     (rb"PK\x03\x04", (*FMU, *SYSTEM, ".zip")),
     (rb"(?i)<!doctype html", PAGE),
     (rb"\{", JSON),
-    (rb"<", MODEL),
+    (rb"<", (*MODEL, *PAGE, ".svg")),
     (rb"function \[", MATLAB),
     (rb'"""', PYTHON),
     (rb"""(?:[^\n]*\n)*?format = ["']tank2sim-""", CARD),

@@ -18,6 +18,7 @@ from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
 from tank2sim.cli.options import number
 from tank2sim.gap.workflow import MOST_EFFECTS
+from tests.cli.command_line import refused, tank2sim
 
 SHIP = t2s.load("mariner")
 GUESSED = {"length_m": 320, "beam_m": 58, "draught_m": 20.8, "block": 0.81, "speed_kn": 15.5}
@@ -213,3 +214,22 @@ def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
         for option in command.params:
             if "--seed" in option.opts:
                 assert isinstance(option.type, click.IntRange) and option.type.min == 0, name
+
+
+@pytest.mark.parametrize(
+    "arguments, option",
+    [
+        ("simulate mariner --manoeuvre turn:35 --duration nan", "--duration"),
+        ("simulate mariner --manoeuvre turn:35 --ensemble 9999999999", "--ensemble"),
+        ("stability mariner --speed nan", "--speed"),
+        ("autopilot mariner --wave-filter nan", "--wave-filter"),
+        ("design mariner --carriage-length nan", "--carriage-length"),
+        ("identify mariner x.csv --piece -3", "--piece"),
+        ("guess --length nan --beam 1 --draught 1 --block 1 --speed 1", "--length"),
+        ("convert mariner --to abkowitz --origin inf -o x.toml", "--origin"),
+    ],
+)
+def test_the_command_line_calls_an_argument_by_its_option(arguments: str, option: str, tmp_path: Path) -> None:
+    done = tank2sim(*arguments.split(), cwd=tmp_path)
+    assert option in done.stderr and not list(tmp_path.iterdir())
+    refused(done)

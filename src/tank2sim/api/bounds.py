@@ -14,7 +14,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar, Union, get_args, get_orig
 
 import numpy as np
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -58,12 +58,12 @@ class Bounds:
         if isinstance(number, float) and self.whole and number.is_integer():
             number = int(number)
         if not isinstance(number, int if self.whole else int | float) or isinstance(number, bool):
-            raise InputError(name, "", f"is {_short(value)}", f"give {self.words}")
+            raise ArgumentError(name, "", f"is {_short(value)}", f"give {self.words}")
         assert isinstance(number, int | float)
         low, high = self.low, self.high
         too_low = low is not None and (number <= low if self.above else number < low)
         if too_low or (high is not None and number > high) or not _finite(number):
-            raise InputError(name, "", f"is {_short(value)}", f"give {self.words}")
+            raise ArgumentError(name, "", f"is {_short(value)}", f"give {self.words}")
         return number
 
 
@@ -156,7 +156,7 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
         for part in get_args(kind):
             try:
                 return _as_kind(name, value, part)
-            except InputError as fault:
+            except ArgumentError as fault:
                 faults.append(fault)
         raise next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
     if (bounds := bounds_of(kind)) is not None and get_origin(kind) is Annotated:
@@ -167,7 +167,9 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
     if not _is_a(value, origin):
         called = getattr(origin, "__name__", str(origin))
         words = {"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"}
-        raise InputError(name, "", f"is {_short(value)}", f"give {words.get(called, f'a value of the type {called}')}")
+        raise ArgumentError(
+            name, "", f"is {_short(value)}", f"give {words.get(called, f'a value of the type {called}')}"
+        )
     if origin is Sequence and parts and isinstance(value, list | tuple):
         return type(value)(_as_kind(name, item, parts[0]) for item in value)
     if origin is Mapping and parts:

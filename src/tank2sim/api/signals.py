@@ -168,7 +168,7 @@ class SignalsResult(Result):
 @checked
 def signals(
     trials: TrialPaths,
-    columns: Sequence[str] = (),
+    columns: str | Sequence[str] = (),
     *,
     max_gap_s: Positive | None = None,
     segment_s: Positive | None = None,

@@ -22,7 +22,7 @@ from typing import Any
 import click
 
 from tank2sim import __version__
-from tank2sim.errors import InputError, close_name
+from tank2sim.errors import ArgumentError, InputError, close_name
 from tank2sim.escaping import one_line
 from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
@@ -91,6 +91,15 @@ class _Commands(click.Group):
         command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """As of any group; a fault of an argument of the API is called by the option that sets it."""
+        try:
+            return super().invoke(ctx)
+        except ArgumentError as fault:
+            command = self.get_command(ctx, ctx.invoked_subcommand or "")
+            option = _option_of(command, fault.source) if command else fault.source
+            raise InputError(option, fault.place, fault.problem, fault.remedy) from None
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -98,6 +107,18 @@ class _Commands(click.Group):
             remedy = close_name(args[0], COMMANDS)
             raise click.UsageError(f"{args[0]!r} is not a command; {remedy}", ctx)
         return super().resolve_command(ctx, args)
+
+
+def _option_of(command: click.Command, argument: str) -> str:
+    """The option of a command that sets an argument, whose name may have a unit: ``--duration`` of ``duration_s``."""
+    named = [(name, param.opts[0]) for param in command.params for name in _names(param)]
+    found = [(name, option) for name, option in named if argument == name or argument.startswith(f"{name}_")]
+    return max(found, key=lambda pair: len(pair[0]), default=("", argument))[1]
+
+
+def _names(param: click.Parameter) -> list[str]:
+    """Names of a parameter as arguments have them."""
+    return [param.name or "", *(option.lstrip("-").replace("-", "_").lower() for option in param.opts)]
 
 
 @click.group(

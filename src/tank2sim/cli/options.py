@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ set_option = click.option(
 """``--set KEY=VALUE``: values by dotted key."""
 
 
-def number(kind: Any) -> click.ParamType:
+def number(kind: Any) -> click.IntRange | click.FloatRange:
     """The type of an option that has the bounds of a type of :mod:`tank2sim.api.bounds`."""
     bounds = bounds_of(kind)
     assert bounds is not None
@@ -50,7 +51,7 @@ class OutputFile(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """As of any parameter. Raises InputError if the name ends as files of another kind do."""
-        path = super().convert(value, param, ctx)
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
         refuse_other_ending(path, self.endings)
         return path
 

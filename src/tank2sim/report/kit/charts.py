@@ -81,7 +81,12 @@ def chart_picture(chart: alt.TopLevelMixin, ending: str = ".png") -> bytes:
     """
     import vl_convert
 
-    how = {"vl_version": VEGALITE_VERSION, "config": LIGHT, "format_locale": LOCALE, "allowed_base_urls": []}
+    how: dict[str, Any] = {
+        "vl_version": VEGALITE_VERSION,
+        "config": LIGHT,
+        "format_locale": LOCALE,
+        "allowed_base_urls": [],
+    }
     specification = chart_specification(chart)
     match ending.lower():
         case ".svg":
