@@ -22,6 +22,7 @@ from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.escaping import json_in_html
 from tank2sim.fmu.export import description_text
 from tank2sim.fmu.osp import osp_system
+from tank2sim.report.steering.page import PageShip, steering_page
 from tests.cli.command_line import tank2sim
 from tests.hostile_text import HOSTILE, TOGETHER, Outline, hostile_card
 from tests.marks import first_fast
@@ -197,13 +198,17 @@ def _diagrams(ship: t2s.Ship) -> Iterator[tuple[str, str]]:
     yield "autopilot", ship.autopilot().page()
 
 
+def _waters(ship: t2s.Ship) -> Iterator[tuple[str, str]]:
+    yield "steer", steering_page(PageShip(model=ship.model, library="AA=="), notices=[ship.name])
+
+
 def _sheets(ship: t2s.Ship) -> Iterator[tuple[str, str]]:
     yield "poster", ship.poster().page()
     yield "pilot card", ship.pilot_card().page()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pages", [_pages, _diagrams, _sheets])
+@pytest.mark.parametrize("pages", [_pages, _diagrams, _waters, _sheets])
 def test_a_page_has_the_same_elements_and_its_data_are_json(
     pages: Callable[[t2s.Ship], Iterator[tuple[str, str]]], made: Made
 ) -> None:
