@@ -253,11 +253,11 @@ def test_pictures_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.Monke
         def charts(self) -> dict[str, object]:
             return dict.fromkeys(["../../MARK", "/MARK", "10/10 zigzag", "a\nb", ".."])
 
-        def picture(self, name: str | None = None) -> bytes:
-            return b"PNG"
+        def picture(self, name: str | None = None, *, ending: str = ".png") -> bytes:
+            return b"\x89PNG"
 
         def page(self) -> str:
-            return ""
+            return "<!doctype html>"
 
     folder = tmp_path / "a" / "b"
     folder.parent.mkdir()

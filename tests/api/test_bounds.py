@@ -13,7 +13,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim import memory
-from tank2sim.api.bounds import Angle, Bounds, Count, Effects, Seed, Speed, bounds_of, checked
+from tank2sim.api.bounds import AngleArgument, ArgumentBounds, Count, Effects, Seed, SpeedArgument, bounds_of, checked
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
 from tank2sim.cli.options import number
@@ -116,20 +116,23 @@ def test_what_is_out_of_bounds_is_refused_by_name(call: Callable[[], object], na
 
 def test_numbers_of_numpy_and_whole_floats_are_taken() -> None:
     assert SHIP.turn(np.float32(35), duration_s=np.int64(20), members=np.int32(0)).words == "turn:35"
-    assert Bounds(0, whole=True).checked("x", 2000.0) == 2000 and Bounds(1, 5).checked("x", np.float64(5)) == 5.0
-    assert type(Bounds(0, whole=True).checked("x", np.int8(3))) is int
+    assert (
+        ArgumentBounds(0, whole=True).checked("x", 2000.0) == 2000
+        and ArgumentBounds(1, 5).checked("x", np.float64(5)) == 5.0
+    )
+    assert type(ArgumentBounds(0, whole=True).checked("x", np.int8(3))) is int
 
 
 @pytest.mark.parametrize(
     "bounds, within, beyond",
     [
-        (Bounds(0, above=True), [1e-300, 1e300], [0, -1e-300]),
-        (Bounds(0), [0, 0.0, 1], [-1e-300]),
-        (Bounds(-2, 3), [-2, 3], [-2.0001, 3.0001]),
-        (Bounds(2, 10, whole=True), [2, 10], [1, 11, 2.5]),
+        (ArgumentBounds(0, above=True), [1e-300, 1e300], [0, -1e-300]),
+        (ArgumentBounds(0), [0, 0.0, 1], [-1e-300]),
+        (ArgumentBounds(-2, 3), [-2, 3], [-2.0001, 3.0001]),
+        (ArgumentBounds(2, 10, whole=True), [2, 10], [1, 11, 2.5]),
     ],
 )
-def test_bounds_hold_at_their_ends(bounds: Bounds, within: list[float], beyond: list[float]) -> None:
+def test_bounds_hold_at_their_ends(bounds: ArgumentBounds, within: list[float], beyond: list[float]) -> None:
     assert [bounds.checked("x", value) for value in within] == within
     for value in beyond:
         with pytest.raises(t2s.InputError, match="x: is"):
@@ -139,9 +142,9 @@ def test_bounds_hold_at_their_ends(bounds: Bounds, within: list[float], beyond: 
 def test_a_function_is_checked_by_its_annotations() -> None:
     @checked
     def asked(
-        angle: Angle,
+        angle: AngleArgument,
         *,
-        speed: Speed | None = None,
+        speed: SpeedArgument | None = None,
         texts: Sequence[str] = (),
         numbers: Mapping[str, float] | None = None,
         path: str | Path = "",
@@ -203,8 +206,8 @@ def test_a_rudder_that_looks_like_radians_is_doubted_in_the_first_line(
 
 
 def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
-    assert bounds_of(Effects) == Bounds(1, MOST_EFFECTS, whole=True)
-    for kind in (Seed, Count, Speed, Effects):
+    assert bounds_of(Effects) == ArgumentBounds(1, MOST_EFFECTS, whole=True)
+    for kind in (Seed, Count, SpeedArgument, Effects):
         bounds, option = bounds_of(kind), number(kind)
         assert bounds is not None and isinstance(option, click.IntRange | click.FloatRange)
         assert (option.min, option.max, option.min_open) == (bounds.low, bounds.high, bounds.above)

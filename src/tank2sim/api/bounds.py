@@ -21,7 +21,7 @@ _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
-class Bounds:
+class ArgumentBounds:
     """Lowest and highest value of a number; without one there is none.
 
     Parameters
@@ -84,33 +84,39 @@ def _short(value: object) -> str:
 
 
 # What a number is, in the annotations of functions; its unit is that of the parameter's name.
-Number = Annotated[float, Bounds()]
-Positive = Annotated[float, Bounds(0, above=True)]
-NotNegative = Annotated[float, Bounds(0)]
-Angle = Annotated[float, Bounds(-360, 360)]
-Speed = Annotated[float, Bounds(0, 100, above=True)]
+NumberArgument = Annotated[float, ArgumentBounds()]
+PositiveArgument = Annotated[float, ArgumentBounds(0, above=True)]
+NonNegativeArgument = Annotated[float, ArgumentBounds(0)]
+AngleArgument = Annotated[float, ArgumentBounds(-360, 360)]
+SpeedArgument = Annotated[float, ArgumentBounds(0, 100, above=True)]
 """m/s; as a card has it."""
-TuningRange = Annotated[float, Bounds(0, 100, above=True)]
+TuningRange = Annotated[float, ArgumentBounds(0, 100, above=True)]
 """Standard errors."""
-Percent = Annotated[float, Bounds(0, 1000)]
-Scatter = Annotated[float, Bounds(0, 10, above=True)]
-Draws = Annotated[int, Bounds(0, 1000, whole=True)]
-Seed = Annotated[int, Bounds(0, whole=True)]
-Effects = Annotated[int, Bounds(1, 4, whole=True)]
+Percent = Annotated[float, ArgumentBounds(0, 1000)]
+Scatter = Annotated[float, ArgumentBounds(0, 10, above=True)]
+DrawsArgument = Annotated[int, ArgumentBounds(0, 1000, whole=True)]
+Seed = Annotated[int, ArgumentBounds(0, whole=True)]
+Effects = Annotated[int, ArgumentBounds(1, 4, whole=True)]
 """That a search names at most: :data:`tank2sim.gap.workflow.MOST_EFFECTS`."""
-Count = Annotated[int, Bounds(1, whole=True)]
-ENSEMBLE = Bounds(0, 10_000_000, whole=True)
+Count = Annotated[int, ArgumentBounds(1, whole=True)]
+ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 """Ships of an ensemble. Project choice: a day of computing."""
 EnsembleSize = Annotated[int, ENSEMBLE]
-SmallEnsemble = Annotated[int, Bounds(0, 100_000, whole=True)]
+SmallEnsemble = Annotated[int, ArgumentBounds(0, 100_000, whole=True)]
 """Ships that are each simulated on trials. Project choice: a day of computing."""
-GuessedShips = Annotated[int, Bounds(100, 1_000_000, whole=True)]
-DrawsOfChain = Annotated[int, Bounds(10, 1_000_000, whole=True)]
+GuessedShips = Annotated[int, ArgumentBounds(100, 1_000_000, whole=True)]
+DrawsOfChain = Annotated[int, ArgumentBounds(10, 1_000_000, whole=True)]
 
 
-def bounds_of(kind: Any) -> Bounds | None:
-    """The bounds of a type of this module; None if it has none."""
-    return next((part for part in get_args(kind) if isinstance(part, Bounds)), None)
+def bounds_of(kind: Any) -> ArgumentBounds | None:
+    """The bounds of a type of this module; None if it has none.
+
+    Parameters
+    ----------
+    kind : type
+        ``SpeedArgument``, for example.
+    """
+    return next((part for part in get_args(kind) if isinstance(part, ArgumentBounds)), None)
 
 
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
@@ -163,7 +169,7 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
         return bounds.checked(name, value)
     origin, parts = get_origin(kind) or kind, get_args(kind)
     if origin is float:
-        return Bounds().checked(name, value)
+        return ArgumentBounds().checked(name, value)
     if not _is_a(value, origin):
         called = getattr(origin, "__name__", str(origin))
         words = {"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"}

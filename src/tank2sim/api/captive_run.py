@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from tank2sim.api.bounds import Angle, Speed, checked
+from tank2sim.api.bounds import AngleArgument, SpeedArgument, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import write_together
@@ -244,9 +244,9 @@ def reduce_runs(
     type: str | None = None,
     campaign: str | Path | None = None,
     force_convention: ForceConvention | None = None,
-    speed_mps: Speed | None = None,
-    drift_deg: Angle | None = None,
-    rudder_deg: Angle | None = None,
+    speed_mps: SpeedArgument | None = None,
+    drift_deg: AngleArgument | None = None,
+    rudder_deg: AngleArgument | None = None,
 ) -> CaptiveRunResult:
     """Reduce one captive run, or several repeats of it, by itself.
 

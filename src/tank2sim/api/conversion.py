@@ -28,7 +28,7 @@ from tank2sim.analysis.conversion.robotics import (
     vrx_model,
     vrx_text,
 )
-from tank2sim.api.bounds import Number, Scatter, checked
+from tank2sim.api.bounds import NumberArgument, Scatter, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
@@ -175,7 +175,7 @@ def convert(
     *,
     scaling: str | None = None,
     rudder_sign: str | None = None,
-    origin_m: Number = 0.0,
+    origin_m: NumberArgument = 0.0,
     scatter: Scatter = SCATTER,
 ) -> ConversionResult:
     """Write a ship's card in another language.

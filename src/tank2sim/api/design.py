@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.influence.figures import InfluenceFigure
-from tank2sim.api.bounds import Draws, Number, Positive, Seed, checked
+from tank2sim.api.bounds import DrawsArgument, NumberArgument, PositiveArgument, Seed, checked
 from tank2sim.api.conversion import convert
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship, as_ship
@@ -231,15 +231,15 @@ def design_campaign(
     card: Ship | Card | str | Path,
     *,
     figures: str | Sequence[str] = DESIGN_FIGURES,
-    hours: Number | None = None,
+    hours: NumberArgument | None = None,
     tank: str | Path | TankFile | None = None,
-    carriage_length_m: Positive | None = None,
-    model_length_m: Positive | None = None,
+    carriage_length_m: PositiveArgument | None = None,
+    model_length_m: PositiveArgument | None = None,
     usual: str | Path | None = None,
     largest: tuple[float, float, float] | None = None,
     check_runs: bool = True,
     one_side: bool = False,
-    draws: Draws = DRAWN_SHIPS,
+    draws: DrawsArgument = DRAWN_SHIPS,
     seed: Seed = 0,
 ) -> CampaignDesignResult:
     """Design the next captive campaign of a ship: the runs that make its figures most certain.
@@ -454,7 +454,7 @@ def design_trial(
     card: Ship | Card | str | Path,
     *,
     figures: str | Sequence[str] = DESIGN_FIGURES,
-    minutes: Number | None = None,
+    minutes: NumberArgument | None = None,
     sensors: Mapping[str, float] | None = None,
     one_side: bool = False,
 ) -> TrialDesignResult:

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.api.bounds import Count, Effects, Number, checked
+from tank2sim.api.bounds import Count, Effects, NumberArgument, checked
 from tank2sim.api.gap_files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
@@ -347,7 +347,7 @@ def find_gap(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
     max_effects: Effects = MOST_EFFECTS,
-    false_discovery: Number = 0.5,
+    false_discovery: NumberArgument = 0.5,
     executor: str = PROCESSES,
     workers: Count | None = None,
     progress: StageReport = lambda text: None,
@@ -412,7 +412,7 @@ def gap_options(
     without: Sequence[str] = (),
     max_effects: Effects = MOST_EFFECTS,
     workers: Count | None = None,
-    false_discovery: Number = 0.5,
+    false_discovery: NumberArgument = 0.5,
 ) -> GapOptions:
     """Options of the search. Raises InputError for an effect that is not known, or a number out of its range.
 

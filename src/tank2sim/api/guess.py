@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, POSTER_MANOEUVRES
 from tank2sim.analysis.guess.prior import ShipDimensions
 from tank2sim.analysis.guess.study import Guess, figure_unit, guess_ship, parse_figures
-from tank2sim.api.bounds import GuessedShips, Positive, Seed, checked
+from tank2sim.api.bounds import GuessedShips, PositiveArgument, Seed, checked
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
@@ -100,11 +100,11 @@ class GuessResult(PagedResult):
 @checked
 def guess(
     *,
-    length_m: Positive,
-    beam_m: Positive,
-    draught_m: Positive,
-    block: Positive,
-    speed_kn: Positive,
+    length_m: PositiveArgument,
+    beam_m: PositiveArgument,
+    draught_m: PositiveArgument,
+    block: PositiveArgument,
+    speed_kn: PositiveArgument,
     figures: Mapping[str, str] | None = None,
     name: str = "guessed ship",
     members: GuessedShips = DEFAULT_MEMBERS,

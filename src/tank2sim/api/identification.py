@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tank2sim.analysis.ensemble.draws import by_file_name
-from tank2sim.api.bounds import Count, DrawsOfChain, Positive, SmallEnsemble, checked
+from tank2sim.api.bounds import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
@@ -216,7 +216,7 @@ def identify(
     structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
     inertia: bool = False,
-    piece_s: Positive | None = None,
+    piece_s: PositiveArgument | None = None,
     trust_card: bool = False,
     hold: Sequence[str] = (),
     force: bool = False,

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
-from tank2sim.api.bounds import Angle, EnsembleSize, NotNegative, Number, Positive, Seed, Speed, TuningRange, checked
+from tank2sim.api.bounds import (
+    AngleArgument,
+    EnsembleSize,
+    NonNegativeArgument,
+    NumberArgument,
+    PositiveArgument,
+    Seed,
+    SpeedArgument,
+    TuningRange,
+    checked,
+)
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
@@ -222,7 +232,7 @@ class Ship:
         return Ship(card_in_waves(card, mesh, hull_of(card, given)))
 
     @checked
-    def turn(self, rudder_deg: Angle = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def turn(self, rudder_deg: AngleArgument = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a turning circle: the rudder is put over at t = 0 and held for 540 deg of heading.
 
         Options are those of :meth:`simulate`.
@@ -231,7 +241,7 @@ class Ship:
 
     @checked
     def zigzag(
-        self, rudder_deg: Angle = 10.0, heading_deg: Angle = 10.0, **options: Unpack[SimulationOptions]
+        self, rudder_deg: AngleArgument = 10.0, heading_deg: AngleArgument = 10.0, **options: Unpack[SimulationOptions]
     ) -> ManoeuvreResult:
         """Simulate a zigzag: the rudder (negative begins to port) is reversed at each `heading_deg` off the course.
 
@@ -240,12 +250,12 @@ class Ship:
         return self.simulate(f"zigzag:{rudder_deg:.10g}/{heading_deg:.10g}", **options)
 
     @checked
-    def pullout(self, rudder_deg: Angle = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def pullout(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a pull-out: a steady turn with `rudder_deg`, then the neutral rudder. Options: :meth:`simulate`."""
         return self.simulate(f"pullout:{rudder_deg:.10g}", **options)
 
     @checked
-    def spiral(self, rudder_deg: Angle = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def spiral(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a direct (Dieudonne) spiral, from `rudder_deg` to the other side and back.
 
         Options are those of :meth:`simulate`.
@@ -253,7 +263,9 @@ class Ship:
         return self.simulate(f"spiral:{rudder_deg:.10g}", **options)
 
     @checked
-    def stop(self, revolutions_rpm: Number | None = None, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def stop(
+        self, revolutions_rpm: NumberArgument | None = None, **options: Unpack[SimulationOptions]
+    ) -> ManoeuvreResult:
         """Simulate a stop with revolutions astern (rpm, negative or 0), by default full astern.
 
         Options are those of :meth:`simulate`.
@@ -296,7 +308,9 @@ class Ship:
             try:
                 columns[si_name] = factor * np.asarray(orders[name], dtype=float)
             except (TypeError, ValueError):
-                raise InputError("orders", f"column {name}", "holds what is no number", "give numbers") from None
+                raise InputError(
+                    "orders", f"column {name}", "holds something else than numbers", "give numbers"
+                ) from None
         if len({values.shape for values in columns.values()}) > 1 or any(each.ndim != 1 for each in columns.values()):
             raise InputError("orders", "", "has columns of different lengths", "give an order for each time")
         return self.simulate(orders_from_columns(columns, "orders"), **options)
@@ -306,7 +320,7 @@ class Ship:
         self,
         manoeuvre: str | Manoeuvre,
         *,
-        duration_s: Positive | None = None,
+        duration_s: PositiveArgument | None = None,
         external: Mapping[str, float] | None = None,
         members: EnsembleSize = 0,
         seed: Seed = 0,
@@ -350,7 +364,7 @@ class Ship:
     @checked
     def stability(
         self,
-        speed_mps: Speed | None = None,
+        speed_mps: SpeedArgument | None = None,
         *,
         spirals: bool = True,
         members: EnsembleSize = 0,
@@ -387,7 +401,7 @@ class Ship:
     @checked
     def state_space(
         self,
-        speed_mps: Speed | None = None,
+        speed_mps: SpeedArgument | None = None,
         *,
         states: Iterable[str] | None = None,
         inputs: Iterable[str] | None = None,
@@ -524,14 +538,14 @@ class Ship:
         self,
         design: str = "pid",
         *,
-        speed_mps: Speed | None = None,
-        heading_weight_deg: Positive = 5.0,
-        rudder_weight_deg: Positive = 5.0,
-        wave_filter_radps: Positive | None = None,
-        course_change_deg: Angle = 20.0,
-        current_mps: NotNegative | None = None,
-        wind_mps: NotNegative | None = None,
-        wave_yaw_deg: NotNegative | None = None,
+        speed_mps: SpeedArgument | None = None,
+        heading_weight_deg: PositiveArgument = 5.0,
+        rudder_weight_deg: PositiveArgument = 5.0,
+        wave_filter_radps: PositiveArgument | None = None,
+        course_change_deg: AngleArgument = 20.0,
+        current_mps: NonNegativeArgument | None = None,
+        wind_mps: NonNegativeArgument | None = None,
+        wave_yaw_deg: NonNegativeArgument | None = None,
         seed: Seed | None = None,
         track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
     ) -> AutopilotResult | CraftAutopilotResult:
@@ -606,12 +620,12 @@ class Ship:
         self,
         angles_deg: float | Sequence[float] = (),
         *,
-        roll_deg: Angle = 0.0,
-        buoyancy_kg: Positive | None = None,
+        roll_deg: AngleArgument = 0.0,
+        buoyancy_kg: PositiveArgument | None = None,
         programme: GlideProgramme | str | Path | None = None,
         as_printed: bool = False,
-        budget_kg: Number | None = None,
-        depth_m: Number | None = None,
+        budget_kg: NumberArgument | None = None,
+        depth_m: NumberArgument | None = None,
         views: bool = False,
     ) -> GlideResult:
         """Steady glides of an underwater glider, the path of a programme, and what is best.

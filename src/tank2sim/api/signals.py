@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tank2sim.api.audit import MEASURED_SAMPLES
-from tank2sim.api.bounds import Positive, checked
+from tank2sim.api.bounds import PositiveArgument, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.errors import InputError
@@ -170,8 +170,8 @@ def signals(
     trials: TrialPaths,
     columns: str | Sequence[str] = (),
     *,
-    max_gap_s: Positive | None = None,
-    segment_s: Positive | None = None,
+    max_gap_s: PositiveArgument | None = None,
+    segment_s: PositiveArgument | None = None,
     filter: str | None = None,
 ) -> SignalsResult:
     """Mean, spread, correlation time, stationarity, normality and spectra of the signals of trials.

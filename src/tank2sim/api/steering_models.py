@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare_steering_models
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
-from tank2sim.api.bounds import Angle, checked
+from tank2sim.api.bounds import AngleArgument, checked
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.turn_tuning import stability_change, turn_table
 from tank2sim.cards.steering_card import SteeringCard, read_steering_card
@@ -131,7 +131,7 @@ class SteeringModelsResult(PagedResult):
 
 
 @checked
-def steering_models(card: str | Path, rudder_deg: Angle | None = None) -> SteeringModelsResult:
+def steering_models(card: str | Path, rudder_deg: AngleArgument | None = None) -> SteeringModelsResult:
     """Compare the models of a steering card.
 
     Parameters

@@ -8,7 +8,7 @@ import click
 
 from tank2sim.analysis.heading.designs import DESIGNS
 from tank2sim.analysis.heading.study import LARGEST_CHANGE_DEG
-from tank2sim.api.bounds import NotNegative, Positive, Seed, Speed
+from tank2sim.api.bounds import NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_option, set_option
@@ -16,14 +16,14 @@ from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
 from tank2sim.files import FMU
 
-_POSITIVE, _NOT_NEGATIVE = number(Positive), number(NotNegative)
+_POSITIVE, _NOT_NEGATIVE = number(PositiveArgument), number(NonNegativeArgument)
 _CHANGE = click.FloatRange(-LARGEST_CHANGE_DEG, LARGEST_CHANGE_DEG)
 
 
 @click.command("autopilot")
 @click.argument("card")
 @click.option("--design", type=click.Choice(DESIGNS), default="pid", show_default=True, help="Way of design.")
-@click.option("--speed", type=number(Speed), metavar="MPS", help="Speed of the design, m/s; by default u0.")
+@click.option("--speed", type=number(SpeedArgument), metavar="MPS", help="Speed of the design, m/s; by default u0.")
 @click.option("--heading-weight", type=_POSITIVE, default=5.0, show_default=True, metavar="DEG",
               help="LQR: heading error that is as bad as ...")  # fmt: skip
 @click.option("--rudder-weight", type=_POSITIVE, default=5.0, show_default=True, metavar="DEG",

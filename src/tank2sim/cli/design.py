@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.bounds import Draws, Seed
+from tank2sim.api.bounds import DrawsArgument, Seed
 from tank2sim.api.design import DESIGN_FIGURES, CampaignDesignResult, TrialDesignResult, design_campaign, design_trial
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
@@ -65,7 +65,7 @@ from tank2sim.files import CARD, TABLE, refuse_doubled, writable_folder
 @click.option("--no-checks", is_flag=True, help="No runs that show whether the polynomial holds.")
 @click.option(
     "--draws",
-    type=number(Draws),
+    type=number(DrawsArgument),
     default=DRAWN_SHIPS,
     show_default=True,
     help="Ships drawn from the card's errors, for which the plan is to be good as well.",

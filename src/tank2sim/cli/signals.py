@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.bounds import Positive
+from tank2sim.api.bounds import PositiveArgument
 from tank2sim.api.signals import signals
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
@@ -14,7 +14,7 @@ from tank2sim.errors import InputError
 from tank2sim.files import TABLE
 from tank2sim.records.signals.requests import REQUEST_FORMS
 
-_POSITIVE = number(Positive)
+_POSITIVE = number(PositiveArgument)
 
 
 @click.command("signals")

@@ -8,7 +8,7 @@ import click
 
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.analysis.validation.study import REQUIRED
-from tank2sim.api.bounds import Positive, SmallEnsemble
+from tank2sim.api.bounds import PositiveArgument, SmallEnsemble
 from tank2sim.api.craft_validation import CraftValidationResult
 from tank2sim.api.ship import load
 from tank2sim.api.validation import validate
@@ -29,7 +29,7 @@ from tank2sim.cli.options import number, page_option, plot_folder_option, set_op
 @click.option(
     "--required",
     "required_percent",
-    type=number(Positive),
+    type=number(PositiveArgument),
     default=REQUIRED,
     show_default=True,
     metavar="PERCENT",

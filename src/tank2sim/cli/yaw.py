@@ -8,7 +8,7 @@ from typing import get_args
 
 import click
 
-from tank2sim.api.bounds import NotNegative, Percent, Positive
+from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument
 from tank2sim.api.ship import load
 from tank2sim.api.yaw import CONTROLLERS, YawResult, simulate_yaw
 from tank2sim.api.yaw import yaw as identify_yaw
@@ -21,7 +21,7 @@ from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.records.yaw import Medium, read_yaw_record
 
-_POSITIVE = number(Positive)
+_POSITIVE = number(PositiveArgument)
 
 
 @click.command("yaw")
@@ -40,9 +40,9 @@ _POSITIVE = number(Positive)
     metavar="L,B,R,T",
     help="Simulate a ship's motion at model size: length, beam in m, yaw rate in deg/min, s.",
 )
-@click.option("--noise", "noise_A", type=number(NotNegative), default=0.0, help="Of the simulated current, A.")
+@click.option("--noise", "noise_A", type=number(NonNegativeArgument), default=0.0, help="Of the simulated current, A.")
 @click.option("--inertia-kgm2", type=_POSITIVE, metavar="J", help="J_zz of body and rotor; else from records in air.")
-@click.option("--inertia-error-kgm2", type=number(NotNegative), help="Its standard error.")
+@click.option("--inertia-error-kgm2", type=number(NonNegativeArgument), help="Its standard error.")
 @click.option(
     "--torque-constant",
     "torque_constant_NmpA",
