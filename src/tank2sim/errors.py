@@ -33,6 +33,13 @@ class InputError(Exception):
         return type(self), (self.source, self.place, self.problem, self.remedy)
 
 
+class ArgumentError(InputError):
+    """An argument of a function is of the wrong kind or out of its bounds; `source` is its name.
+
+    The command line calls it by the option.
+    """
+
+
 def close_name(name: str, known: Iterable[str]) -> str:
     """A remedy for a name that is not known: the one that resembles it, or all of them."""
     names = list(known)

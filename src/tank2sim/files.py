@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -56,8 +57,8 @@ def write_together(
     Raises
     ------
     InputError
-        One of the targets is an input, is given twice or is a folder, or its folder is missing or cannot be written;
-        then nothing has been written.
+        One of the targets is an input, is given twice or is a folder, or its folder is missing or cannot be written,
+        or its name ends like a file of another kind; then nothing has been written.
     """
     targets = [_target(path if isinstance(path, Path) else Path(path)) for path in contents]
     _refuse_doubled(targets)
@@ -68,6 +69,8 @@ def write_together(
     try:
         for target, content in zip(targets, contents.values(), strict=True):
             data = content.encode("utf-8") if isinstance(content, str) else content
+            if target.replaceable:
+                refuse_other_ending(target.given, _endings_of(data))
             if target.replaceable:
                 ready.append((_temporary(target, data), target))
             else:
@@ -200,6 +203,77 @@ def read_exact_text(path: Path) -> str:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
 
 
+_DEEPEST = 100
+"""Lists and objects within each other that a file may have. Project choice: ten times as deep as any result, a tenth of
+what ends a recursion."""
+
+
+def refuse_deep(content: object, source: Path | str) -> None:
+    """Refuse a document whose lists and objects are nested so deeply that no function can go through it.
+
+    Raises
+    ------
+    InputError
+        It is nested more than :data:`_DEEPEST` deep.
+    """
+    level = [content]
+    for _ in range(_DEEPEST):
+        inner = [each.values() if isinstance(each, dict) else each for each in level if isinstance(each, dict | list)]
+        if not inner:
+            return
+        level = [item for items in inner for item in items]
+    raise InputError(source, "", f"is nested more than {_DEEPEST} deep", "write it without so many brackets")
+
+
+def parsed_json(text: str, source: Path | str, remedy: str) -> Any:
+    """The content of a JSON text that a user gave; `remedy` says what to give.
+
+    Raises
+    ------
+    InputError
+        It is not JSON, is nested too deeply, or holds what no page or file can: half of a character.
+    """
+    try:
+        content = json.loads(text)
+        refuse_deep(content, source)
+        json.dumps(content, ensure_ascii=False).encode()
+    except json.JSONDecodeError as error:
+        raise InputError(source, f"line {error.lineno}", f"is not JSON ({error.msg})", remedy) from None
+    except UnicodeEncodeError:
+        problem = "holds half of a character (a lone surrogate, \\ud800 to \\udfff)"
+        raise InputError(source, "", problem, remedy) from None
+    except RecursionError:
+        raise InputError(source, "", "is nested too deeply", remedy) from None
+    except ValueError:
+        raise InputError(source, "", "is not JSON: an integer has thousands of digits", remedy) from None
+    return content
+
+
+@contextmanager
+def named_in(source: Path | str, file: Path) -> Iterator[None]:
+    """While a file is read because another one, `source`, names it: a refusal does not quote a foreign file.
+
+    Who writes a campaign or a card may name any file of this machine; what is in one outside the folder of `source` is
+    not shown. The message has the name and the line.
+
+    Raises
+    ------
+    InputError
+        As raised within, without what it quotes if the file is foreign; or the file is a device or a pipe.
+    """
+    if file.exists() and not file.is_file():
+        raise InputError(file, "", f"is not a file, and {source} names it", "name a file")
+    try:
+        yield
+    except InputError as fault:
+        if file.resolve().is_relative_to(Path(source).parent.resolve()) or not file.is_file():
+            raise
+        line = re.match(r"line \d+", fault.place)
+        problem = f"cannot be used; it is outside the folder of {source}, which names it, and is not quoted here"
+        remedy = "put a copy into that folder to see what is wrong with it"
+        raise InputError(file, line[0] if line else "", problem, remedy) from None
+
+
 def writable_folder(path: Path) -> Path:
     """Make a folder (and its parents) if need be, and make sure that files can be put there.
 
@@ -224,6 +298,47 @@ def _umask() -> int:
     value = os.umask(0)
     os.umask(value)
     return value
+
+
+PAGE, PICTURE, CARD, TABLE, JSON = (".html", ".htm"), (".png", ".svg", ".pdf"), (".toml",), (".csv", ".txt"), (".json",)
+FMU, SYSTEM, MATLAB, PYTHON, MODEL = (".fmu",), (".ssp",), (".m",), (".py",), (".sdf", ".xml", ".world")
+"""How the names of files of each kind end. Any other ending, and none, is taken for any kind."""
+
+_TEXTS = {*CARD, *TABLE, *MATLAB, *PYTHON, *MODEL}
+_ENDINGS = {*PAGE, *PICTURE, *JSON, *FMU, *SYSTEM, *_TEXTS, ".zip", ".xlsx", ".jpg", ".jpeg", ".gif"}
+_BEGINNINGS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
+    (rb"\x89PNG", (".png",)),
+    (rb"%PDF-", (".pdf",)),
+    (rb"<svg", (".svg",)),
+    (rb"PK\x03\x04", (*FMU, *SYSTEM, ".zip")),
+    (rb"(?i)<!doctype html", PAGE),
+    (rb"\{", JSON),
+    (rb"<", (*MODEL, *PAGE, ".svg")),
+    (rb"function \[", MATLAB),
+    (rb'"""', PYTHON),
+    (rb"""(?:[^\n]*\n)*?format = ["']tank2sim-""", CARD),
+)
+"""How contents begin, and how the names of their files end."""
+
+
+def refuse_other_ending(path: Path, endings: Iterable[str]) -> None:
+    """Refuse a name that ends as files of another kind do.
+
+    Raises
+    ------
+    InputError
+        It ends like a known kind of file, and none of `endings`; those that are possible are named.
+    """
+    ending, possible = path.suffix.lower(), list(endings)
+    if ending in _ENDINGS and ending not in possible:
+        remedy = f"let its name end in {' or '.join(possible)}" if possible else "give the name of a folder"
+        raise InputError(path, "", f"ends in {ending}, and something else is written there", remedy)
+
+
+def _endings_of(content: bytes) -> Iterable[str]:
+    """Endings of the names of files with this content."""
+    head = content[:4096].removeprefix(BYTE_ORDER_MARK.encode()).lstrip()
+    return next((endings for begins, endings in _BEGINNINGS if re.match(begins, head)), sorted(_TEXTS))
 
 
 SCHEMA_VERSION = 1

@@ -9,6 +9,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.report.steering import ship as page_ship
+from tests.made_results import without_wasm
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +80,17 @@ def test_a_card_is_never_overwritten_by_its_own_sheet(tmp_path: Path) -> None:
     assert t2s.load(path).name == "Mariner class"
 
 
-def test_a_steering_page_says_whether_the_ship_is_in_it(tmp_path: Path) -> None:
-    with mock.patch.object(page_ship, "has_compiler", return_value=False):
+def test_without_the_compiler_no_steering_page_is_written(tmp_path: Path) -> None:
+    with mock.patch.object(page_ship, "has_compiler", return_value=False), pytest.raises(t2s.InputError) as refusal:
+        t2s.load("mariner").steering_page(tmp_path / "steer.html")
+    assert "tank2sim[platforms]" in refusal.value.remedy and not list(tmp_path.iterdir())
+
+
+def test_a_steering_page_is_that_of_its_result(tmp_path: Path) -> None:
+    with without_wasm():
         found = t2s.load("mariner").steering_page(tmp_path / "steer.html")
     page = (tmp_path / "steer.html").read_text(encoding="utf-8")
-    assert found.to_dict()["steerable"] is False and found.notices[0] == page_ship.NO_WASM_COMPILER
-    assert page == found.page() and page.count(page_ship.NO_WASM_COMPILER) == 1
+    assert found.to_dict()["steerable"] is True and page == found.page()
     assert found.to_dict()["page_kB"] == pytest.approx((tmp_path / "steer.html").stat().st_size / 1000)
     assert len(repr(found).splitlines()) <= 24
 

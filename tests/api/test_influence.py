@@ -116,7 +116,7 @@ def test_models_of_a_steering_card_turn_as_the_paper_prints() -> None:
         (lambda ship: ship.tune("steady_radius_m@20"), "--tune", "steady_radius_m@20"),
         (lambda ship: ship.tune([]), "--tune", ""),
         (lambda ship: ship.tune("criterion_C=5e-6", by="luck"), "--by", ""),
-        (lambda ship: ship.tune("criterion_C=5e-6", within=0.0), "--within", ""),
+        (lambda ship: ship.tune("criterion_C=5e-6", within=0.0), "within", ""),
         (lambda ship: ship.tune_through("35@35", "much@3"), "--through", "much@3"),
     ],
 )

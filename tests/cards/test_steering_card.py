@@ -46,7 +46,7 @@ def test_ship_cards_are_no_steering_cards(tmp_path: Path) -> None:
         ("[6.0, 7.5, 9.0]", "[6.0, 6.0, 9.0]", "influence.draughts_m: has one draught twice"),
         ("[-1.60, -0.22, 1.85]", "[-1.60]", "influence.K_percent.C_y_b: has 1 values"),
         ('C_y_bw = "C_y_bb"', 'C_y_bw = "C_q"', "influence.misread_as: C_q has no K"),
-        ("[ship]", "[ship", "is not TOML"),
+        ("[ship]", "[ship", "correct the TOML"),
     ],
 )
 def test_a_fault_is_reported_by_its_key(old: str, new: str, reported: str) -> None:

@@ -83,8 +83,8 @@ def test_bad_options_are_refused_in_a_line(tmp_path, arguments, words):
 @pytest.mark.parametrize("option", ["--campaign", "--json"])
 def test_one_file_for_two_outputs_is_refused_before_the_work(tmp_path, option, monkeypatch):
     monkeypatch.setattr("tank2sim.cli.design.design_campaign", None)
-    result = tank2sim("design", "esso-osaka", *FAST, "--hours", "2", "-o", "p.csv", option, "p.csv", cwd=tmp_path)
-    refused(result, "p.csv", "two outputs")
+    result = tank2sim("design", "esso-osaka", *FAST, "--hours", "2", "-o", "p", option, "p", cwd=tmp_path)
+    refused(result, "p:", "two outputs")
     assert list(tmp_path.iterdir()) == []
 
 

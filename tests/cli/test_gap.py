@@ -335,7 +335,7 @@ def test_an_improved_card_goes_all_the_way_to_a_checked_fmu(name: str, tmp_path:
         assert result.returncode == 0, (arguments, result.stdout, result.stderr)
 
 
-@pytest.mark.parametrize(("given", "option"), [({"effects": "wind"}, "--effects"), ({"workers": 0}, "--workers")])
+@pytest.mark.parametrize(("given", "option"), [({"effects": "wind"}, "effects"), ({"workers": 0}, "workers")])
 def test_an_option_of_the_wrong_kind_is_refused_by_its_name(given: dict, option: str) -> None:
     with pytest.raises(InputError) as raised:
         gap_options(**given)

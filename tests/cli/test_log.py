@@ -138,7 +138,7 @@ def test_a_channels_file_comes_back_as_it_was_written(folder) -> None:
         ("sign = 1", "sing = 1", "did you mean sign?"),
         ('stream = "rudder_deg"', 'stream = "ruder"', "no stream is called ruder"),
         ('quantity = "cog"', 'quantity = "heading"', "is in use twice"),
-        ("[[channels]]", "[[channels", "is not TOML"),
+        ("[[channels]]", "[[channels", "correct the TOML"),
     ],
 )
 def test_a_wrong_channels_file_is_refused_and_nothing_is_written(folder, old, new, problem) -> None:

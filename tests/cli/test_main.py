@@ -53,10 +53,10 @@ def test_asked_for_nothing_it_helps(tmp_path) -> None:
 @first_fast(
     "given, bundled, arguments",
     [
-        ("tows.csv", "wilinski-zellman/tows.csv", ["tow", "tows.csv", "--terms", "B3", "-o", "tows.csv"]),
-        ("ship.toml", "mariner/ship.toml", ["stability", "ship.toml", "--json", "ship.toml"]),
-        ("ship.toml", "wilinski-zellman/ship.toml", ["export", "ship.toml", "-o", "ship.toml"]),
-        ("ship.toml", "mariner/ship.toml", ["simulate", "ship.toml", "--manoeuvre", "turn:35", "--out", "ship.toml"]),
+        ("tows", "wilinski-zellman/tows.csv", ["tow", "tows", "--terms", "B3", "-o", "tows"]),
+        ("ship", "mariner/ship.toml", ["stability", "ship", "--json", "ship"]),
+        ("ship", "wilinski-zellman/ship.toml", ["export", "ship", "-o", "ship"]),
+        ("ship", "mariner/ship.toml", ["simulate", "ship", "--manoeuvre", "turn:35", "--out", "ship"]),
     ],
 )
 def test_an_input_is_not_written_over(tmp_path, given, bundled, arguments) -> None:

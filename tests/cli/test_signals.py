@@ -104,8 +104,8 @@ def test_decimation_thins_the_whole_trial(path, tmp_path):
 
 def test_the_measured_trial_is_never_overwritten(path, tmp_path):
     text = path.read_text()
-    for options in (["--out", path], ["--json", path]):
-        with pytest.raises(InputError, match="would be overwritten"):
+    for options, match in ((["--out", path], "would be overwritten"), (["--json", path], "ends in .csv")):
+        with pytest.raises(InputError, match=match):
             run(path, "--column", "r", "--filter", "lowpass:0.3", *options)
     with pytest.raises(InputError, match="two outputs"):
         run(path, "--column", "r", "--filter", "lowpass:0.3", "--out", tmp_path / "a", "--json", tmp_path / "a")

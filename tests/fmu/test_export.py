@@ -260,3 +260,34 @@ def test_an_fmu_bounds_its_states_by_the_number_of_the_simulation(hull: Model, m
     found = [(name, line) for name, text in texts.items() for line in text.splitlines() if "TIMES_BEYOND " in line]
     assert sorted(name for name, _ in found) == ["model.h", "simulation.c"]  # defined once, used once
     assert ("model.h", "#define TIMES_BEYOND 7.5") in found
+
+
+@pytest.mark.skipif(os.name != "posix", reason="makes compilers of shell scripts")
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[ "$out" ] && : > "$out"',
+        '[ "$out" ] && echo "not a library" > "$out"',
+        'echo "double nothing(void) { return 0; }" > "$0.c" && cc -shared -fPIC "$0.c" -o "$out"',
+    ],
+    ids=["empty", "text", "without its functions"],
+)
+@first_fast("from_the_start", [True, False])
+def test_a_library_that_does_not_work_is_not_exported(
+    text: str, from_the_start: bool, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a compiler that says nothing; or that makes the library of its trial well, and the FMU's badly."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    compiler = folder / "compiler"
+    well = "" if from_the_start else 'case "$*" in *trial*) exec cc "$@" ;; esac\n'
+    out = 'out=""; for word in "$@"; do [ "$before" = -o ] && out="$word"; before="$word"; done\n'
+    # a compiler for single files makes objects as it should, and goes wrong with what it links
+    objects = 'case "$*" in *" -c "*) exec cc "$@" ;; esac\n'
+    compiler.write_text(f"#!/bin/sh\n{well}{objects}{out}{text}\nexit 0\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    with pytest.raises(InputError, match=r"does not work"):
+        write_fmu(hull, tmp_path / "x.fmu")
+    assert not (tmp_path / "x.fmu").exists()

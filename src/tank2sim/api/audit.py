@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.records import audit as records_audit
@@ -123,6 +124,7 @@ class AuditResult(Result):
         return [finding for found in self.found for finding in found]
 
 
+@checked
 def audit(trials: TrialPaths) -> AuditResult:
     """Judge the columns of trials by their consistency alone: signs, units, frames, clocks, failed sensors.
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from tank2sim.api.bounds import AngleArgument, SpeedArgument, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import write_together
@@ -236,15 +237,16 @@ def _phase(each: FourierCoefficient) -> str | None:
     return f"{math.degrees(each.phase_rad):.4g} ± {math.degrees(each.phase_error_rad):.2g}" if each.order else None
 
 
+@checked
 def reduce_runs(
     files: str | Path | Sequence[str | Path],
     *,
     type: str | None = None,
     campaign: str | Path | None = None,
     force_convention: ForceConvention | None = None,
-    speed_mps: float | None = None,
-    drift_deg: float | None = None,
-    rudder_deg: float | None = None,
+    speed_mps: SpeedArgument | None = None,
+    drift_deg: AngleArgument | None = None,
+    rudder_deg: AngleArgument | None = None,
 ) -> CaptiveRunResult:
     """Reduce one captive run, or several repeats of it, by itself.
 

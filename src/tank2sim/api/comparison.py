@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
 from tank2sim.analysis.validation.comparison import CardComparison, compare_cards
 from tank2sim.analysis.validation.standard_trials import MEMBERS
+from tank2sim.api.bounds import SmallEnsemble, checked
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard, SteeredCard
@@ -161,7 +162,8 @@ class ComparisonResult(Result):
         return ResultTable(f"Farthest apart: {label}", columns, cells)
 
 
-def compare(cards: Sequence[Ship | Card | str | Path], *, members: int = MEMBERS) -> ComparisonResult:
+@checked
+def compare(cards: Sequence[Ship | Card | str | Path], *, members: SmallEnsemble = MEMBERS) -> ComparisonResult:
     """Compare cards of one ship, or of ships and models of one form; the first is the reference, whose size is taken.
 
     Cards of a craft with thrusters are compared at its own size, by a straight run, turns by difference and a spin.

@@ -18,6 +18,7 @@ from tank2sim.analysis.conversion.readings import (
     with_diameter,
     with_probabilities,
 )
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import ManoeuvringCard
@@ -212,6 +213,7 @@ class ConventionResult(Result):
         return tuple(found)
 
 
+@checked
 def convention(table: str | Path) -> ConventionResult:
     """Say what a table of derivatives with unstated conventions may mean: readings ranked with probabilities.
 

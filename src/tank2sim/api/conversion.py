@@ -28,6 +28,7 @@ from tank2sim.analysis.conversion.robotics import (
     vrx_model,
     vrx_text,
 )
+from tank2sim.api.bounds import NumberArgument, Scatter, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
@@ -167,14 +168,15 @@ def _percent(change: FigureChange) -> float | None:
     return 100 * (change.after / change.before - 1)
 
 
+@checked
 def convert(
     card: str | Path | Ship,
     to: str = "abkowitz",
     *,
     scaling: str | None = None,
     rudder_sign: str | None = None,
-    origin_m: float = 0.0,
-    scatter: float = SCATTER,
+    origin_m: NumberArgument = 0.0,
+    scatter: Scatter = SCATTER,
 ) -> ConversionResult:
     """Write a ship's card in another language.
 
@@ -217,8 +219,6 @@ def convert(
     ):
         if value is not None and value not in known:
             raise InputError(option, value, "is not known", close_name(value, known))
-    if not 0 < scatter <= 10:
-        raise InputError("--scatter", f"{scatter:g}", "is out of bounds", "give a number above 0, to 10")
     ship = as_ship(card)
     if isinstance(ship.card, CraftCard):
         return _of_craft(ship, ship.card, to, Conventions(scaling, rudder_sign, origin_m))

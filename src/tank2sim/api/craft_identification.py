@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard
@@ -219,6 +220,7 @@ def _response_row(response: OrderResponse) -> list[object]:
     return [response.lag_s, response.lag_error_s, *rpm]
 
 
+@checked
 def identify_craft(
     card: Ship | Card | str | Path,
     trials: CraftTrialPaths,

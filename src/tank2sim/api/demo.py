@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.demo import PAGE
 from tank2sim.files import writable_folder
@@ -57,6 +58,7 @@ class DemoResult(Result):
         return self.path.read_text(encoding="utf-8")
 
 
+@checked
 def run_demo(folder: str | Path = "demo", *, report: Callable[[str], None] = lambda _: None) -> DemoResult:
     """Go the whole way on bundled data: tows to an FMU, the Mariner to checked FMUs, and a page that shows both.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.influence.figures import InfluenceFigure
+from tank2sim.api.bounds import DrawsArgument, NumberArgument, PositiveArgument, Seed, checked
 from tank2sim.api.conversion import convert
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship, as_ship
@@ -225,20 +226,21 @@ def _shares(row: Mapping[str, object]) -> Mapping[str, float]:
     return found
 
 
+@checked
 def design_campaign(
     card: Ship | Card | str | Path,
     *,
     figures: str | Sequence[str] = DESIGN_FIGURES,
-    hours: float | None = None,
+    hours: NumberArgument | None = None,
     tank: str | Path | TankFile | None = None,
-    carriage_length_m: float | None = None,
-    model_length_m: float | None = None,
+    carriage_length_m: PositiveArgument | None = None,
+    model_length_m: PositiveArgument | None = None,
     usual: str | Path | None = None,
     largest: tuple[float, float, float] | None = None,
     check_runs: bool = True,
     one_side: bool = False,
-    draws: int = DRAWN_SHIPS,
-    seed: int = 0,
+    draws: DrawsArgument = DRAWN_SHIPS,
+    seed: Seed = 0,
 ) -> CampaignDesignResult:
     """Design the next captive campaign of a ship: the runs that make its figures most certain.
 
@@ -286,8 +288,6 @@ def design_campaign(
     """
     if hours is not None and not 0 < hours <= _MOST_HOURS:
         raise InputError("--hours", f"{hours:g}", "is out of bounds", f"give hours above 0 and up to {_MOST_HOURS:g}")
-    if not 0 <= draws <= 1000:
-        raise InputError("--draws", f"{draws}", "is out of bounds", "give 0 to 1000")
     ship = as_ship(card)
     polynomial, converted = _polynomial(ship)
     asked = _figures_of(figures)
@@ -449,11 +449,12 @@ class TrialDesignResult(PagedResult):
         }
 
 
+@checked
 def design_trial(
     card: Ship | Card | str | Path,
     *,
     figures: str | Sequence[str] = DESIGN_FIGURES,
-    minutes: float | None = None,
+    minutes: NumberArgument | None = None,
     sensors: Mapping[str, float] | None = None,
     one_side: bool = False,
 ) -> TrialDesignResult:

@@ -8,9 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import ENSEMBLE
 from tank2sim.api.result import ResultTable
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.memory import refuse_beyond_memory
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -25,6 +27,11 @@ FEW = 64
 
 FEW_IN_LANES = 4000
 """The same of members that run in lanes, a millisecond each. Project choice."""
+
+
+_BYTES = 400
+"""Bytes of a member: some 25 figures, and as many again where quantiles are taken. Project choice, four times what a
+turning circle of 20 s takes."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +58,12 @@ class EnsembleOptions:
     executor: str = PROCESSES
 
     def __post_init__(self) -> None:
+        ENSEMBLE.checked("members", self.members)
         if check_executor(self.executor) != PROCESSES and not self.members:
             raise InputError("--executor", "", "has nothing to do without --ensemble", "give --ensemble N, too")
         if self.members and self.members < 2:
             raise InputError("--ensemble", "", f"is {self.members}", "2 members or more, or 0 for no ensemble")
+        refuse_beyond_memory("members", self.members, _BYTES)
 
     @contextmanager
     def computing(self, few: int = FEW) -> Iterator[Executor | None]:

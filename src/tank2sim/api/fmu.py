@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
@@ -14,7 +15,7 @@ from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
 from tank2sim.fmu.documents import documents_of, documents_without_card
 from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
-from tank2sim.fmu.osp import osp_system
+from tank2sim.fmu.osp import osp_notices, osp_system
 from tank2sim.fmu.platforms import named_platforms
 from tank2sim.fmu.unpacking import embedded_card
 from tank2sim.marks import marked
@@ -38,16 +39,24 @@ class ExportResult(Result):
         SSP package in which a heading autopilot steers the ship.
     files : mapping
         Paths and bytes of both.
+    notices : sequence of str
+        Notices in addition to those of the model.
     """
 
     command = "export"
 
     def __init__(
-        self, ship: Ship, path: Path, exported: ExportedFmu, ssp: Path | None = None, files: Files | None = None
+        self,
+        ship: Ship,
+        path: Path,
+        exported: ExportedFmu,
+        ssp: Path | None = None,
+        files: Files | None = None,
+        notices: Sequence[str] = (),
     ) -> None:
         self.ship, self.path, self.exported, self.ssp = ship, path, exported, ssp
         self.files = files or {}
-        self.notices = tuple(ship.model.notices)
+        self.notices = (*ship.model.notices, *notices)
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
@@ -175,9 +184,10 @@ def make_fmu_file(
         files[ssp] = ship_with_autopilot(model, made, every_input=ssp_inputs, platforms=chosen, report=report)
     if osp:
         files |= {path.parent / name: text for name, text in osp_system(model, path.name).items()}
-    return ExportResult(ship, path, made, ssp, files)
+    return ExportResult(ship, path, made, ssp, files, osp_notices(model) if osp else ())
 
 
+@checked
 def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
 

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tank2sim.api.bounds import Count, Effects, NumberArgument, checked
 from tank2sim.api.gap_files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
@@ -337,6 +338,7 @@ def _by_trial_row(row: Mapping[str, Any]) -> list[object]:
     return [row["trial"], which, f"{speed:g} m/s", speed_error, f"{direction:g} deg", direction_error]
 
 
+@checked
 def find_gap(
     card: Ship | Card | str | Path,
     trials: TrialPaths,
@@ -344,10 +346,10 @@ def find_gap(
     holdout: TrialPaths = (),
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
-    max_effects: int = MOST_EFFECTS,
-    false_discovery: float = 0.5,
+    max_effects: Effects = MOST_EFFECTS,
+    false_discovery: NumberArgument = 0.5,
     executor: str = PROCESSES,
-    workers: int | None = None,
+    workers: Count | None = None,
     progress: StageReport = lambda text: None,
 ) -> GapResult:
     """Find the physical effect that a model lacks to follow free-running trials, add it, and prove it.
@@ -404,12 +406,13 @@ def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
     ]
 
 
+@checked
 def gap_options(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
-    max_effects: int = MOST_EFFECTS,
-    workers: int | None = None,
-    false_discovery: float = 0.5,
+    max_effects: Effects = MOST_EFFECTS,
+    workers: Count | None = None,
+    false_discovery: NumberArgument = 0.5,
 ) -> GapOptions:
     """Options of the search. Raises InputError for an effect that is not known, or a number out of its range.
 
@@ -424,10 +427,6 @@ def gap_options(
         for name in names:
             if EFFECTS.get(name) is None:
                 raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    if workers is not None and workers < 1:
-        raise InputError("--workers", "", f"is {workers}", "give 1 or more")
-    if not 1 <= max_effects <= MOST_EFFECTS:
-        raise InputError("--max-effects", "", f"is {max_effects}", f"give 1 to {MOST_EFFECTS}")
     if not SUREST_WRONG <= false_discovery <= 0.5:
         problem = f"is {false_discovery:g}: no name is surer than {1 - SUREST_WRONG:g}, and half is a guess"
         raise InputError("--false-discovery", "", problem, f"give {SUREST_WRONG:g} to 0.5")

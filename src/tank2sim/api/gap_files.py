@@ -95,7 +95,7 @@ def _of_earlier_run(folder: Path) -> set[Path]:
         earlier = json.loads((folder / GAP).read_text(encoding="utf-8"))
         names = [*earlier.get("files", ()), (earlier.get("next_test") or {}).get("orders", "")]
         paths = [PurePosixPath(name) for name in names]
-    except (OSError, ValueError, AttributeError, TypeError):
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
         return set()  # none, or another program's
     trials = {
         folder / path for path in paths if len(path.parts) == 2 and any(path.match(f"{name}/*.csv") for name in FOLDERS)

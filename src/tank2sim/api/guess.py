@@ -8,14 +8,20 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, POSTER_MANOEUVRES
 from tank2sim.analysis.guess.prior import ShipDimensions
 from tank2sim.analysis.guess.study import Guess, figure_unit, guess_ship, parse_figures
+from tank2sim.api.bounds import GuessedShips, PositiveArgument, Seed, checked
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
+from tank2sim.memory import refuse_beyond_memory
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_BYTES = 15_000
+"""Bytes of a ship of the prior, measured: 14 kB."""
 
 
 class GuessResult(PagedResult):
@@ -91,17 +97,18 @@ class GuessResult(PagedResult):
         return found
 
 
+@checked
 def guess(
     *,
-    length_m: float,
-    beam_m: float,
-    draught_m: float,
-    block: float,
-    speed_kn: float,
+    length_m: PositiveArgument,
+    beam_m: PositiveArgument,
+    draught_m: PositiveArgument,
+    block: PositiveArgument,
+    speed_kn: PositiveArgument,
     figures: Mapping[str, str] | None = None,
     name: str = "guessed ship",
-    members: int = DEFAULT_MEMBERS,
-    seed: int = 0,
+    members: GuessedShips = DEFAULT_MEMBERS,
+    seed: Seed = 0,
 ) -> GuessResult:
     """Guess a ship from its main dimensions and figures of its manoeuvres.
 
@@ -137,6 +144,7 @@ def guess(
     >>> bool(found.figures.loc["tactical_diameter@turn35", "p5"] < 980)
     True
     """
+    refuse_beyond_memory("members", members, _BYTES)
     ship = ShipDimensions(length_m=length_m, beam_m=beam_m, draught_m=draught_m, block=block, speed_kn=speed_kn)
     if members < LEAST_MEMBERS:
         raise InputError("--members", "", f"is {members}", f"{LEAST_MEMBERS} or more were expected")

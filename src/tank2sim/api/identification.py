@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tank2sim.analysis.ensemble.draws import by_file_name
+from tank2sim.api.bounds import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
@@ -205,6 +206,7 @@ class IdentificationResult(Result):
         ]
 
 
+@checked
 def identify(
     card: Ship | Card | str | Path,
     trials: TrialPaths,
@@ -214,16 +216,16 @@ def identify(
     structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
     inertia: bool = False,
-    piece_s: float | None = None,
+    piece_s: PositiveArgument | None = None,
     trust_card: bool = False,
     hold: Sequence[str] = (),
     force: bool = False,
-    members: int = 100,
-    bootstrap: int = 0,
+    members: SmallEnsemble = 100,
+    bootstrap: SmallEnsemble = 0,
     posterior: str = "",
-    draws: int = DRAWS_OF_CHAIN,
+    draws: DrawsOfChain = DRAWS_OF_CHAIN,
     executor: str = PROCESSES,
-    workers: int | None = None,
+    workers: Count | None = None,
     progress: SearchReport = silent,
 ) -> IdentificationResult:
     """Identify the coefficients of a ship from free-running trials.
@@ -284,8 +286,6 @@ def identify(
     ):
         if value not in known:
             raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
-    if piece_s is not None and not 0 < piece_s < float("inf"):
-        raise InputError("--piece", "", f"is {piece_s:g} s", "a positive number of seconds was expected")
     ship = as_ship(card).manoeuvring()
     options = IdentificationOptions(
         method=method,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialRecord
@@ -305,6 +306,7 @@ def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
     return removed
 
 
+@checked
 def log(
     files: str | Path | Sequence[str | Path],
     *,

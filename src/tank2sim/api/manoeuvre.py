@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.dynamics.external_forces import external_inputs, with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
+from tank2sim.marks import CHECK
 from tank2sim.simulation.card_range import entry_name, single_figures
 from tank2sim.simulation.manoeuvres import Manoeuvre, PullOut, parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
@@ -23,6 +27,25 @@ if TYPE_CHECKING:
 
     from tank2sim.analysis.ensemble.results import ManoeuvreBands
     from tank2sim.api.ship import Ship
+
+
+_LEAST_DEG, _MOST_DEG = 5.0, 45.0
+"""Rudder angles that are ordered in manoeuvres, where the card states no largest one: IMO MSC.137(76) has 10 to 35 deg,
+spirals go down to 5. Project choice."""
+
+
+def _doubt_of_radians(run: Run) -> list[str]:
+    """A notice if all orders of the rudder are so small in deg that they are angles of manoeuvres in rad."""
+    model = run.trajectory.model
+    if "rudder.command" not in model.input_names:
+        return []
+    largest = math.degrees(float(np.abs(run.trajectory["rudder.command"]).max()))
+    limits = [parameter.start for parameter in model.parameters if parameter.name == "steering.max_angle"]
+    most = math.degrees(limits[0]) if limits else _MOST_DEG
+    if not _LEAST_DEG <= math.degrees(largest) <= most + 1e-6:
+        return []
+    rudder = f"the largest rudder angle is {largest:.3g} deg"
+    return [f"{CHECK} {rudder}; if it was meant in rad, give {math.degrees(largest):.3g}: angles are in deg"]
 
 
 class ManoeuvreResult(PagedResult):
@@ -56,7 +79,8 @@ class ManoeuvreResult(PagedResult):
         self, ship: Ship, words: str, run: Run, bands: ManoeuvreBands | None = None, other_side: Run | None = None
     ) -> None:
         self.ship, self.words, self.run, self.bands, self.other_side = ship, words, run, bands, other_side
-        self.notices = tuple(dict.fromkeys([*run.notices, *(bands.asked.notices if bands else ())]))
+        self._of_run = (*_doubt_of_radians(run), *run.notices)
+        self.notices = tuple(dict.fromkeys([*self._of_run, *(bands.asked.notices if bands else ())]))
 
     @property
     def figures(self) -> dict[str, float]:
@@ -95,7 +119,7 @@ class ManoeuvreResult(PagedResult):
             "figures": self.run.figures,
             "limits": self.limits,
             **self.run.reading.as_json(),
-            "notices": self.run.notices,
+            "notices": self._of_run,
             "histories": histories(self.run.trajectory),
             **({"ensemble": self.bands.as_json()} if self.bands else {}),
             **({"other_side": {"figures": other.figures, "histories": histories(other.trajectory)}} if other else {}),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
@@ -324,6 +325,7 @@ def _place(key: str) -> str:
     return f"propeller.{key}" if key in PROPELLER_COEFFICIENTS else f"rudder.{key}"
 
 
+@checked
 def reduce_to_mmg(campaign: str | Path) -> MmgReductionResult:
     """Reduce steady captive tests with thrust and rudder normal force to the coefficients of the MMG method.
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
@@ -156,6 +157,7 @@ class ReductionResult(Result):
         return dict(reduction_charts(self.to_dict()))
 
 
+@checked
 def reduce(
     campaign: str | Path,
     *,

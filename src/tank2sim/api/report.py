@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tank2sim.api.bounds import checked
 from tank2sim.api.result import PagedResult, Result, ResultTable
-from tank2sim.errors import InputError
-from tank2sim.files import plain_json, write_together
+from tank2sim.files import parsed_json, plain_json, read_text, refuse_deep, write_together
 from tank2sim.marks import marked
 
 if TYPE_CHECKING:
@@ -80,6 +79,7 @@ class ReportResult(PagedResult):
         return self._layout
 
 
+@checked
 def make_report(result: Result | Mapping[str, object] | str | Path, path: str | Path | None = None) -> ReportResult:
     """Make the page of a result.
 
@@ -98,6 +98,7 @@ def make_report(result: Result | Mapping[str, object] | str | Path, path: str | 
     if isinstance(result, Result):
         found = ReportResult(result.to_dict(), f"tank2sim {result.command}")
     elif isinstance(result, Mapping):
+        refuse_deep(result, "the result")
         found = ReportResult(plain_json(result), "the result")
     else:
         found = ReportResult(read_result(Path(result)), str(result))
@@ -115,16 +116,4 @@ def read_result(path: Path) -> Any:
     InputError
         The file cannot be read, or is not JSON that a page can show.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-        json.dumps(content, ensure_ascii=False).encode()  # a text may hold half a character, which no page can
-        return content
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", _REMEDY) from None
-    except json.JSONDecodeError as error:
-        raise InputError(path, f"line {error.lineno}", f"is not JSON ({error.msg})", _REMEDY) from None
-    except UnicodeEncodeError:
-        problem = "holds half of a character (a lone surrogate, \\ud800 to \\udfff)"
-        raise InputError(path, "", problem, _REMEDY) from None
-    except (ValueError, RecursionError):  # a ValueError also where an integer has thousands of digits
-        raise InputError(path, "", "is not JSON", _REMEDY) from None
+    return parsed_json(read_text(path), path, _REMEDY)

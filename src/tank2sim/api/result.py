@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from tank2sim.api.bounds import checked
 from tank2sim.files import json_text, plain_json, schema_name, write_together
 from tank2sim.marks import marked
 
@@ -113,6 +114,7 @@ class Result(ABC):
         plain: dict[str, object] = plain_json({"schema": self.schema, **self.content()})
         return plain
 
+    @checked
     def to_json(self, path: str | Path | None = None, **keys: object) -> str:
         """Return the result as JSON text, also written to `path`; `keys` are added at its end.
 
@@ -130,8 +132,9 @@ class Result(ABC):
         """Charts of the result by name, the main one first; empty where the command draws none."""
         return {}
 
+    @checked
     def plot(self, path: str | Path | None = None, name: str | None = None) -> alt.TopLevelMixin:
-        """One chart of the result (Altair), also written to `path` as PNG.
+        """One chart of the result (Altair), also written to `path` as PNG, SVG or PDF, by its ending.
 
         Parameters
         ----------
@@ -153,14 +156,14 @@ class Result(ABC):
             )
         chart = charts[name] if name is not None else next(iter(charts.values()))
         if path is not None:
-            write_together({Path(path): self.picture(name)})
+            write_together({Path(path): self.picture(name, ending=Path(path).suffix)})
         return chart
 
-    def picture(self, name: str | None = None) -> bytes:
-        """One chart of the result as PNG."""
-        from tank2sim.report.kit.charts import chart_png
+    def picture(self, name: str | None = None, *, ending: str = ".png") -> bytes:
+        """One chart of the result as PNG, or as SVG or PDF if that is the `ending` of its file's name."""
+        from tank2sim.report.kit.charts import chart_picture
 
-        return chart_png(self.plot(name=name))
+        return chart_picture(self.plot(name=name), ending)
 
     def layout(self) -> Page:
         """Return sections, tables and charts of the page, made from :meth:`to_dict` alone.
@@ -180,6 +183,7 @@ class Result(ABC):
 
         return render_page(self.layout())
 
+    @checked
     def to_html(self, path: str | Path) -> None:
         """Write :meth:`page` to a file."""
         write_together({Path(path): self.page()})

@@ -10,6 +10,7 @@ from typing import Any, NotRequired
 from pydantic import ConfigDict, TypeAdapter
 from typing_extensions import TypedDict
 
+from tank2sim.api.bounds import checked
 from tank2sim.files import schema_name
 
 Number = float | None
@@ -1249,6 +1250,7 @@ KEYS: dict[str, Any] = {
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 
 
+@checked
 def json_schema(command: str) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of the JSON that a command writes.
 

@@ -10,6 +10,17 @@ from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
+from tank2sim.api.bounds import (
+    AngleArgument,
+    EnsembleSize,
+    NonNegativeArgument,
+    NumberArgument,
+    PositiveArgument,
+    Seed,
+    SpeedArgument,
+    TuningRange,
+    checked,
+)
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
@@ -48,8 +59,8 @@ class SimulationOptions(TypedDict, total=False):
     """Options of every simulated manoeuvre; see :meth:`Ship.simulate`."""
 
     duration_s: float | None
-    members: int
-    seed: int
+    members: EnsembleSize
+    seed: Seed
     executor: str
 
 
@@ -147,6 +158,7 @@ class Ship:
         """
         return self.card if isinstance(self.card, CraftCard) else self.manoeuvring()
 
+    @checked
     def replace(self, values: Mapping[str, object]) -> Ship:
         """The ship with other values on its card, by dotted key: ``{"derivatives.Yv": -0.012}``.
 
@@ -157,6 +169,7 @@ class Ship:
         """
         return Ship(parse_card(changed_text(self.card.text, self.card.source, values), self.card.source))
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write the card's TOML to a file, whole or not at all.
 
@@ -167,6 +180,7 @@ class Ship:
         """
         write_together({Path(path): self.card.text})
 
+    @checked
     def with_waves(
         self,
         mesh: str | Path,
@@ -217,15 +231,17 @@ class Ship:
         given = {name: value for name, value in stated.items() if value is not None}
         return Ship(card_in_waves(card, mesh, hull_of(card, given)))
 
-    def turn(self, rudder_deg: float = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    @checked
+    def turn(self, rudder_deg: AngleArgument = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a turning circle: the rudder is put over at t = 0 and held for 540 deg of heading.
 
         Options are those of :meth:`simulate`.
         """
         return self.simulate(f"turn:{rudder_deg:.10g}", **options)
 
+    @checked
     def zigzag(
-        self, rudder_deg: float = 10.0, heading_deg: float = 10.0, **options: Unpack[SimulationOptions]
+        self, rudder_deg: AngleArgument = 10.0, heading_deg: AngleArgument = 10.0, **options: Unpack[SimulationOptions]
     ) -> ManoeuvreResult:
         """Simulate a zigzag: the rudder (negative begins to port) is reversed at each `heading_deg` off the course.
 
@@ -233,24 +249,30 @@ class Ship:
         """
         return self.simulate(f"zigzag:{rudder_deg:.10g}/{heading_deg:.10g}", **options)
 
-    def pullout(self, rudder_deg: float = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    @checked
+    def pullout(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a pull-out: a steady turn with `rudder_deg`, then the neutral rudder. Options: :meth:`simulate`."""
         return self.simulate(f"pullout:{rudder_deg:.10g}", **options)
 
-    def spiral(self, rudder_deg: float = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    @checked
+    def spiral(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a direct (Dieudonne) spiral, from `rudder_deg` to the other side and back.
 
         Options are those of :meth:`simulate`.
         """
         return self.simulate(f"spiral:{rudder_deg:.10g}", **options)
 
-    def stop(self, revolutions_rpm: float | None = None, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    @checked
+    def stop(
+        self, revolutions_rpm: NumberArgument | None = None, **options: Unpack[SimulationOptions]
+    ) -> ManoeuvreResult:
         """Simulate a stop with revolutions astern (rpm, negative or 0), by default full astern.
 
         Options are those of :meth:`simulate`.
         """
         return self.simulate("stop" if revolutions_rpm is None else f"stop:{revolutions_rpm:.10g}", **options)
 
+    @checked
     def steer(
         self,
         orders: pd.DataFrame | Mapping[str, Sequence[float]] | str | Path,
@@ -275,20 +297,33 @@ class Ship:
 
         if isinstance(orders, str | Path):
             return self.simulate(read_orders(Path(orders)), **options)
+        if not hasattr(orders, "keys"):
+            problem = f"is of the type {type(orders).__name__}"
+            raise InputError("orders", "", problem, "give a data frame, a mapping of columns or a file")
         columns: dict[str, Array] = {}
         for name in orders:
             si_name, factor = to_si(str(name), 1.0)
-            columns[si_name] = factor * np.asarray(orders[name], dtype=float)
+            if si_name in columns:
+                raise InputError("orders", f"column {name}", "is given twice", "give each order once")
+            try:
+                columns[si_name] = factor * np.asarray(orders[name], dtype=float)
+            except (TypeError, ValueError):
+                raise InputError(
+                    "orders", f"column {name}", "holds something else than numbers", "give numbers"
+                ) from None
+        if len({values.shape for values in columns.values()}) > 1 or any(each.ndim != 1 for each in columns.values()):
+            raise InputError("orders", "", "has columns of different lengths", "give an order for each time")
         return self.simulate(orders_from_columns(columns, "orders"), **options)
 
+    @checked
     def simulate(
         self,
         manoeuvre: str | Manoeuvre,
         *,
-        duration_s: float | None = None,
+        duration_s: PositiveArgument | None = None,
         external: Mapping[str, float] | None = None,
-        members: int = 0,
-        seed: int = 0,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
         executor: str = PROCESSES,
     ) -> ManoeuvreResult:
         """Simulate a manoeuvre in the words of the command line: ``"zigzag:20/20"``, ``"turn:-35"``, ``"stop"``.
@@ -318,18 +353,22 @@ class Ship:
         from tank2sim.api.manoeuvre import simulate_manoeuvre
         from tank2sim.simulation.manoeuvres import parse_manoeuvre
 
+        if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
+            problem = f"is of the type {type(manoeuvre).__name__}"
+            raise InputError("manoeuvre", "", problem, "give a text, for example 'turn:35'")
         parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
         words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
         ensemble = EnsembleOptions(members, seed, executor)
         return simulate_manoeuvre(self, parsed, words, duration_s, ensemble, external)
 
+    @checked
     def stability(
         self,
-        speed_mps: float | None = None,
+        speed_mps: SpeedArgument | None = None,
         *,
         spirals: bool = True,
-        members: int = 0,
-        seed: int = 0,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
         executor: str = PROCESSES,
     ) -> StabilityResult | CraftStabilityResult:
         """Straight-line stability, steady turning and the IMO criteria; of a craft what is not of a rudder.
@@ -359,9 +398,10 @@ class Ship:
 
         return judge_stability(self, speed_mps, spirals=spirals, ensemble=EnsembleOptions(members, seed, executor))
 
+    @checked
     def state_space(
         self,
-        speed_mps: float | None = None,
+        speed_mps: SpeedArgument | None = None,
         *,
         states: Iterable[str] | None = None,
         inputs: Iterable[str] | None = None,
@@ -391,13 +431,14 @@ class Ship:
         settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
+    @checked
     def influence(
         self,
         figures: str | Sequence[str] = (),
         *,
         joint_variation: Mapping[str, float] | None = None,
-        members: int = 0,
-        seed: int = 0,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
         executor: str = PROCESSES,
     ) -> InfluenceResult:
         """Influence coefficients: by how many per cent a figure changes for 10 % more of each number on the card.
@@ -424,18 +465,19 @@ class Ship:
         names = [figures] if isinstance(figures, str) else list(figures)
         return influence_of_ship(self, names, joint_variation or {}, EnsembleOptions(members, seed, executor))
 
+    @checked
     def tune(
         self,
         targets: str | Sequence[str],
         *,
         figures: str | Sequence[str] = (),
         by: str = "uncertain",
-        within: float = 3.0,
+        within: TuningRange = 3.0,
         hold: Sequence[str] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
         joint_variation: Mapping[str, float] | None = None,
-        members: int = 0,
-        seed: int = 0,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
         executor: str = PROCESSES,
     ) -> TuningResult:
         """Change the card until figures have the values that a trial or a standard gives.
@@ -472,6 +514,7 @@ class Ship:
         means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
         return tune_ship(self, wanted, further, means, EnsembleOptions(members, seed, executor))
 
+    @checked
     def tune_through(self, first: str, second: str) -> TurnTuningResult:
         """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.
 
@@ -490,19 +533,20 @@ class Ship:
 
         return tune_ship_through(self, first, second)
 
+    @checked
     def autopilot(
         self,
         design: str = "pid",
         *,
-        speed_mps: float | None = None,
-        heading_weight_deg: float = 5.0,
-        rudder_weight_deg: float = 5.0,
-        wave_filter_radps: float | None = None,
-        course_change_deg: float = 20.0,
-        current_mps: float | None = None,
-        wind_mps: float | None = None,
-        wave_yaw_deg: float | None = None,
-        seed: int | None = None,
+        speed_mps: SpeedArgument | None = None,
+        heading_weight_deg: PositiveArgument = 5.0,
+        rudder_weight_deg: PositiveArgument = 5.0,
+        wave_filter_radps: PositiveArgument | None = None,
+        course_change_deg: AngleArgument = 20.0,
+        current_mps: NonNegativeArgument | None = None,
+        wind_mps: NonNegativeArgument | None = None,
+        wave_yaw_deg: NonNegativeArgument | None = None,
+        seed: Seed | None = None,
         track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
     ) -> AutopilotResult | CraftAutopilotResult:
         """Design a heading controller, judge its loop and try it; of a craft with thrusters, one of heading and speed.
@@ -571,16 +615,17 @@ class Ship:
         )
         return pilot_ship(self, settings, track)
 
+    @checked
     def glide(
         self,
         angles_deg: float | Sequence[float] = (),
         *,
-        roll_deg: float = 0.0,
-        buoyancy_kg: float | None = None,
+        roll_deg: AngleArgument = 0.0,
+        buoyancy_kg: PositiveArgument | None = None,
         programme: GlideProgramme | str | Path | None = None,
         as_printed: bool = False,
-        budget_kg: float | None = None,
-        depth_m: float | None = None,
+        budget_kg: NumberArgument | None = None,
+        depth_m: NumberArgument | None = None,
         views: bool = False,
     ) -> GlideResult:
         """Steady glides of an underwater glider, the path of a programme, and what is best.
@@ -625,6 +670,7 @@ class Ship:
         )
         return glide_with(self, question)
 
+    @checked
     def poster(
         self,
         path: str | Path | None = None,
@@ -653,6 +699,7 @@ class Ship:
 
         return self._written(PosterResult(*bridges_of(self, ballast, orders or {})), path)
 
+    @checked
     def pilot_card(
         self,
         path: str | Path | None = None,
@@ -671,6 +718,7 @@ class Ship:
 
         return self._written(PilotCardResult(*bridges_of(self, ballast, orders or {})), path)
 
+    @checked
     def steering_page(
         self,
         path: str | Path | None = None,
@@ -709,6 +757,7 @@ class Ship:
             write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
         return result
 
+    @checked
     def to_fmu(
         self, path: str | Path, *, fmi: int = 3, platforms: str = "host", sources: bool = True, osp: bool = False
     ) -> ExportResult:
@@ -749,6 +798,7 @@ class Ship:
         return f"{self.name} ({', '.join(particulars)}); {self.card.source}"
 
 
+@checked
 def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
     """Read a ship from its card.
 

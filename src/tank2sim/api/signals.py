@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tank2sim.api.audit import MEASURED_SAMPLES
+from tank2sim.api.bounds import PositiveArgument, checked
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.errors import InputError
@@ -164,12 +165,13 @@ class SignalsResult(Result):
         return [(analysis.trial, column) for analysis in self.analyses for column in analysis.columns]
 
 
+@checked
 def signals(
     trials: TrialPaths,
-    columns: Sequence[str] = (),
+    columns: str | Sequence[str] = (),
     *,
-    max_gap_s: float | None = None,
-    segment_s: float | None = None,
+    max_gap_s: PositiveArgument | None = None,
+    segment_s: PositiveArgument | None = None,
     filter: str | None = None,
 ) -> SignalsResult:
     """Mean, spread, correlation time, stationarity, normality and spectra of the signals of trials.

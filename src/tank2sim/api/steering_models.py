@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare_steering_models
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
+from tank2sim.api.bounds import AngleArgument, checked
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.turn_tuning import stability_change, turn_table
 from tank2sim.cards.steering_card import SteeringCard, read_steering_card
@@ -129,7 +130,8 @@ class SteeringModelsResult(PagedResult):
         return ResultTable(title, ("model", *heads, "10/10 overshoots (deg)"), rows)
 
 
-def steering_models(card: str | Path, rudder_deg: float | None = None) -> SteeringModelsResult:
+@checked
+def steering_models(card: str | Path, rudder_deg: AngleArgument | None = None) -> SteeringModelsResult:
     """Compare the models of a steering card.
 
     Parameters

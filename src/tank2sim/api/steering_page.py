@@ -28,8 +28,8 @@ class SteeringPageResult(Result):
     ship : Ship
     model : Model
         What the page holds: with a measured rudder angle, one that can follow it.
-    library : str or None
-        The model as WebAssembly, base64; None without its compiler.
+    library : str
+        The model as WebAssembly, base64.
     ghost : Ghost, optional
         A measured trial next to the ship.
     notices : tuple of str
@@ -49,7 +49,7 @@ class SteeringPageResult(Result):
         self,
         ship: Ship,
         model: Model,
-        library: str | None,
+        library: str,
         ghost: Ghost | None,
         notices: tuple[str, ...],
         members: Sequence[Mapping[str, float]] = (),
@@ -57,20 +57,17 @@ class SteeringPageResult(Result):
         scenario: Scenario | None = None,
         view_3d: bool = False,
     ) -> None:
-        from tank2sim.report.steering.ship import NO_WASM_COMPILER
-
         self.ship, self.model, self.library, self.ghost = ship, model, library, ghost
         self.members, self.autopilot, self.scenario = tuple(members), autopilot, scenario
         self.view_3d = view_3d
-        self._page_notices = tuple(dict.fromkeys(notices))  # the page itself says first that there is no ship in it
-        self.notices = self._page_notices if library else (NO_WASM_COMPILER, *self._page_notices)
+        self.notices = tuple(dict.fromkeys(notices))
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
         return {
             "ship": self.ship.name,
             "ghost": self.ghost.label if self.ghost else None,
-            "steerable": self.library is not None,
+            "steerable": True,
             "members": len(self.members),
             "autopilot": self.autopilot or None,
             "scenario": self.scenario.name if self.scenario else None,
@@ -107,7 +104,7 @@ class SteeringPageResult(Result):
             beam_m=self.ship.card.ship.beam_m,
             draught_m=self.ship.card.ship.draught_m,
         )
-        return steering_page(ship, self.ghost, self._page_notices, self.scenario, self.view_3d)
+        return steering_page(ship, self.ghost, self.notices, self.scenario, self.view_3d)
 
     @property
     def _size_kB(self) -> float:
@@ -178,13 +175,14 @@ def make_steering_page(
     return SteeringPageResult(ship, model, library, shown, notices, members, autopilot, waters, view_3d)
 
 
-def _compiled(model: Model, report: Callable[[str], None]) -> str | None:
-    """The library of a model; None without the compiler."""
+def _compiled(model: Model, report: Callable[[str], None]) -> str:
+    """The library of a model. Raises InputError without the compiler for WebAssembly."""
     from tank2sim.native.cross import has_compiled
     from tank2sim.report.steering import ship as page_ship
 
     if not page_ship.has_compiler():
-        return None
+        problem = "needs a compiler for WebAssembly, which is not installed: without it no ship is in the page"
+        raise InputError("steer", "", problem, "pip install tank2sim[platforms], and write the page again")
     if not has_compiled(page_ship.WEB):
         report(FIRST_COMPILATION)
     return page_ship.ship_in_page(model)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from numpy.polynomial import Polynomial
 
+from tank2sim.api.bounds import NumberArgument, checked
 from tank2sim.api.result import Result, ResultTable, cell_text, section_charts
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, parse_card
@@ -153,17 +154,18 @@ class TowResult(Result):
         return ResultTable("Output error, models of different size", columns, rows, tuple(notes))
 
 
+@checked
 def tow(
     tows: str | Path,
     *,
     force_N: float | Sequence[float] | None = None,
-    mass_kg: float | None = None,
+    mass_kg: NumberArgument | None = None,
     terms: str | Sequence[str] = "B3,B2,B1",
     start_delay: bool = False,
-    total_mass_kg: float | None = None,
-    length_m: float | None = None,
-    beam_m: float | None = None,
-    volume_m3: float | None = None,
+    total_mass_kg: NumberArgument | None = None,
+    length_m: NumberArgument | None = None,
+    beam_m: NumberArgument | None = None,
+    volume_m3: NumberArgument | None = None,
     method: str = "output_error",
     name: str | None = None,
 ) -> TowResult:

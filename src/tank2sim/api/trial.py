@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import checked
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.records.reading import READERS, looks_like_a_trial
@@ -111,6 +112,7 @@ TrialPaths = Sequence[TrialRecord | str | Path] | TrialRecord | str | Path
 """Trials by their files, folders or records."""
 
 
+@checked
 def read_trial(path: str | Path) -> TrialRecord:
     """Read a trial: the project's CSV, a SIMMAN ``.dat`` or an Esso Osaka CSV, by its first line.
 

@@ -15,6 +15,7 @@ from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
 from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, Verified, verify
 from tank2sim.analysis.validation.study import validate_card as validate_figures
+from tank2sim.api.bounds import PositiveArgument, SmallEnsemble, checked
 from tank2sim.api.craft_validation import CraftValidationResult, validate_craft
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
@@ -157,12 +158,13 @@ class ValidationResult(Result):
         return section_charts(self.layout().sections)
 
 
+@checked
 def validate(
     card: Ship | Card | str | Path,
     trials: TrialPaths = (),
     *,
-    members: int = MEMBERS,
-    required_percent: float = REQUIRED,
+    members: SmallEnsemble = MEMBERS,
+    required_percent: PositiveArgument = REQUIRED,
 ) -> ValidationResult | CraftValidationResult:
     """Validate a ship in the manner of ITTC 7.5-02-06-03 by trials that did not make its card, figure by figure.
 

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument, checked
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, YawRigCard, parse_card
@@ -199,17 +200,18 @@ class YawResult(Result):
         return self.method
 
 
+@checked
 def yaw(
     records: Sequence[str | Path] | str | Path,
     *,
-    inertia_kgm2: float | None = None,
-    inertia_error_kgm2: float | None = None,
-    torque_constant_NmpA: float | None = None,
+    inertia_kgm2: PositiveArgument | None = None,
+    inertia_error_kgm2: NonNegativeArgument | None = None,
+    torque_constant_NmpA: PositiveArgument | None = None,
     reference: str | Path | None = None,
-    reference_inertia_kgm2: float | None = None,
+    reference_inertia_kgm2: PositiveArgument | None = None,
     rig: Ship | Card | str | Path | None = None,
     terms: str | Sequence[str] | None = None,
-    mirror_percent: float = 25.0,
+    mirror_percent: Percent = 25.0,
     method: str = BEST,
     theory: str | None = None,
 ) -> YawResult:
@@ -276,6 +278,7 @@ def yaw(
     return YawResult(found, method, known, values)
 
 
+@checked
 def simulate_yaw(
     card: Ship | Card | str | Path,
     path: str | Path,
@@ -283,7 +286,7 @@ def simulate_yaw(
     medium: Medium = "water",
     controller: str = "tuned",
     similar_to: str | None = None,
-    noise_A: float = 0.0,
+    noise_A: NonNegativeArgument = 0.0,
 ) -> Path:
     """Write the record that the yaw rig of a card would give, and return its file.
 

@@ -11,7 +11,6 @@ import csv
 import io
 import math
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Any
 
 from tank2sim.cards.card import OPPOSITE
 from tank2sim.cards.form import Environment
-from tank2sim.cards.reading import faults_of_toml
+from tank2sim.cards.reading import parsed_toml
 from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_text
@@ -123,8 +122,7 @@ def read_coefficients(path: str | Path) -> CoefficientTable:
 
 
 def _of_toml(text: str, source: str) -> CoefficientTable:
-    with faults_of_toml(source):
-        content = tomllib.loads(text)
+    content = parsed_toml(text, source)
     sections = {}
     read = ("ship", "model", "rigid_body", "derivatives", "environment")
     for name in read:

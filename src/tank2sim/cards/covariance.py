@@ -20,9 +20,10 @@ from typing import Any
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import Card
+from tank2sim.cards.card import Card, ManoeuvringCard
+from tank2sim.cards.reading import LARGEST_PRIME
 from tank2sim.errors import InputError
-from tank2sim.files import BYTE_ORDER_MARK, read_text
+from tank2sim.files import BYTE_ORDER_MARK, named_in, parsed_json, read_text
 
 _FORMAT = "tank2sim-covariance/1"
 
@@ -89,7 +90,7 @@ def referring(text: str, card: Path) -> str:
     """
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     kept = _WHOLE_LINE.sub("", text.removeprefix(mark))
-    lines = kept.splitlines(keepends=True)
+    lines = re.split(r"(?<=\n)", kept)  # other ends of lines may stand within a comment
     head = next((place for place, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return mark + "".join([*lines[:head], f"# covariance: {covariance_file(card).name}\n", *lines[head:]])
 
@@ -155,18 +156,16 @@ def read_covariance(card: Card) -> Covariance | None:
     if not path.is_file():
         remedy = f"put it next to the card, or take the line '# covariance: {found[1]}' out"
         raise InputError(path, "", f"is missing, and {card.source} refers to it", remedy)
-    names, rows, drawn = _form(path)
-    matrix = _matrix(path, names, rows)
-    _check_names(card, path, names)
-    _check_errors(card, path, names, matrix)
-    return Covariance(tuple(names), matrix, None if drawn is None else _samples(path, matrix, drawn))
+    with named_in(card.source, path):
+        names, rows, drawn = _form(path)
+        matrix = _matrix(path, names, rows)
+        _check_names(card, path, names)
+        _check_errors(card, path, names, matrix)
+        return Covariance(tuple(names), matrix, None if drawn is None else _samples(path, matrix, drawn))
 
 
 def _form(path: Path) -> tuple[list[str], object, object]:
-    try:
-        content = json.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"is not JSON ({error})", "write it again with reduce or identify") from None
+    content = parsed_json(read_text(path), path, "write it again with reduce or identify")
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise InputError(path, "format", f"is not {_FORMAT!r}", "give a file that reduce or identify wrote")
     names = content.get("names")
@@ -179,10 +178,7 @@ def _form(path: Path) -> tuple[list[str], object, object]:
 
 def _samples(path: Path, matrix: Array, rows: object) -> Array:
     """Samples (n, k) whose variances are those of the covariance, up to their own scatter."""
-    try:
-        samples = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
-        samples = np.zeros(0)
+    samples = _table(rows)
     remedy = "write it again with identify, or take the samples out"
     if samples.ndim != 2 or samples.shape[1] != len(matrix) or len(samples) < 2 or not np.isfinite(samples).all():
         raise InputError(path, "samples", f"is not a table of rows of {len(matrix)} finite numbers", remedy)
@@ -193,11 +189,18 @@ def _samples(path: Path, matrix: Array, rows: object) -> Array:
     return samples
 
 
-def _matrix(path: Path, names: Sequence[str], rows: object) -> Array:
+def _table(rows: object) -> Array:
+    """Rows of numbers of a JSON file; empty if a cell is a text, a truth value or missing."""
+    flat = [cell for row in rows if isinstance(row, list) for cell in row] if isinstance(rows, list) else []
     try:
-        matrix = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
-        matrix = np.zeros(0)
+        numbers = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in flat)
+        return np.array(rows, dtype=float) if numbers else np.zeros(0)
+    except (TypeError, ValueError, OverflowError):  # an integer may be beyond all floats
+        return np.zeros(0)
+
+
+def _matrix(path: Path, names: Sequence[str], rows: object) -> Array:
+    matrix = _table(rows)
     if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
         problem = f"is not a matrix of {len(names)} rows of {len(names)} finite numbers"
         raise InputError(path, "covariance", problem, "give a row for each of the names")
@@ -227,10 +230,18 @@ def _check_names(card: Card, path: Path, names: Sequence[str]) -> None:
 
 def _check_errors(card: Card, path: Path, names: Sequence[str], matrix: Array) -> None:
     content = tomllib.loads(card.text.removeprefix(BYTE_ORDER_MARK))
+    known = (
+        {f"derivatives.{key}": name for name, key in card.places.items()} if isinstance(card, ManoeuvringCard) else {}
+    )
     for name, variance in zip(names, np.diag(matrix), strict=True):
         key = _uncertainty_of(name)
         stated = _at(content, key)
         error = math.sqrt(variance)
+        if isinstance(card, ManoeuvringCard) and name in known:
+            prime = error / abs(card.file_factor(known[name]))
+            if prime > LARGEST_PRIME:
+                problem = f"has a standard error of {prime:.4g} in the prime system"
+                raise InputError(path, f"covariance of {name}", problem, f"at most {LARGEST_PRIME:g} was expected")
         if isinstance(stated, int | float) and abs(stated - error) > _ROUNDING * max(abs(stated), error):
             problem = f"is {stated:.4g}, and {path.name} says {error:.4g}"
             raise InputError(card.source, key, problem, "make them agree, or take the line '# covariance: ...' out")

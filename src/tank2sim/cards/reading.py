@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 from pydantic import ValidationError
 from tomlkit.exceptions import TOMLKitError
@@ -45,7 +46,8 @@ from tank2sim.cards.scaling import FileScales, file_factor
 from tank2sim.cards.small_craft import body_scales, craft_card, craft_scale, craft_scales
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
-from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
+from tank2sim.escaping import one_line
+from tank2sim.files import BYTE_ORDER_MARK, read_exact_text, refuse_deep
 from tank2sim.units import to_si
 
 LARGEST_PRIME = 1e4
@@ -160,9 +162,13 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
             table = table[section]
             if not isinstance(table, dict | list):
                 raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
-        table[last] = value
+        try:
+            table[last] = value.item() if isinstance(value, np.generic) else value
+        except (TypeError, ValueError):
+            problem = f"cannot be a value of the type {type(value).__name__}"
+            raise InputError(source, key, problem, "give a number, a text or a list of numbers") from None
         if comment is not None and not isinstance(table, tomlkit.items.InlineTable):  # {...} cannot hold comments
-            table[last].comment(comment)
+            table[last].comment(one_line(comment))
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + tomlkit.dumps(document)
 
@@ -223,9 +229,7 @@ def craft_in_scaling(card: CraftCard, scaling: str) -> CraftCard:
 
 
 def _content(text: str, source: str) -> dict[str, Any]:
-    with faults_of_toml(source):
-        content = tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
-    return content
+    return parsed_toml(text, source)
 
 
 def _document(text: str, source: str) -> tomlkit.TOMLDocument:
@@ -233,6 +237,14 @@ def _document(text: str, source: str) -> tomlkit.TOMLDocument:
     with faults_of_toml(source):
         document = tomlkit.parse(text.removeprefix(BYTE_ORDER_MARK))
     return document
+
+
+def parsed_toml(text: str, source: Path | str) -> dict[str, Any]:
+    """The content of a TOML text that a user gave; raises InputError, which names the place, if it is none."""
+    with faults_of_toml(str(source)):
+        content = tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
+    refuse_deep(content, source)
+    return content
 
 
 @contextmanager

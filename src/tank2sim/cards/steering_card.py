@@ -7,7 +7,6 @@ influence coefficients in ``[influence]``. Which coefficients a model has is def
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from pydantic import Field, ValidationError
 from tank2sim.bundled import bundled
 from tank2sim.cards.form import CardSection, Length, Positive, Speed, Text
 from tank2sim.cards.form_faults import form_fault
+from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.units import to_si
@@ -145,8 +145,8 @@ def find_steering_card(name: str) -> Path | None:
         path = bundled("models") / name.lower() / _FILE
         return path if name and path.is_file() else None
     try:
-        content = tomllib.loads(read_text(path))
-    except (InputError, ValueError, RecursionError):
+        content = parsed_toml(read_text(path), path)
+    except InputError:
         return None  # the reader of ship cards reports the fault
     return path if str(content.get("format", "")).startswith(_FORMAT.partition("/")[0] + "/") else None
 
@@ -168,10 +168,7 @@ def read_steering_card(name: str | Path) -> SteeringCard:
 
 def parse_steering_card(text: str, source: str) -> SteeringCard:
     """The card that a TOML text describes; `source` names it in messages. Raises as :func:`read_steering_card`."""
-    try:
-        content = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(source, "", f"is not TOML: {error}", "correct the TOML there") from None
+    content = parsed_toml(text, source)
     spelt: dict[str, str] = {}
     _to_radians(content, spelt)
     try:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import tomlkit
 from tomlkit.items import Table
 
+from tank2sim.escaping import one_line
+
 
 @dataclass(frozen=True)
 class SurgeResult:
@@ -175,12 +177,12 @@ def manoeuvring_card_text(result: ManoeuvringResult) -> str:
         }
     )
     body = _table({key: float(f"{value:.6g}") for key, value in result.rigid_body.items()})
-    body["yaw_inertia"].comment(f"about midships; {result.inertia_source}")
+    body["yaw_inertia"].comment(one_line(f"about midships; {result.inertia_source}"))
     document["rigid_body"] = body
     derivatives, uncertainty = tomlkit.table(), tomlkit.table()
     for name, entry in result.derivatives.items():
         derivatives[name] = entry.value
-        derivatives[name].comment(entry.how)
+        derivatives[name].comment(one_line(entry.how))
         uncertainty[name] = entry.standard_error
     document["derivatives"], document["uncertainty"] = derivatives, uncertainty
     return tomlkit.dumps(document)

@@ -22,7 +22,8 @@ from typing import Any
 import click
 
 from tank2sim import __version__
-from tank2sim.errors import InputError, close_name
+from tank2sim.errors import ArgumentError, InputError, close_name
+from tank2sim.escaping import one_line
 from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
@@ -90,6 +91,15 @@ class _Commands(click.Group):
         command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """As of any group; a fault of an argument of the API is called by the option that sets it."""
+        try:
+            return super().invoke(ctx)
+        except ArgumentError as fault:
+            command = self.get_command(ctx, ctx.invoked_subcommand or "")
+            option = _option_of(command, fault.source) if command else fault.source
+            raise InputError(option, fault.place, fault.problem, fault.remedy) from None
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -97,6 +107,18 @@ class _Commands(click.Group):
             remedy = close_name(args[0], COMMANDS)
             raise click.UsageError(f"{args[0]!r} is not a command; {remedy}", ctx)
         return super().resolve_command(ctx, args)
+
+
+def _option_of(command: click.Command, argument: str) -> str:
+    """The option of a command that sets an argument, whose name may have a unit: ``--duration`` of ``duration_s``."""
+    named = [(name, param.opts[0]) for param in command.params for name in _names(param)]
+    found = [(name, option) for name, option in named if argument == name or argument.startswith(f"{name}_")]
+    return max(found, key=lambda pair: len(pair[0]), default=("", argument))[1]
+
+
+def _names(param: click.Parameter) -> list[str]:
+    """Names of a parameter as arguments have them."""
+    return [param.name or "", *(option.lstrip("-").replace("-", "_").lower() for option in param.opts)]
 
 
 @click.group(
@@ -114,6 +136,7 @@ def tank2sim(ctx: click.Context) -> None:
 
 def main() -> None:
     """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
+    _open_closed_streams()
     keep_freed_memory()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, so that nothing is left half-written
     with warnings.catch_warnings():
@@ -127,6 +150,20 @@ def main() -> None:
         code = code or _unwritable(error)
         _silence()
     sys.exit(code)
+
+
+def _open_closed_streams() -> None:
+    """Give a process that was started without standard streams (``>&-``) ones that go nowhere.
+
+    The next file that it opened would else be standard output, and what is printed would be written into it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8"))
 
 
 def _run() -> int:
@@ -183,5 +220,6 @@ def _unwritable(error: OSError) -> int:
 
 
 def _refuse(message: str, code: int = 2) -> int:
-    print(f"tank2sim: {' '.join(message.split())}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # the error stream may be full or closed: the exit code still says it
+        print(f"tank2sim: {one_line(message)}", file=sys.stderr)
     return code

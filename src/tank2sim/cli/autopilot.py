@@ -8,21 +8,22 @@ import click
 
 from tank2sim.analysis.heading.designs import DESIGNS
 from tank2sim.analysis.heading.study import LARGEST_CHANGE_DEG
+from tank2sim.api.bounds import NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_option, set_option
+from tank2sim.cli.options import OutputFile, number, page_option, plot_option, set_option
 from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
+from tank2sim.files import FMU
 
-_POSITIVE = click.FloatRange(min=0, min_open=True)
-_NOT_NEGATIVE = click.FloatRange(min=0)
+_POSITIVE, _NOT_NEGATIVE = number(PositiveArgument), number(NonNegativeArgument)
 _CHANGE = click.FloatRange(-LARGEST_CHANGE_DEG, LARGEST_CHANGE_DEG)
 
 
 @click.command("autopilot")
 @click.argument("card")
 @click.option("--design", type=click.Choice(DESIGNS), default="pid", show_default=True, help="Way of design.")
-@click.option("--speed", type=_POSITIVE, metavar="MPS", help="Speed of the design, m/s; by default u0.")
+@click.option("--speed", type=number(SpeedArgument), metavar="MPS", help="Speed of the design, m/s; by default u0.")
 @click.option("--heading-weight", type=_POSITIVE, default=5.0, show_default=True, metavar="DEG",
               help="LQR: heading error that is as bad as ...")  # fmt: skip
 @click.option("--rudder-weight", type=_POSITIVE, default=5.0, show_default=True, metavar="DEG",
@@ -33,9 +34,9 @@ _CHANGE = click.FloatRange(-LARGEST_CHANGE_DEG, LARGEST_CHANGE_DEG)
 @click.option("--current", type=_NOT_NEGATIVE, metavar="MPS", help="Current, towards east.")
 @click.option("--wind", type=_NOT_NEGATIVE, metavar="MPS", help="Wind, from north-east. The ship steers north.")
 @click.option("--wave-yaw", type=_NOT_NEGATIVE, metavar="DEG", help="Yawing by waves, standard deviation.")
-@click.option("--seed", type=click.IntRange(0), metavar="N", help="Seed of the waves.")
+@click.option("--seed", type=number(Seed), metavar="N", help="Seed of the waves.")
 @click.option("--track", type=click.Path(path_type=Path), metavar="FILE.csv", help="Also keep a track: x_m,y_m.")
-@click.option("--export", type=click.Path(path_type=Path), metavar="AP.fmu", help="Write the controller as an FMU.")
+@click.option("--export", type=OutputFile(FMU), metavar="AP.fmu", help="Write the controller as an FMU.")
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version of FMI.")
 @click.option("--verify", is_flag=True, help="With --export: co-simulate it with the ship's FMU, against one model.")
 @page_option("-o")

@@ -12,13 +12,14 @@ from tank2sim.api.bridge import ORDER_OPTION, BridgeResult
 from tank2sim.api.ship import load
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import Command, plot_option, set_option
+from tank2sim.cli.options import Command, OutputFile, plot_option, set_option
 from tank2sim.errors import InputError
+from tank2sim.files import PAGE
 
 
 def bridge_options(command: Command) -> Command:
     """CARD, ``--ballast``, ``--order``, ``--set``, ``-o``, ``--plot`` and ``--json``."""
-    page = click.Path(path_type=Path, dir_okay=False)
+    page = OutputFile(PAGE, dir_okay=False)
     options = (
         click.argument("card"),
         click.option("--ballast", metavar="CARD", help="Card of the ballast condition; CARD is then the loaded one."),

@@ -7,16 +7,17 @@ from pathlib import Path
 import click
 
 from tank2sim.analysis.validation.standard_trials import MEMBERS
+from tank2sim.api.bounds import SmallEnsemble
 from tank2sim.api.comparison import compare
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import number, page_option, plot_folder_option
 
 
 @click.command("compare")
 @click.argument("cards", nargs=-1, required=True, metavar="CARD CARD ...")
 @click.option(
     "--members",
-    type=click.IntRange(min=0, max=100_000),
+    type=number(SmallEnsemble),
     default=MEMBERS,
     show_default=True,
     help="Ships drawn within the errors of each card for the deviations of figures; 0 for none.",

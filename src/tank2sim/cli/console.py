@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from tank2sim.api.result import Result, cell_text
-from tank2sim.files import STANDARD_OUTPUT, writable_folder, write_together
+from tank2sim.errors import InputError
+from tank2sim.escaping import file_name, one_line
+from tank2sim.files import JSON, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
 from tank2sim.marks import marked
 
 screen = Console(highlight=False)
@@ -25,7 +28,11 @@ _WIDEST = 1000
 def _standard_output(context: click.Context, parameter: click.Parameter, given: Path | None) -> Path | None:
     if given != Path("-"):
         screen.stderr = False
+        if given:
+            refuse_other_ending(given, JSON)
         return given
+    if sys.__stdout__ is None:
+        raise InputError("--json", "-", "standard output is closed", "give the name of a file")
     screen.stderr = True  # the summary goes there, so that standard output is JSON and nothing else
     return STANDARD_OUTPUT
 
@@ -48,8 +55,8 @@ def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]
         numeric = all(isinstance(row[place], int | float) or row[place] is None for row in rows)
         table.add_column(escape(head), justify="right" if numeric else "left", overflow="fold", no_wrap=wide)
     for row in rows:
-        table.add_row(*(escape(cell_text(value)) for value in row))
-    screen.print(escape(title), style="italic", soft_wrap=True)
+        table.add_row(*(escape(one_line(cell_text(value))) for value in row))
+    screen.print(escape(one_line(title)), style="italic", soft_wrap=True)
     needed = Measurement.get(screen, screen.options.update(width=_WIDEST), table).maximum if wide else 0
     Console(width=max(needed, screen.width), highlight=False, stderr=screen.stderr).print(table)
 
@@ -57,7 +64,7 @@ def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]
 def show_notices(notices: Iterable[str]) -> None:
     """Print what the user should know, a line each."""
     for notice in notices:
-        screen.print(f"[yellow]note:[/yellow] {escape(notice)}", soft_wrap=True)
+        screen.print(f"[yellow]note:[/yellow] {escape(one_line(notice))}", soft_wrap=True)
 
 
 def show_marked(notices: Iterable[str]) -> list[str]:
@@ -65,7 +72,7 @@ def show_marked(notices: Iterable[str]) -> list[str]:
     notices = list(notices)
     first = marked(notices)
     for notice in first:
-        screen.print(f"[bold red]{escape(notice)}[/bold red]", soft_wrap=True)
+        screen.print(f"[bold red]{escape(one_line(notice))}[/bold red]", soft_wrap=True)
     return [notice for notice in notices if notice not in first]
 
 
@@ -73,11 +80,11 @@ def show_result(result: Result) -> None:
     """Print a result: its marks first, then the main findings, tables and notices."""
     others = show_marked(result.notices)
     for line in result.headline:
-        screen.print(escape(line), soft_wrap=True)
+        screen.print(escape(one_line(line)), soft_wrap=True)
     for table in result.tables:
         show_table(table.title, table.columns, table.rows, wide=table.wide)
         for note in table.notes:
-            screen.print(escape(note), soft_wrap=True)
+            screen.print(escape(one_line(note)), soft_wrap=True)
     show_notices(others)
 
 
@@ -99,7 +106,7 @@ def write_result(
     inputs : paths
         Files that must not be overwritten.
     json_file, page, plot : Path, optional
-        JSON, page (HTML) and main chart (PNG).
+        JSON, page (HTML) and main chart (PNG, SVG or PDF by its ending).
     plots : Path, optional
         Folder for a picture of each chart, and the page as ``report.html``.
     files : mapping or sequence of pairs, optional
@@ -117,10 +124,10 @@ def write_result(
     if page:
         contents[page] = result.page()
     if plot:
-        contents[plot] = result.picture()
+        contents[plot] = result.picture(ending=plot.suffix)
     if plots:
         writable_folder(plots)
-        contents |= {plots / f"{name}.png": result.picture(name) for name in result.charts()}
+        contents |= {plots / f"{file_name(name)}.png": result.picture(name) for name in result.charts()}
         contents[plots / "report.html"] = result.page()
     given = [*(path for path, _ in further), json_file, page, plot]
     write_together(contents, inputs=[Path(path) for path in inputs], outputs=given)

@@ -8,13 +8,13 @@ import click
 
 from tank2sim.api.convention import convention
 from tank2sim.cli.console import json_option, screen, show_result, write_result
+from tank2sim.cli.options import OutputFile
+from tank2sim.files import CARD
 
 
 @click.command("convention")
 @click.argument("coefficients")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card of the first reading."
-)
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the card of the first reading.")
 @json_option
 def command(coefficients: str, output: Path | None, json_file: Path | None) -> None:
     """Say what COEFFICIENTS means: rows of name and value, or a card that lacks conventions.

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 from tank2sim.api.demo import run_demo
 from tank2sim.cli.console import json_option, screen, show_result, write_result
+from tank2sim.cli.options import OutputFile
 from tank2sim.demo import DEMO_STEPS
 from tank2sim.errors import InputError
 
@@ -18,7 +19,7 @@ from tank2sim.errors import InputError
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=OutputFile(()),
     default=Path("demo"),
     show_default=True,
     metavar="DIR",

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.bounds import DrawsArgument, Seed
 from tank2sim.api.design import DESIGN_FIGURES, CampaignDesignResult, TrialDesignResult, design_campaign, design_trial
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import page_option, plot_option, set_option
+from tank2sim.cli.options import OutputFile, number, page_option, plot_option, set_option
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.design.captive_design import DRAWN_SHIPS
 from tank2sim.errors import InputError
-from tank2sim.files import refuse_doubled, writable_folder
+from tank2sim.files import CARD, TABLE, refuse_doubled, writable_folder
 
 
 @click.command("design", cls=TakesSeveral, several=("--figures", "--sensors"))
@@ -56,7 +57,7 @@ from tank2sim.files import refuse_doubled, writable_folder
 )
 @click.option(
     "--orders",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFile((), file_okay=False),
     metavar="DIR",
     help="Of a trial: write the orders of each manoeuvre, for simulate --manoeuvre file:.",
 )
@@ -64,18 +65,18 @@ from tank2sim.files import refuse_doubled, writable_folder
 @click.option("--no-checks", is_flag=True, help="No runs that show whether the polynomial holds.")
 @click.option(
     "--draws",
-    type=click.IntRange(0, 1000),
+    type=number(DrawsArgument),
     default=DRAWN_SHIPS,
     show_default=True,
     help="Ships drawn from the card's errors, for which the plan is to be good as well.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the drawn ships.")
+@click.option("--seed", type=number(Seed), default=0, show_default=True, help="Seed of the drawn ships.")
 @set_option
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="PLAN.csv", help="Write the plan.")
+@click.option("-o", "--output", type=OutputFile(TABLE), metavar="PLAN.csv", help="Write the plan.")
 @click.option(
     "--campaign",
     "template",
-    type=click.Path(path_type=Path),
+    type=OutputFile(CARD),
     metavar="CAMPAIGN.toml",
     help="Write the campaign's file for tank2sim reduce, which then lacks only the files of the runs.",
 )

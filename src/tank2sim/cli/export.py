@@ -9,15 +9,16 @@ import click
 from tank2sim.api.fmu import make_fmu_file
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import set_option
+from tank2sim.cli.options import OutputFile, set_option
 from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
+from tank2sim.files import FMU, SYSTEM
 from tank2sim.fmu.platforms import PLATFORMS
 
 
 @click.command("export")
 @click.argument("card")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), metavar="SHIP.fmu", help="The FMU.")
+@click.option("-o", "--output", required=True, type=OutputFile(FMU), metavar="SHIP.fmu", help="The FMU.")
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version of FMI.")
 @click.option(
     "--platforms",
@@ -36,7 +37,7 @@ from tank2sim.fmu.platforms import PLATFORMS
 )
 @click.option(
     "--ssp",
-    type=click.Path(path_type=Path),
+    type=OutputFile(SYSTEM),
     metavar="SYSTEM.ssp",
     help="Also an SSP package in which a heading autopilot steers the ship.",
 )

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.bounds import Count, Effects
 from tank2sim.api.gap import find_gap, gap_options
 from tank2sim.api.gap_files import folder_made, put, refuse_early
 from tank2sim.api.trial import trial_files
 from tank2sim.bundled import bundled_cards
 from tank2sim.cli.console import json_option, screen, show_notices, show_result
-from tank2sim.cli.options import executor_option
+from tank2sim.cli.options import OutputFile, executor_option, number
 from tank2sim.cli.progress import showing_stages
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
@@ -33,17 +34,17 @@ from tank2sim.gap.workflow import MOST_EFFECTS
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path),
+    type=OutputFile(()),
     metavar="DIR",
     help="Folder for gap.json, improved.toml, report.html, next_test.csv and corrected/.",
 )
-@click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; by default one for each core.")
+@click.option("--workers", type=number(Count), metavar="N", help="Processes; by default one for each core.")
 @executor_option
 @click.option("--effects", multiple=True, metavar="NAME...", help="Look for these alone.")
 @click.option("--without", multiple=True, metavar="NAME...", help="Do not look for these.")
 @click.option(
     "--max-effects",
-    type=click.IntRange(1, MOST_EFFECTS),
+    type=number(Effects),
     default=MOST_EFFECTS,
     show_default=True,
     help="Effects named at most.",

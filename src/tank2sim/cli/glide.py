@@ -7,10 +7,11 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.bounds import PositiveArgument
 from tank2sim.api.glide import BUNDLED_GLIDER
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_option, set_option
+from tank2sim.cli.options import number, page_option, plot_option, set_option
 from tank2sim.errors import InputError
 
 
@@ -21,7 +22,7 @@ from tank2sim.errors import InputError
 @click.option("--angle-deg", "angles", multiple=True, metavar="A",
               help="Angle of a steady path, + to climb, - to dive; several: repeat it, or 25,-30.")  # fmt: skip
 @click.option("--roll-deg", type=float, default=0.0, metavar="G", help="Roll of these glides, + starboard side down.")
-@click.option("--buoyancy-kg", type=click.FloatRange(min=0, min_open=True), metavar="M",
+@click.option("--buoyancy-kg", type=number(PositiveArgument), metavar="M",
               help="Size of the net buoyancy of these glides; by default the card's.")  # fmt: skip
 @click.option("--reference-area-m2", "area", type=float, metavar="S", help="Area of the coefficients, for the card's.")
 @click.option("--programme", type=click.Path(path_type=Path), metavar="FILE",

@@ -7,16 +7,18 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from tank2sim.api.bounds import Count, DrawsOfChain, SmallEnsemble
 from tank2sim.api.craft_identification import craft_trial_files, identify_craft
 from tank2sim.api.identification import identify
 from tank2sim.api.ship import Ship, load
 from tank2sim.api.trial import trial_files
 from tank2sim.cards import CraftCard
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import executor_option, page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, executor_option, number, page_option, plot_folder_option
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
+from tank2sim.files import CARD
 from tank2sim.identification.trials.identify import BY_RESIDUALS, TRIAL_METHODS
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
@@ -72,7 +74,7 @@ def _of_craft(
     metavar="TRIAL...",
     help="Compare with these; do not fit them.",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card found.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the card found.")
 @click.option(
     "--method",
     type=click.Choice(TRIAL_METHODS),
@@ -97,18 +99,18 @@ def _of_craft(
 )
 @click.option("--inertia", is_flag=True, help="Estimate acceleration derivatives, too.")
 @click.option("--piece", type=float, metavar="S", help="Length of the pieces of output error, s; by default 5 L/u0.")
-@click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes for cross-validation and bootstrap.")
+@click.option("--workers", type=number(Count), metavar="N", help="Processes for cross-validation and bootstrap.")
 @executor_option
 @click.option(
     "--members",
-    type=click.IntRange(0, 100000),
+    type=number(SmallEnsemble),
     default=100,
     show_default=True,
     help="Simulations behind the intervals of figures of trials held out.",
 )
 @click.option(
     "--bootstrap",
-    type=click.IntRange(0),
+    type=number(SmallEnsemble),
     default=0,
     metavar="N",
     help="Fit N sets of trials simulated again with the estimate, for the scatter of the estimates.",
@@ -121,7 +123,11 @@ def _of_craft(
     help="Sample the posterior by the no-U-turn sampler (nuts) or by an ensemble of walkers; the card carries it.",
 )
 @click.option(
-    "--draws", type=click.IntRange(10), default=DRAWS_OF_CHAIN, show_default=True, help="Draws of each of four chains."
+    "--draws",
+    type=number(DrawsOfChain),
+    default=DRAWS_OF_CHAIN,
+    show_default=True,
+    help="Draws of each of four chains.",
 )
 @click.option("--hold", multiple=True, metavar="NAME", help="Leave a derivative or parameter as the card has it.")
 @click.option("--force", is_flag=True, help="Fit trials also if they look like another ship's; the card says so.")

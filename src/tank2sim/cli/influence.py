@@ -9,6 +9,7 @@ import click
 
 from tank2sim.analysis.influence.figures import forms
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN
+from tank2sim.api.bounds import TuningRange
 from tank2sim.api.influence import InfluenceResult, TuningResult
 from tank2sim.api.ship import Ship, load
 from tank2sim.api.steering_models import SteeringModelsResult, steering_models
@@ -16,9 +17,10 @@ from tank2sim.api.turn_tuning import THROUGH_OPTION, THROUGH_REMEDY, TurnTuningR
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.joint_variation import parse_agreed, parse_bounds
-from tank2sim.cli.options import ensemble_options, page_option, plot_option, set_option
+from tank2sim.cli.options import OutputFile, ensemble_options, number, page_option, plot_option, set_option
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
+from tank2sim.files import CARD
 
 
 @click.command("influence", cls=TakesSeveral, several=("--figure", "--tune", "--agreed", "--through"))
@@ -46,7 +48,7 @@ from tank2sim.errors import InputError
 )
 @click.option(
     "--within",
-    type=click.FloatRange(min=0, min_open=True, max=100),
+    type=number(TuningRange),
     default=WITHIN,
     show_default=True,
     help="Bounds of tuning, standard errors of the card.",
@@ -76,7 +78,7 @@ from tank2sim.errors import InputError
     "Not with --figure, --tune, --hold, --bound, --agreed, --plot or --ensemble.",
 )
 @set_option
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the tuned card.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the tuned card.")
 @page_option()
 @plot_option
 @ensemble_options

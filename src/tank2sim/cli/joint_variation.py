@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError
 from tank2sim.files import read_exact_text
 
@@ -68,11 +68,7 @@ def _number(option: str, text: str, number: str) -> float:
 def _from_file(path: Path) -> dict[str, float]:
     if not path.is_file():
         raise InputError(AGREED, str(path), "is neither NAME=PERCENT nor a file", "give, for example, --agreed Yv=0.62")
-    try:
-        content = tomllib.loads(read_exact_text(path))
-    except ValueError as error:
-        raise InputError(path, "", str(error), "correct the TOML") from None
-    return _flat(content, path, "")
+    return _flat(parsed_toml(read_exact_text(path), path), path, "")
 
 
 def _flat(content: Mapping[str, object], path: Path, section: str) -> dict[str, float]:

@@ -9,7 +9,7 @@ import click
 from tank2sim.api.gap_files import folder_made
 from tank2sim.api.log import log, remove_earlier_trials
 from tank2sim.cli.console import json_option, screen, show_notices, show_result, write_result
-from tank2sim.cli.options import page_option
+from tank2sim.cli.options import OutputFile, page_option
 from tank2sim.logs.channel_file import CHANNELS_FILE
 
 
@@ -19,7 +19,7 @@ from tank2sim.logs.channel_file import CHANNELS_FILE
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFile((), file_okay=False),
     metavar="DIR",
     help=f"Folder for {CHANNELS_FILE} and the trials.",
 )

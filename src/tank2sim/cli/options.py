@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
+from tank2sim.api.bounds import ENSEMBLE, Seed, bounds_of
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.cli.overrides import parse_changes
 from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
+from tank2sim.files import PAGE, PICTURE, refuse_other_ending
 
 Command = Callable[..., Any]
 
@@ -29,15 +32,42 @@ set_option = click.option(
 )
 """``--set KEY=VALUE``: values by dotted key."""
 
+
+def number(kind: Any) -> click.IntRange | click.FloatRange:
+    """The type of an option that has the bounds of a type of :mod:`tank2sim.api.bounds`."""
+    bounds = bounds_of(kind)
+    assert bounds is not None
+    if bounds.whole:
+        return click.IntRange(int(bounds.low or 0), None if bounds.high is None else int(bounds.high))
+    return click.FloatRange(bounds.low, bounds.high, min_open=bounds.above)
+
+
+class OutputFile(click.Path):
+    """A file to be written, whose name ends as files of its kind do (:mod:`tank2sim.files`); a folder has no ending."""
+
+    def __init__(self, endings: Sequence[str], **more: Any) -> None:
+        super().__init__(path_type=Path, **more)
+        self.endings = endings
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As of any parameter. Raises InputError if the name ends as files of another kind do."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        refuse_other_ending(path, self.endings)
+        return path
+
+
 plot_option = click.option(
-    "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.png", help="Draw the main chart."
+    "--plot",
+    type=OutputFile(PICTURE, dir_okay=False),
+    metavar="FILE.png",
+    help="Draw the main chart: .png, .svg or .pdf.",
 )
 """``--plot FILE.png``."""
 
 plot_folder_option = click.option(
     "--plot",
     "plots",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFile((), file_okay=False),
     metavar="DIR",
     help="Write a picture of each chart, and the page (report.html), into a folder.",
 )
@@ -55,7 +85,7 @@ executor_option = click.option(
 
 def page_option(*names: str) -> Callable[[Command], Command]:
     """``--page FILE.html``, and other names of it where the page is the main result."""
-    path = click.Path(path_type=Path, dir_okay=False)
+    path = OutputFile(PAGE, dir_okay=False)
     return click.option(*names, "--page", "page", type=path, metavar="FILE.html", help="Write the page.")
 
 
@@ -74,14 +104,14 @@ def ensemble_options(command: Command) -> Command:
         click.option(
             "--ensemble",
             "members",
-            type=_NumberOfShips(2, 10_000_000),
+            type=_NumberOfShips(2, int(ENSEMBLE.high or 0)),
             is_flag=False,
             flag_value=DEFAULT_MEMBERS,
             metavar="N",
             help="Also N ships drawn from the card's errors and their covariance, 2000 if N is left out: bands (5, 50, "
             "95 %).",
         ),
-        click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the ensemble."),
+        click.option("--seed", type=number(Seed), default=0, show_default=True, help="Seed of the ensemble."),
         executor_option,
     )
     for option in reversed(options):

@@ -27,6 +27,6 @@ def parse_changes(settings: Iterable[str]) -> dict[str, object]:
             raise InputError("--set", setting, "is not of the form KEY=VALUE", remedy)
         try:
             changes[key] = tomlkit.parse(f"value = {text}").unwrap()["value"]
-        except TOMLKitError:
+        except (TOMLKitError, ValueError, RecursionError):
             changes[key] = text
     return changes

@@ -8,14 +8,15 @@ import click
 
 from tank2sim.api.reduction import reduce
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, page_option, plot_folder_option
 from tank2sim.errors import InputError
+from tank2sim.files import CARD, TABLE
 from tank2sim.identification.captive.result_card import FILLS
 
 
 @click.command("reduce")
 @click.argument("campaign", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the ship card.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the ship card.")
 @click.option(
     "--model",
     type=click.Choice(("polynomial", "mmg")),
@@ -38,7 +39,7 @@ from tank2sim.identification.captive.result_card import FILLS
 @click.option("--test-symmetry", is_flag=True, help="Test terms that port-starboard symmetry leaves out.")
 @click.option(
     "--budget",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(TABLE, dir_okay=False),
     metavar="FILE.csv",
     help="Write the uncertainty budget (ITTC 7.5-02-06-04): shares of the variance, combined and expanded.",
 )

@@ -8,7 +8,8 @@ import click
 
 from tank2sim.api.report import make_report
 from tank2sim.cli.console import show_result, write_result
-from tank2sim.cli.options import plot_option
+from tank2sim.cli.options import OutputFile, plot_option
+from tank2sim.files import PAGE
 
 
 @click.command("report")
@@ -17,7 +18,7 @@ from tank2sim.cli.options import plot_option
     "-o",
     "--page",
     required=True,
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(PAGE, dir_okay=False),
     metavar="PAGE.html",
     help="The page.",
 )

@@ -7,9 +7,11 @@ from typing import get_args
 
 import click
 
+from tank2sim.api.bounds import SpeedArgument
 from tank2sim.api.captive_run import TYPE_NAMES, ForceConvention, reduce_runs
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
+from tank2sim.files import TABLE
 
 
 @click.command("run")
@@ -28,19 +30,19 @@ from tank2sim.cli.options import page_option, plot_folder_option
     type=click.Choice(get_args(ForceConvention)),
     help="Whose force the file has, without a campaign; by default that on the gauge.",
 )
-@click.option("--speed", "speed_mps", type=click.FloatRange(min=0, min_open=True), metavar="MPS", help="Test speed.")
+@click.option("--speed", "speed_mps", type=number(SpeedArgument), metavar="MPS", help="Test speed.")
 @click.option("--drift-deg", type=float, metavar="DEG", help="Drift angle, where file and sheet have none.")
 @click.option("--rudder-deg", type=float, metavar="DEG", help="Rudder angle, where file and sheet have none.")
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(TABLE, dir_okay=False),
     metavar="HARMONICS.csv",
     help="Write the Fourier coefficients.",
 )
 @click.option(
     "--cycle",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(TABLE, dir_okay=False),
     metavar="CYCLE.csv",
     help="Write the averaged cycle of the first run.",
 )

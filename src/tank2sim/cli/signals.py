@@ -6,13 +6,15 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.bounds import PositiveArgument
 from tank2sim.api.signals import signals
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.errors import InputError
+from tank2sim.files import TABLE
 from tank2sim.records.signals.requests import REQUEST_FORMS
 
-_POSITIVE = click.FloatRange(min=0, min_open=True)
+_POSITIVE = number(PositiveArgument)
 
 
 @click.command("signals")
@@ -33,7 +35,7 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
     "-o",
     "--output",
     "--out",
-    type=click.Path(path_type=Path),
+    type=OutputFile(TABLE),
     metavar="FILTERED.csv",
     help="Write the trial with the filtered column.",
 )

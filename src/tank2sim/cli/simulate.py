@@ -8,7 +8,8 @@ import click
 
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import ensemble_options, page_option, plot_option, set_option
+from tank2sim.cli.options import OutputFile, ensemble_options, page_option, plot_option, set_option
+from tank2sim.files import TABLE
 from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS
 
 
@@ -25,9 +26,7 @@ from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS
     "--duration", type=float, metavar="S", help="Length of the run in s; by default what the manoeuvre needs."
 )
 @set_option
-@click.option(
-    "-o", "--output", "--out", type=click.Path(path_type=Path), metavar="RUN.csv", help="Write the motion as a trial."
-)
+@click.option("-o", "--output", "--out", type=OutputFile(TABLE), metavar="RUN.csv", help="Write the motion as a trial.")
 @page_option()
 @plot_option
 @ensemble_options

@@ -6,15 +6,16 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.bounds import SpeedArgument
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import ensemble_options, page_option, set_option
+from tank2sim.cli.options import ensemble_options, number, page_option, set_option
 from tank2sim.errors import InputError
 
 
 @click.command("stability")
 @click.argument("card")
-@click.option("--speed", type=click.FloatRange(min=0, min_open=True), metavar="MPS", help="Speed, m/s; by default u0.")
+@click.option("--speed", type=number(SpeedArgument), metavar="MPS", help="Speed, m/s; by default u0.")
 @set_option
 @click.option(
     "--spiral/--no-spiral", "spirals", default=True, help="Simulate the spirals on the steady-turning diagram."

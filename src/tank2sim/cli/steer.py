@@ -8,7 +8,8 @@ import click
 
 from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import set_option
+from tank2sim.cli.options import OutputFile, set_option
+from tank2sim.files import PAGE
 
 DEFAULT_SHIP = "esso-osaka-ship"
 """Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
@@ -20,7 +21,7 @@ DEFAULT_SHIP = "esso-osaka-ship"
     "-o",
     "--page",
     required=True,
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(PAGE, dir_okay=False),
     metavar="PAGE.html",
     help="The page.",
 )

@@ -8,8 +8,9 @@ import click
 
 from tank2sim.api.tow import tow as identify_tow
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, page_option, plot_folder_option
 from tank2sim.errors import InputError
+from tank2sim.files import CARD
 from tank2sim.identification.tow.force import parse_force
 from tank2sim.identification.tow.identify import TOW_METHODS
 
@@ -40,7 +41,7 @@ from tank2sim.identification.tow.identify import TOW_METHODS
     show_default=True,
     help="Whose numbers the card gets.",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write a surge card.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write a surge card.")
 @page_option()
 @plot_folder_option
 @json_option

@@ -8,11 +8,12 @@ import click
 
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.analysis.validation.study import REQUIRED
+from tank2sim.api.bounds import PositiveArgument, SmallEnsemble
 from tank2sim.api.craft_validation import CraftValidationResult
 from tank2sim.api.ship import load
 from tank2sim.api.validation import validate
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option, set_option
+from tank2sim.cli.options import number, page_option, plot_folder_option, set_option
 
 
 @click.command("validate")
@@ -20,7 +21,7 @@ from tank2sim.cli.options import page_option, plot_folder_option, set_option
 @click.argument("trials", nargs=-1, type=click.Path(path_type=Path), metavar="[TRIAL]...")
 @click.option(
     "--members",
-    type=click.IntRange(min=0, max=100_000),
+    type=number(SmallEnsemble),
     default=MEMBERS,
     show_default=True,
     help="Ships drawn within the card's errors for u_input; 0 for none.",
@@ -28,7 +29,7 @@ from tank2sim.cli.options import page_option, plot_folder_option, set_option
 @click.option(
     "--required",
     "required_percent",
-    type=click.FloatRange(min=0, min_open=True),
+    type=number(PositiveArgument),
     default=REQUIRED,
     show_default=True,
     metavar="PERCENT",

@@ -8,18 +8,20 @@ from typing import get_args
 
 import click
 
+from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument
 from tank2sim.api.ship import load
 from tank2sim.api.yaw import CONTROLLERS, YawResult, simulate_yaw
 from tank2sim.api.yaw import yaw as identify_yaw
 from tank2sim.cli.console import json_option, screen, show_result, write_result
-from tank2sim.cli.options import page_option, plot_folder_option
+from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.errors import InputError
+from tank2sim.files import CARD
 from tank2sim.identification.yaw.card import BEST
 from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.records.yaw import Medium, read_yaw_record
 
-_POSITIVE = click.FloatRange(min=0, min_open=True)
+_POSITIVE = number(PositiveArgument)
 
 
 @click.command("yaw")
@@ -38,9 +40,9 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
     metavar="L,B,R,T",
     help="Simulate a ship's motion at model size: length, beam in m, yaw rate in deg/min, s.",
 )
-@click.option("--noise", "noise_A", type=click.FloatRange(min=0), default=0.0, help="Of the simulated current, A.")
+@click.option("--noise", "noise_A", type=number(NonNegativeArgument), default=0.0, help="Of the simulated current, A.")
 @click.option("--inertia-kgm2", type=_POSITIVE, metavar="J", help="J_zz of body and rotor; else from records in air.")
-@click.option("--inertia-error-kgm2", type=click.FloatRange(min=0), help="Its standard error.")
+@click.option("--inertia-error-kgm2", type=number(NonNegativeArgument), help="Its standard error.")
 @click.option(
     "--torque-constant",
     "torque_constant_NmpA",
@@ -56,7 +58,7 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
 )
 @click.option(
     "--mirror-percent",
-    type=click.FloatRange(0, 1000),
+    type=number(Percent),
     default=25.0,
     show_default=True,
     help="Largest difference of mirror images, % of the largest rate.",
@@ -71,7 +73,7 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
     help="Also (7)-(9) for length, beam, draught, depth in m, block coefficient; or a CARD.",
 )
 @click.option("--length-m", type=_POSITIVE, metavar="L", help="Length of the model; else as the records say.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card.")
+@click.option("-o", "--output", type=OutputFile(CARD), metavar="CARD.toml", help="Write the card.")
 @page_option()
 @plot_folder_option
 @json_option

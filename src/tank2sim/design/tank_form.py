@@ -5,15 +5,14 @@ Angles may be given in degrees; the key is then renamed (``drift_deg`` to ``drif
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
 from tank2sim.cards.form import CardSection, Gravity, Positive, WaterDensity
 from tank2sim.cards.form_faults import form_fault
-from tank2sim.cards.reading import faults_of_toml
+from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.records.campaign_form import (
@@ -153,9 +152,7 @@ def read_tank(path: Path | str) -> TankFile:
         It is missing, not TOML, or has a key that is unknown, given twice, or out of its bounds.
     """
     path = Path(path)
-    text = read_text(path)
-    with faults_of_toml(str(path)):
-        content: dict[str, Any] = tomllib.loads(text)
+    content = parsed_toml(read_text(path), path)
     spelt: dict[str, str] = {}
     content = {
         key: section_in_si(section, key, path, spelt) if isinstance(section, dict) else section

@@ -23,6 +23,10 @@ from tank2sim.fmu.unpacking import unpack
 from tank2sim.simulation.run import Run
 from tank2sim.units import in_words
 
+_WRONG = 1e-3
+"""Largest error of an output, relative to its range, of a library that is exported. Project choice: rounding makes
+1e-9 at most, and a compiler that calculates wrongly more than this."""
+
 _TITLES = {"zigzag_20_20": "Zigzag 20/20", "turn_35": "Turning circle, rudder 35 deg to starboard"}
 
 
@@ -47,10 +51,21 @@ class AcceptanceResult:
         return self.reference.files() if self.reference else {}
 
     def passport_files(self, documents: Documents, fmu: bytes, fmi: int) -> dict[str, str]:
-        """Name in the FMU to text: the passport for machines and as a page, with what the FMU `fmu` itself answered."""
-        return passport_files(
-            self.model, documents, self.manoeuvres, replay_in_fmu(fmu, self.reference, self.model, fmi)
-        )
+        """Name in the FMU to text: the passport for machines and as a page, with what the FMU `fmu` itself answered.
+
+        Raises
+        ------
+        InputError
+            Its library does not run here, or answers with something else than the model.
+        """
+        replay = replay_in_fmu(fmu, self.reference, self.model, fmi)
+        error = replay.max_error or 0.0
+        if replay.platform and (replay.problem or not error <= _WRONG):
+            wrong = replay.problem or f"{replay.output} differs from the model by {100 * error:.3g} % of its range"
+            problem = f"the library that the C compiler made for this machine does not work ({wrong})"
+            remedy = "name another compiler in the environment variable CC, and its own flags alone"
+            raise InputError(f"binaries/{replay.platform}", "", problem, remedy)
+        return passport_files(self.model, documents, self.manoeuvres, replay)
 
 
 def gather(model: Model) -> AcceptanceResult:

@@ -13,6 +13,7 @@ import casadi as ca
 import jinja2
 
 from tank2sim.bundled import bundled
+from tank2sim.escaping import xml_text
 
 _LONGEST_IDENTIFIER = 60
 
@@ -37,11 +38,6 @@ def c_identifier(name: str) -> str:
     if not identifier or identifier[0].isdigit() or identifier.lower() in _RESERVED or keyword.iskeyword(identifier):
         identifier = f"model_{identifier}".rstrip("_")
     return identifier
-
-
-def xml_text(text: str) -> str:
-    """The text without characters that XML 1.0 cannot hold (control characters, surrogates), a space for each."""
-    return re.sub(r"[^\t\n\r\x20-\uD7FF\uE000-\uFFFD\U00010000-\U0010FFFF]", " ", text)
 
 
 def _signature(function: ca.Function) -> str:

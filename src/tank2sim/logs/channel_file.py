@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 
+from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import read_text
 from tank2sim.logs.channels import ChannelSet, LogChannel
@@ -56,10 +56,7 @@ def read_channels(path: Path) -> ChannelSet:
         It is not such a file, a key or quantity is unknown, a unit does not fit its quantity, or two channels in use
         are one quantity.
     """
-    try:
-        content = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(path, "", f"is not TOML ({error})", "correct it, or delete it to have it made again") from None
+    content = parsed_toml(read_text(path), path)
     if content.get("format") != CHANNELS_FORMAT:
         raise InputError(path, "format", f"is {content.get('format')!r}", f"write format = {CHANNELS_FORMAT!r}")
     entries = content.get("channels")

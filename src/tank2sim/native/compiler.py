@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 import shlex
@@ -28,7 +29,17 @@ SHARED_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
 # Fails where headers, libraries or the linker do not fit, and with nothing else.
-_TRIAL = '#include <math.h>\n#include <string.h>\ndouble trial(double x) { return sin(x) + (double) strlen(""); }\n'
+_TRIAL = """\
+#include <math.h>
+#include <string.h>
+#ifdef __GNUC__
+__attribute__((visibility("default")))
+#endif
+double trial(double x) { return cos(x) + (double) strlen("trial"); }
+"""
+
+
+_SILENT = "without a library or a word"
 
 
 def find_compiler() -> list[str] | None:
@@ -76,7 +87,7 @@ def compile_shared(
     Raises
     ------
     InputError
-        There is no compiler that works.
+        There is no compiler that works, or it makes nothing and says nothing.
     RuntimeError
         The compiler refused the sources: a fault of the program, with the compiler's words.
     """
@@ -87,6 +98,9 @@ def compile_shared(
         problem = f"the C compiler found no room ({os.strerror(errno.ENOSPC)})"
         remedy = "make room there, or name another folder in the environment variable TMPDIR"
         raise InputError(tempfile.gettempdir(), "", problem, remedy)
+    if refusal is not None and refusal.endswith(_SILENT):
+        remedy = "correct it, or name another in the environment variable CC"
+        raise InputError(shlex.join(compiler), "", f"this C compiler does not work ({refusal})", remedy)
     if refusal is not None:
         raise RuntimeError(f"{shlex.join(compiler)} refused generated C\n{refusal}")
 
@@ -104,11 +118,22 @@ def _named_compiler() -> tuple[str, ...] | None:
 
 @cache
 def _trouble(command: tuple[str, ...]) -> str | None:
-    """What a compiler says when it cannot even make a library of a few words; None if it can."""
-    with tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
+    """What a compiler says when it cannot even make a library of a few words that runs; None if it can."""
+    with tempfile.TemporaryDirectory(prefix="tank2sim-", ignore_cleanup_errors=True) as folder:
         trial = Path(folder, "trial.c")
         trial.write_text(_TRIAL, encoding="utf-8")
-        return _refusal(list(command), [trial], Path(folder, "trial"), [])
+        library = Path(folder, f"trial{SHARED_SUFFIX}")
+        return _refusal(list(command), [trial], library, []) or _trouble_in(library)
+
+
+def _trouble_in(library: Path) -> str | None:
+    """What is wrong with the library of the trial, which is loaded here; None if it answers as it should."""
+    try:
+        trial = ctypes.CDLL(str(library)).trial
+    except (OSError, AttributeError) as error:
+        return f"it made a library that cannot be loaded: {str(error).replace(f'{library}: ', '')}"
+    trial.argtypes, trial.restype = [ctypes.c_double], ctypes.c_double
+    return None if trial(0.0) == 6.0 else "it made a library that calculates wrongly"
 
 
 def _refusal(
@@ -143,9 +168,9 @@ def _run(command: list[str], folder: Path, made: Path) -> str | None:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
     except OSError as error:
         return f"it cannot be run ({error.strerror})"
-    if done.returncode == 0 and made.exists():
+    if done.returncode == 0 and made.exists() and made.stat().st_size:
         return None
-    return done.stderr.strip() or f"it ended with code {done.returncode}, without a library or a word"
+    return done.stderr.strip() or f"it ended with code {done.returncode}, {_SILENT}"
 
 
 def _first_error(words: str) -> str:

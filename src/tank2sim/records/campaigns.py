@@ -12,7 +12,6 @@ Inside the program a :class:`CaptiveRun` has, whatever its file says:
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
-from tank2sim.cards.reading import faults_of_toml
+from tank2sim.cards.reading import parsed_toml
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
-from tank2sim.files import read_text
+from tank2sim.files import named_in, read_text
 from tank2sim.records.averages import Condition, read_averages
 from tank2sim.records.campaign_form import (
     OSCILLATING,
@@ -198,13 +197,15 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
         problem = "has both [averages] and [[runs]]" if form.runs else "has no run"
         raise InputError(path, "", problem, "give [[runs]] with a file each, or one table in [averages]")
     if form.averages is not None:
-        conditions, remarks = read_averages(form, spelt, path)
+        with named_in(path, path.parent / form.averages.file):
+            conditions, remarks = read_averages(form, spelt, path)
         runs = [_averaged_run(condition, form) for condition in conditions]
     _refuse_doubled_names(form, path)
     for sheet in form.runs:
         try:
-            columns = {**form.columns, **sheet.columns}
-            runs.append(read_captive_run(path.parent / sheet.file, sheet, form.test, columns, form.files))
+            columns, file = {**form.columns, **sheet.columns}, path.parent / sheet.file
+            with named_in(path, file):
+                runs.append(read_captive_run(file, sheet, form.test, columns, form.files))
         except InputError as fault:
             faults.append(fault)
     copies = _copies(runs)
@@ -273,10 +274,7 @@ def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputEr
 
 def read_campaign_file(path: Path) -> tuple[CampaignFile, dict[str, SpeltColumn]]:
     """The checked form of ``campaign.toml`` and how it spells its columns of averages; raises as `campaign_file`."""
-    text = read_text(path)
-    with faults_of_toml(str(path)):
-        content = tomllib.loads(text)
-    return campaign_file(content, path)
+    return campaign_file(parsed_toml(read_text(path), path), path)
 
 
 def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:

@@ -389,7 +389,7 @@ def test_mmgdynamics_has_the_rates_of_the_model_where_it_has_the_same_equations(
         ("mariner", {"to": "mss", "scaling": "prime"}, ["--to", "mss"]),
         ("kvlcc2", {"origin_m": 1.0}, ["effects", "midships"]),
         ("kvlcc2-l7-mmg", {"to": "mmg", "origin_m": 1.0}, ["model.kind", "abkowitz"]),
-        ("kvlcc2-l7-mmg", {"scatter": 0.0}, ["--scatter"]),
+        ("kvlcc2-l7-mmg", {"scatter": 0.0}, ["scatter"]),
         ("wilinski-zellman", {}, ["model.kind"]),
     ],
 )

@@ -65,7 +65,7 @@ def test_a_craft_with_thrusters_on_one_side_alone_is_refused(tmp_path):
     card = tmp_path / "ship.toml"
     card.write_text(text.replace("y_m = -0.395", "y_m = 0.395"), encoding="utf-8")
     with pytest.raises(InputError, match="no thrusters that steer"):
-        steering_page(PageShip(model=t2s.load(card).model, library=None))
+        steering_page(PageShip(model=t2s.load(card).model, library="AA=="))
 
 
 class TestInABrowser:

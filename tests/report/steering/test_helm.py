@@ -14,11 +14,11 @@ from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.ship import mass_fault
-from tank2sim.report.steering import ship as page_ship
 from tank2sim.report.steering.members import members_of
 from tank2sim.report.steering.ship import telegraph_of
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
+from tests.made_results import without_wasm
 from tests.report.opened_page import opened
 from tests.report.steering.sailing import in_browser, sailed
 
@@ -83,9 +83,9 @@ def test_members_have_the_spread_of_the_covariance():
     assert not any(mass_fault(values | member) for member in members)
 
 
-def test_a_card_without_covariance_has_no_members_and_says_so(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(page_ship, "has_compiler", lambda: False)  # half a minute, which has no part in it
-    result = make_steering_page(t2s.load("mariner"))
+def test_a_card_without_covariance_has_no_members_and_says_so():
+    with without_wasm():  # half a minute, which has no part in it
+        result = make_steering_page(t2s.load("mariner"))
     assert result.members == ()
     assert "has no covariance" in result.headline[1]
 

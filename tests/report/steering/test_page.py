@@ -75,17 +75,14 @@ def worst(voyage, trajectory):
     return max(found.values())
 
 
-def test_without_the_compiler_the_page_says_what_is_missing(mariner):
-    html = steering_page(PageShip(model=mariner, library=None), None, ["another notice"])
-    assert html.index("pip install tank2sim[platforms]") < html.index("another notice")
-    assert "The ship in this page is" not in html
-    assert "<canvas" not in html
-    assert "<script" not in html
+def test_notices_are_counted_at_the_top_and_listed(mariner):
+    html = steering_page(PageShip(model=mariner, library="AA=="), None, ["a notice <b>"])
+    assert "1 notice<" in html and "a notice &lt;b&gt;" in html
 
 
 def test_a_model_without_a_rudder_is_refused():
     with pytest.raises(InputError, match="has no rudder"):
-        steering_page(PageShip(model=build(read_card("wilinski-zellman")), library=None))
+        steering_page(PageShip(model=build(read_card("wilinski-zellman")), library="AA=="))
 
 
 def test_the_rudder_slider_ends_where_the_gear_does_and_shows_degrees(mariner):

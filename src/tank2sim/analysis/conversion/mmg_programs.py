@@ -12,6 +12,7 @@ import math
 
 from tank2sim.cards.card import MmgCard
 from tank2sim.dynamics.mmg.hull import HULL_TERMS
+from tank2sim.escaping import python_text
 
 
 def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
@@ -156,10 +157,10 @@ def mmgdynamics_text(card: MmgCard) -> str:
     n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
     title = f"{card.ship.name}: a vessel of mmgdynamics, written by tank2sim convert."
     return (
-        f'"""{_plain(title)}\n\n'
+        f'"""{python_text(title)}\n\n'
         "SI, and Prime II where a name ends in _dash; rudder positive to starboard. C_1 and C_2 of the wake are left\n"
         "out: the wake is w_P0 exp(-4 beta_P^2), as in shipmmg.\n"
-        f'Source of the coefficients: {_plain(card.ship.source)}\n"""\n\n'
+        f'Source of the coefficients: {python_text(card.ship.source)}\n"""\n\n'
         f"u0 = {card.model.speed_mps!r}  # m/s, the approach\n"
         f"nps = {n!r}  # 1/s, revolutions of the approach\n\n"
         f"vessel = {{\n{entries}}}\n"
@@ -182,9 +183,9 @@ def shipmmg_text(card: MmgCard) -> str:
     n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
     title = f"{card.ship.name}: parameters for shipmmg, written by tank2sim convert."
     return (
-        f'"""{_plain(title)}\n\n'
+        f'"""{python_text(title)}\n\n'
         "SI; rudder positive to starboard. shipmmg has another wake than the card: w_P0 exp(-4 beta_P^2), no C_1\n"
-        f'and C_2. Source of the coefficients: {_plain(card.ship.source)}\n"""\n\n'
+        f'and C_2. Source of the coefficients: {python_text(card.ship.source)}\n"""\n\n'
         "from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams\n\n"
         f"u0 = {card.model.speed_mps!r}  # m/s, the approach\n"
         f"nps = {n!r}  # 1/s, revolutions of the approach\n"
@@ -196,8 +197,3 @@ def shipmmg_text(card: MmgCard) -> str:
 
 def _number_text(value: float) -> str:
     return 'float("nan")' if math.isnan(value) else repr(value)
-
-
-def _plain(text: str) -> str:
-    """Text that ends no string and opens no escape."""
-    return text.replace("\\", "/").replace('"', "'").replace("\n", " ")

@@ -6,6 +6,8 @@ its steering gear, effects and low speed, and not a second version of it.
 
 from __future__ import annotations
 
+import builtins
+import keyword
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -14,6 +16,7 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model, Variable
+from tank2sim.escaping import one_line, python_text
 
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARED = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "~="}
@@ -109,15 +112,38 @@ def operations(model: Model, spelt: Spelling, first: int) -> list[str]:
     return lines
 
 
-def program_name(card: ManoeuvringCard) -> str:
-    """The ship's name as an identifier in small letters."""
-    stem = re.sub(r"\W+", "_", card.ship.name.lower(), flags=re.ASCII).strip("_")
-    return stem if stem[:1].isalpha() else f"ship_{stem}"
+_LONGEST_NAME = 60  # MATLAB takes 63 letters
+
+_MATLAB_WORDS = (
+    *(
+        "break",
+        "case",
+        "catch",
+        "classdef",
+        "continue",
+        "do",
+        "else",
+        "elseif",
+        "end",
+        "for",
+        "function",
+        "global",
+        "if",
+    ),
+    *("otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "until", "while"),
+)
+
+
+def program_name(card: ManoeuvringCard, code: Iterable[str] = ()) -> str:
+    """The ship's name as an identifier in small letters: neither a word of the language nor one of the code."""
+    stem = re.sub(r"\W+", "_", card.ship.name.lower(), flags=re.ASCII).strip("_")[:_LONGEST_NAME].rstrip("_")
+    taken = {*_MATLAB_WORDS, *keyword.kwlist, *dir(builtins), *re.findall(r"\w+", "\n".join(code))}
+    return stem if stem[:1].isalpha() and stem not in taken else f"ship_{stem}"
 
 
 def _listed(variables: Iterable[Variable], mark: str, first: int) -> list[str]:
     return [
-        f"{mark} {place:3d} {variable.name} ({variable.unit}): {variable.description}"
+        one_line(f"{mark} {place:3d} {variable.name} ({variable.unit}): {variable.description}")
         for place, variable in enumerate(variables, start=first)
     ]
 
@@ -127,22 +153,9 @@ def mss_function(card: ManoeuvringCard, model: Model) -> str:
 
     SI and rad, rudder positive to starboard; without `ui` and `p` those of the card.
     """
-    name = program_name(card)
     values = {"ui": model.input_values().tolist(), "p": model.parameter_values().tolist()}
     start = [float(value) for value in model.initial(model.parameter_values()).full().ravel()]
-    lines = [
-        f"function [xdot, U] = {name}(x, ui, p)",
-        f"% [xdot, U] = {name}(x, ui, p): {model.description}.",
-        "% Written by tank2sim convert, operation by operation, from the equations of the card",
-        f"% {' '.join(card.source.split())}.",
-        "% SI and rad; rudder positive to starboard (MSS: to port). U is the speed through the water.",
-        "% States x (rates in xdot), started by default from",
-        f"%   x0 = [{' '.join(repr(value) for value in start)}]'",
-        *_listed(model.states, "%", 1),
-        "% Inputs ui:",
-        *_listed(model.inputs, "%", 1),
-        "% Parameters p:",
-        *_listed(model.parameters, "%", 1),
+    code = [
         *(
             f"if nargin < {place}, {key} = [{' '.join(repr(value) for value in values[key])}]'; end"
             for place, key in ((2, "ui"), (3, "p"))
@@ -155,6 +168,22 @@ def mss_function(card: ManoeuvringCard, model: Model) -> str:
         "function value = if_else_zero(condition, value)",
         "if ~condition, value = 0; end",
         "end",
+    ]
+    name = program_name(card, code)
+    lines = [
+        f"function [xdot, U] = {name}(x, ui, p)",
+        one_line(f"% [xdot, U] = {name}(x, ui, p): {model.description}."),
+        "% Written by tank2sim convert, operation by operation, from the equations of the card",
+        one_line(f"% {card.source}."),
+        "% SI and rad; rudder positive to starboard (MSS: to port). U is the speed through the water.",
+        "% States x (rates in xdot), started by default from",
+        f"%   x0 = [{' '.join(repr(value) for value in start)}]'",
+        *_listed(model.states, "%", 1),
+        "% Inputs ui:",
+        *_listed(model.inputs, "%", 1),
+        "% Parameters p:",
+        *_listed(model.parameters, "%", 1),
+        *code,
     ]
     return "\n".join(lines) + "\n"
 
@@ -202,6 +231,10 @@ _PVS_CLASS = '''class {name}:
 '''
 
 
+_OF_PVS = ("math", "np", "P", "UI", "X0", "rates_of")
+"""Names of the module in which the class is."""
+
+
 def pvs_class(card: ManoeuvringCard, model: Model) -> str:
     """A Python file with a vehicle class for Fossen's Python Vehicle Simulator; it needs NumPy alone.
 
@@ -211,12 +244,11 @@ def pvs_class(card: ManoeuvringCard, model: Model) -> str:
     def spelt(word: str) -> str:
         return "**" if word == "^" else _PYTHON.get(word, word)
 
-    name = program_name(card)
-    title = " ".join(card.ship.name.replace('"', "'").replace("\\", "/").split())
+    title = python_text(card.ship.name)
     start = [float(value) for value in model.initial(model.parameter_values()).full().ravel()]
     places = {name: model.state_names.index(name) for name in model.state_names}
     body = _PVS_CLASS.format(
-        name=name,
+        name=program_name(card, [_PVS_CLASS, *_OF_PVS]),
         title=title,
         length=card.ship.length_m,
         u=places["motion.u"],

@@ -23,6 +23,7 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import added_mass_forces
 from tank2sim.errors import InputError
+from tank2sim.escaping import xml_comment
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
@@ -124,9 +125,8 @@ def _head(card: CraftCard, where: str) -> list[str]:
     body = card.rigid_body
     # About the centre of gravity, as SDF has it.
     inertia = body.yaw_inertia - body.mass * body.x_G**2
-    name = " ".join(card.ship.name.replace("--", "-").split())
     return [
-        f"<!-- {name}, by tank2sim, for {where} -->",
+        f"<!-- {xml_comment(card.ship.name)}, by tank2sim, for {where} -->",
         f"<!-- <inertial>: pose {_NUMBER.format(body.x_G)} 0 0, mass {_NUMBER.format(body.mass)}, izz "
         f"{_NUMBER.format(inertia)}; the origin of base_link is midships -->",
     ]

@@ -28,7 +28,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, figure_bands, history_bands
-from tank2sim.simulation.ensemble import KEPT, Ensemble, ensemble
+from tank2sim.simulation.ensemble import KEPT, Draws, Ensemble, Question, ensemble
 from tank2sim.simulation.lane_figures import USUAL_PACE
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.units import in_words
@@ -244,7 +244,7 @@ def manoeuvre_bands(
             f"integration steps are {steps[0]:.3g} s for the first {KEPT} members and {steps[1]:.3g} s{single} for the "
             f"others: no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
         )
-    found = ensemble(question, draws, request.members, executor)
+    found = _ensemble(card, question, draws, request.members, executor)
     shown, histories, track = history_bands(found, times, tuple(signals_with_bands(model)))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
@@ -269,10 +269,10 @@ def stability_bands(
     of `curves`: at a speed (None: the card's), on a grid."""
     draws, messages = draws_of(card, request.seed)
     question = OfCriteria(ShipText.of(card))
-    trials = ensemble(question, draws, request.members, executor)
+    trials = _ensemble(card, question, draws, request.members, executor)
     messages.append("an ensemble is judged at the card's speed")
     try:
-        straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
+        straight = _ensemble(card, OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
     except InputError as error:
         straight = Ensemble(request.members, request.seed, {})
         messages.append(f"no bands of the straight course: {error.problem}")
@@ -307,7 +307,7 @@ def named_bands(
 ) -> FigureBands:
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
     draws, notices = draws_of(card, request.seed)
-    found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, request.members, executor)
+    found = _ensemble(card, OfFigures(ShipText.of(card), tuple(figures)), draws, request.members, executor)
     bands, through = bands_without_poles(found)
     notices += through
     deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if request.members > 1 else {}
@@ -388,6 +388,19 @@ def _stable(straight: Ensemble) -> tuple[float, tuple[float, float]] | tuple[Non
     with np.errstate(invalid="ignore"):
         count = int(np.sum((straight.figures["criterion_C"] > 0) & (total > 0)))
     return _share(count, straight.usable)
+
+
+def _ensemble(
+    card: ManoeuvringCard, question: Question, draws: Draws, members: int, executor: Executor | None
+) -> Ensemble:
+    """The members. Raises InputError if not one of them is a ship that can be simulated."""
+    found = ensemble(question, draws, members, executor)
+    shown = found.histories is not None or any(np.isfinite(values).any() for values in found.figures.values())
+    if found.bad.all() or not shown:
+        reason = next(iter(found.unusable), "none shows a figure")
+        problem = f"not one of {members} ships drawn from it can be simulated ({reason})"
+        raise card.fault("uncertainty", problem, "correct the standard errors, or the covariance")
+    return found
 
 
 def _members(found: Ensemble, messages: Sequence[str]) -> Members:

@@ -15,6 +15,7 @@ from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter
 from tank2sim.errors import InputError
+from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
 
 FEWEST, UNCERTAIN = "fewest", "uncertain"
@@ -161,7 +162,8 @@ def tuned_text(card: SteeredCard, tuned: Tuned) -> str:
     text = changed_text(text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     parse_card(text, card.source)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
-    head = f"# {how[0].upper()}{how[1:]} ({tuned.means.by}).\n# Keys that changed have their old values in comments.\n"
+    head = f"# {one_line(how[0].upper() + how[1:])} ({tuned.means.by}).\n"
+    head += "# Keys that changed have their old values in comments.\n"
     return mark + head + text.removeprefix(mark)
 
 

@@ -135,6 +135,6 @@ def ship_summary(folder: Path) -> ShipSummary:
             misfit={version: results["misfit"][version] for version in ("before", "after")},
             trials={"fit": held.count(False), "holdout": held.count(True)},
         )
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         remedy = "let one run at a time write there, and run it again"
         raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None

@@ -22,6 +22,7 @@ from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS, EffectParameter
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Model, Quantity
+from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.gap.outcome.export import estimate_in_file, in_file_units
 from tank2sim.identification.trials.problem.problem_from_card import rounded
@@ -103,7 +104,7 @@ def card_with_effects_text(
     if rivals:
         lines.append(f"These trials cannot distinguish this from: {'; '.join(rivals)}.")
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
-    return mark + "".join(f"# {_printable(line)}\n" for line in lines) + text.removeprefix(mark)
+    return mark + "".join(f"# {one_line(line)}\n" for line in lines) + text.removeprefix(mark)
 
 
 def in_short(name: str, values: Mapping[str, float], errors: Mapping[str, float]) -> str:
@@ -293,8 +294,3 @@ def _written(
 
 def _rounded(value: float, error: float) -> float:
     return rounded(value, error) + 0.0 if error > 0 else float(f"{value:.{_DIGITS}g}") + 0.0
-
-
-def _printable(line: str) -> str:
-    """One line without characters that a comment must not contain, which file names may have."""
-    return "".join(letter if letter.isprintable() else " " for letter in line)

@@ -12,6 +12,7 @@ from tank2sim.cards.estimates import estimate
 from tank2sim.cards.mmg import fujii
 from tank2sim.dynamics.mmg.hull import HULL_TERMS
 from tank2sim.errors import InputError
+from tank2sim.escaping import one_line
 from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
 from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
@@ -67,7 +68,9 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
     document["model"] = {"kind": "mmg", "speed_mps": form.test.speed_mps}
     document["rigid_body"] = {
         "mass": _rounded(model.mass_kg / volume_unit),
-        "yaw_inertia": tomlkit.item(_rounded(inertia / (volume_unit * model.length_m**2))).comment(inertia_source),
+        "yaw_inertia": tomlkit.item(_rounded(inertia / (volume_unit * model.length_m**2))).comment(
+            one_line(inertia_source)
+        ),
         "x_G": _rounded(model.x_G_m / model.length_m),
     }
     derivatives, uncertainty = tomlkit.table(), tomlkit.table()

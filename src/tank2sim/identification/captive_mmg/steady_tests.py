@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
+from tank2sim.files import named_in
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.identification.captive_mmg.contradicted_tests import (
@@ -283,7 +284,8 @@ def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
         if headings != given:
             place = next(key for key in given if key not in headings)
             raise InputError(path, f"open_water.{place}", "is a list, and a file is given", "give one of the two")
-        values = read_columns(path.parent / section.file, headings)
+        with named_in(path, path.parent / section.file):
+            values = read_columns(path.parent / section.file, headings)
     for key, points in values.items():
         if len(points) != len(values["J"]):
             problem = f"has {len(points)} values and J {len(values['J'])}"

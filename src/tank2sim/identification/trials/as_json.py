@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import changed_text
+from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.trials.assessment.comparison import Comparison, misfit
 from tank2sim.identification.trials.assessment.evaluation import (
@@ -281,7 +282,7 @@ def identified_card_text(result: Identification, trials: list[str]) -> str:
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {origin}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {origin}: {card.ship.notes}"
-    head = f"# {origin[0].upper()}{origin[1:]}.\n"
+    head = f"# {one_line(origin[0].upper() + origin[1:])}.\n"
     head += "# Comments below are of the card before, except keys marked as identified.\n"
     text = changed_text(card.text, card.source, changes)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""

@@ -44,6 +44,7 @@ __all__ = [
     "Tow",
     "TrackData",
     "bode_chart",
+    "chart_picture",
     "chart_png",
     "chart_specification",
     "error_chart",
@@ -67,6 +68,33 @@ def chart_specification(chart: alt.TopLevelMixin) -> dict[str, Any]:
     specification: dict[str, Any] = chart.to_dict(validate=CHECKED_AGAINST_SCHEMA)
     specification.pop("config", None)
     return specification
+
+
+def chart_picture(chart: alt.TopLevelMixin, ending: str = ".png") -> bytes:
+    """The chart as a picture on white; needs no network and no browser.
+
+    Parameters
+    ----------
+    chart : Chart
+    ending : str
+        ``.svg`` or ``.pdf``; else it is a PNG.
+    """
+    import vl_convert
+
+    how: dict[str, Any] = {
+        "vl_version": VEGALITE_VERSION,
+        "config": LIGHT,
+        "format_locale": LOCALE,
+        "allowed_base_urls": [],
+    }
+    specification = chart_specification(chart)
+    match ending.lower():
+        case ".svg":
+            return str(vl_convert.vegalite_to_svg(specification, **how)).encode()
+        case ".pdf":
+            return bytes(vl_convert.vegalite_to_pdf(specification, **how))
+        case _:
+            return chart_png(chart)
 
 
 def chart_png(chart: alt.TopLevelMixin, *, scale: float = 2.0) -> bytes:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import importlib.resources
-import json
 import urllib.parse
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ import jinja2
 from markupsafe import Markup
 
 from tank2sim import __version__
+from tank2sim.escaping import json_in_html
 from tank2sim.marks import marked
 from tank2sim.native.library import kept
 from tank2sim.report.kit.charts import VEGALITE_VERSION, chart_specification
@@ -319,13 +319,6 @@ def _chart(illustration: Illustration, number: int) -> dict[str, Any]:
 
 def _paragraphs(text: str) -> Iterable[str]:
     return [part.strip() for part in text.split("\n\n") if part.strip()]
-
-
-def json_in_html(value: object) -> Markup:
-    """Return the JSON of a value, for a script element of a page."""
-    # Inside <script> the reader of HTML looks for "</script" and "<!--" even within strings of JSON.
-    text = json.dumps(value, allow_nan=False, sort_keys=True, separators=(",", ":"))
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
 def resource_text(name: str) -> str:

@@ -16,13 +16,13 @@ from markupsafe import Markup
 from tank2sim import __version__
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
+from tank2sim.escaping import json_in_html
 from tank2sim.fmu.interface import interface
-from tank2sim.report.kit.page import json_in_html, resource_text
+from tank2sim.report.kit.page import resource_text
 from tank2sim.report.steering.ghost import Ghost
 from tank2sim.report.steering.members import NO_COVARIANCE
 from tank2sim.report.steering.scenario import Scenario
 from tank2sim.report.steering.ship import (
-    NO_WASM_COMPILER,
     TOKEN,
     Control,
     controls,
@@ -109,9 +109,8 @@ class PageShip:
     model : Model
         A ship; for a ghost with a measured rudder angle that of
         :func:`tank2sim.report.steering.ship.ship_following_angle`.
-    library : str or None
-        Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page states
-        before anything else.
+    library : str
+        Of :func:`tank2sim.report.steering.ship.ship_in_page`.
     members : sequence of mapping
         Parameters by name of ships that are steered together with the card's (:mod:`.members`).
     autopilot : str
@@ -123,7 +122,7 @@ class PageShip:
     """
 
     model: Model
-    library: str | None
+    library: str
     members: Sequence[Mapping[str, float]] = ()
     autopilot: str = ""
     beam_m: float | None = None
@@ -156,13 +155,11 @@ def steering_page(
     InputError
         The model has no rudder.
     """
-    model, library = ship.model, ship.library
+    model = ship.model
     thrusters = thrusters_of(model)
     if "rudder.command" not in model.input_names and not thrusters:
         remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
         raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
-    if library is None:
-        notices = [NO_WASM_COMPILER, *notices]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
     )
@@ -180,7 +177,6 @@ def steering_page(
         version=__version__,
         notices=notices,
         ghost=ghost,
-        library=library,
         controls=set_by_hand,
         rudder=rudder,
         engine=engine,

@@ -18,7 +18,6 @@ kind        geometry   other properties
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from tank2sim.errors import InputError, close_name
+from tank2sim.files import parsed_json, read_text
 from tank2sim.logs.reference import local_metres
 from tank2sim.units import KNOT_MPS
 
@@ -139,16 +139,9 @@ def read_scenario(source: str | Path) -> Scenario:
 
 def _content(path: Path) -> dict[str, Any]:
     known = ", ".join(bundled_scenarios())
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        remedy = f"give a GeoJSON file, or a bundled scenario: {known}"
-        raise InputError(path, "", f"cannot be read ({error.strerror})", remedy) from error
-    except UnicodeDecodeError as error:
-        raise InputError(path, "", "is not UTF-8 text", "save the GeoJSON as UTF-8") from error
-    except (ValueError, RecursionError) as error:  # of a number with thousands of digits, too
-        place = f"line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
-        raise InputError(path, place, "is not JSON", "give a GeoJSON file (RFC 7946)") from error
+    if not path.exists():
+        raise InputError(path, "", "does not exist", f"give a GeoJSON file, or a bundled scenario: {known}")
+    content = parsed_json(read_text(path), path, "give a GeoJSON file (RFC 7946)")
     if not isinstance(content, dict) or content.get("type") != "FeatureCollection":
         raise InputError(path, "type", "is not FeatureCollection", "a scenario is a GeoJSON FeatureCollection")
     if not isinstance(content.get("features"), list):

@@ -40,11 +40,6 @@ FUNCTIONS = (
 WEB = CompileTarget("wasm32-wasi", ".wasm", (*FUNCTIONS, "malloc"))
 """WebAssembly with the C library of WASI, of which nothing is left but mathematics and memory: it imports nothing."""
 
-NO_WASM_COMPILER = (
-    "the ship is not in this page, which needs a compiler to WebAssembly: pip install tank2sim[platforms], and write "
-    "the page again"
-)
-
 _LARGEST_RUDDER = math.radians(35.0)
 """End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
 
