@@ -207,7 +207,7 @@ class TestFrames:
         (b'<?xml version="1.0"?>\n<gpx></gpx>\n', "XML"),
         (gzip.compress(b"$GPRMC,1,2"), "gzip"),
         (b"PK\x03\x04\x14\x00", "ZIP"),
-        (b"hello world of words\n" * 30, "no log of a known format"),
+        (b"hello world of words\n" * 30, "not a log of a known format"),
     ],
 )
 def test_what_is_no_log_is_called_what_it_is(tmp_path, content, problem) -> None:

@@ -36,7 +36,7 @@ LEAST_RATE_RADPS = math.radians(0.2)
 """Slowest rudder that is taken for one: a tenth of the 2.3 deg/s of SOLAS II-1/29, and more than that in rad/s for
 degrees. Project choice."""
 
-USUAL = {
+USUAL_OF_SHIPS = {
     "length over beam": (1.5, 20.0),
     "beam over draught": (1.0, 12.0),
     "block coefficient": (0.2, 1.0),
@@ -57,7 +57,7 @@ gyration of 0.22 to 0.28 L, x_G within 0.04 L, a rudder of L d/70 to L d/30 and 
 feet, beam and draught exchanged, a speed or an area of another scale, or one prime system taken for another. Project
 choice."""
 
-_CRAFT_USUAL = {
+USUAL_OF_CRAFT = {
     "length over beam": (0.5, 30.0),
     "Froude number": (0.01, 3.0),
     "radius of gyration over length": (0.1, 0.5),
@@ -155,7 +155,7 @@ def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
         values = " and ".join(f"{name}' = {hull[name]:.3g}" for name in turned)
         yield f"the rudder turns the ship the wrong way ({values}, starboard positive): check model.rudder_sign"
     yield from signs.values()
-    yield from _proportions(card, USUAL)
+    yield from _proportions(card, USUAL_OF_SHIPS)
     deep = not (ship.water_depth_m and ship.draught_m) or ship.water_depth_m >= _DEEP_DRAUGHTS * ship.draught_m
     slender = math.pi * (ship.draught_m / ship.length_m) ** 2 if ship.draught_m else None
     cautions = [*yaw_force(hull, body.mass)]
@@ -164,7 +164,9 @@ def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
         cautions += yaw_damping(hull, errors, ship.draught_m / ship.length_m if ship.draught_m else None)
         value = hull.get("Yv", 0.0)
         if slender and value < 0:
-            yield from _beyond("Y_v' over -pi (d/L)^2", -value / slender, USUAL, 2 * errors.get("Yv", 0.0) / slender)
+            yield from _beyond(
+                "Y_v' over -pi (d/L)^2", -value / slender, USUAL_OF_SHIPS, 2 * errors.get("Yv", 0.0) / slender
+            )
     if "Nd" not in signs:
         cautions += levers({name: value for name, value in hull.items() if name not in signs}, errors, _LEVER_ROOM)
     yield from (caution.fact for caution in cautions)
@@ -184,7 +186,7 @@ def _of_mmg(card: MmgCard) -> Iterator[str]:
             what = "the effective place of the rudder" if name == "l_R" else "this is forward of midships"
             yield f"{name} is {value:+.3g}, and it is negative for every ship: {what}"
     yield from _beyond(
-        "rudder area over L d", rudder.number * ship.rudder_area_m2 / (ship.length_m * ship.draught_m), USUAL
+        "rudder area over L d", rudder.number * ship.rudder_area_m2 / (ship.length_m * ship.draught_m), USUAL_OF_SHIPS
     )
     if card.propulsion is not None and propeller.k_0 is not None:
         speed = (1 - propeller.w_P0) * card.model.speed_mps
@@ -200,7 +202,7 @@ def _of_mmg(card: MmgCard) -> Iterator[str]:
 def _of_craft(card: CraftCard) -> Iterator[str]:
     known = {name: value for name, value in card.derivatives.items() if name in EXPECTED_SIGNS and value}
     yield from (caution.fact for caution in unusual_signs(known, card.uncertainty) if "Nv" not in caution.fact)
-    yield from _proportions(card, _CRAFT_USUAL)
+    yield from _proportions(card, USUAL_OF_CRAFT)
     for thruster in card.thrusters:
         for side, sign in (("port", -1.0), ("starboard", 1.0)):
             if side in thruster.name and thruster.y_m * sign < 0:

@@ -238,7 +238,7 @@ _UNKNOWN_16_BITS = 65535
 
 
 _FRAMES = {0xFE: 8, 0xFD: 12}
-"""Bytes of a message of MAVLink 1 and 2 beside its payload, by its first one (mavlink.io, "Packet Serialization")."""
+"""Bytes of a message of MAVLink 1 and 2 besides its payload, by its first one (mavlink.io, "Packet Serialization")."""
 
 _SIGNED = 13
 """Bytes of a signature."""

@@ -116,7 +116,7 @@ propeller ask for some degrees (SNAME, PNA vol. III, IX.17); servos rest at 90 d
 _LEAST_HELM = 4.0
 """Rudder on straight legs, deg, that is doubted. Project choice: from here on a held rudder is taken to turn."""
 
-LARGEST_RUDDER_RAD = math.radians(75.0)
+LARGEST_LOGGED_RUDDER_RAD = math.radians(75.0)
 """Angle that no rudder goes beyond: Schilling rudders go to 70 or 75 deg."""
 
 _SHOWN = 0.6
@@ -671,7 +671,7 @@ class _Search:
         most = float(np.nanpercentile(np.abs(stream.values - zero), 99.9)) * QUANTITIES["rudder_angle"].units.get(
             unit, 0
         )
-        if unit in ("deg", "rad") and most > LARGEST_RUDDER_RAD:
+        if unit in ("deg", "rad") and most > LARGEST_LOGGED_RUDDER_RAD:
             confidence, why = min(confidence, 0.6), f"{why}; it goes to {math.degrees(most):.3g} deg, as no rudder does"
         if zero and not stream.unit and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
             confidence, why = min(confidence, 0.6), f"{why}; its unit is known by its size alone"

@@ -19,7 +19,7 @@ DOUBLED_STEPS = 3.0
 differs by one to two."""
 
 _ROLLOVER_S = 1024 * 604800.0
-"""Time after which the week number of GPS begins anew, s (IS-GPS-200, 20.3.3.3.1.1)."""
+"""Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)."""
 
 _DAY_S = 86400.0
 """Difference of two clocks, s, from which one is wrong by more than a time zone."""

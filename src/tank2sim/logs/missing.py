@@ -33,7 +33,7 @@ _JUMP, _LEAST_JUMP = 10.0, 0.05
 def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     """The stream with nan for numbers that stand for none, and a note of them; streams defined by a format stay.
 
-    A number stands for none if it is beyond the bounds of its quantity, or if it is one that recorders write so and is
+    A number means no value if it is beyond the bounds of its quantity, or if it is one that recorders write so and is
     further from all others than these are from each other; headings, rates and speeds do not jump to it either.
     """
     if stream.stated_by == "format":

@@ -181,7 +181,7 @@ class _Reader:
         }
 
     def take(self, raw: bytes) -> None:
-        """Take a line; it may hold several sentences, and a time stamp beside them."""
+        """Take a line; it may hold several sentences, and a time stamp next to them."""
         if not raw.strip() or raw.startswith(b"#"):
             return
         self.counts["lines"] += 1
@@ -190,22 +190,22 @@ class _Reader:
         self.counts["corrupted"] += not found
         for place, match in enumerate(found):
             self.number += place > 0
-            beside = raw[: found[0].start()] or raw[found[-1].end() :]
-            self._sentence(match["body"].rstrip(), match["sum"], beside)
+            prefix = raw[: found[0].start()] or raw[found[-1].end() :]
+            self._sentence(match["body"].rstrip(), match["sum"], prefix)
 
-    def _sentence(self, body: bytes, total: bytes | None, beside: bytes) -> None:
+    def _sentence(self, body: bytes, total: bytes | None, prefix: bytes) -> None:
         label = body[1:].partition(b",")[0]
         if total is None and self.summed and label not in self.summed:
-            self.unsummed[label].append((self.number, body, beside))
+            self.unsummed[label].append((self.number, body, prefix))
         elif (total is None and self.summed) or (total and reduce(xor, body[1:], 0) != int(total, 16)):
             self.counts["corrupted"] += 1
             self.wrong[_kind(label)] += total is not None
         else:
-            self._read(self.number, body, beside)
+            self._read(self.number, body, prefix)
 
-    def _read(self, number: int, body: bytes, beside: bytes) -> None:
+    def _read(self, number: int, body: bytes, prefix: bytes) -> None:
         """Read an intact sentence; one that cannot be read is counted, and ends nothing."""
-        if (time := _time_of_prefix(beside)) is not None:
+        if (time := _time_of_prefix(prefix)) is not None:
             self.stamps.add(number, time)
         if body[:1] == b"!":
             self.counts["ais"] += 1

@@ -302,7 +302,7 @@ def _undated_time(
                 findings.append(LogFinding("note", text, name))
                 scale = _stated_count(name, layout) or _count_by_motion(name, values, frame, findings)
                 return values * scale, False, {name}
-    problem = "it is no log of a known format, and as a table there is no column of time"
+    problem = "it is not a log of a known format, and as a table there is no column of time"
     remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
     raise InputError(path, "header", problem, remedy)
 

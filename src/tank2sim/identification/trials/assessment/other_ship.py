@@ -36,7 +36,7 @@ FACTOR_ALONE = 2.5
 ERRORS = 2.0
 """Standard errors either way: an interval of 95 %."""
 
-FAR = 2.0
+SEVERAL_TIMES = 2.0
 """Difference of coefficients over their size, median of an equation, from which an estimate is of another ship: the
 KVLCC2's from a Mariner's trials differ 11 times, cards by regression formulas from measured ones by half (project
 choice)."""
@@ -110,7 +110,7 @@ def far_from_card(problem: Problem, scale: Mapping[str, float]) -> tuple[str, ..
             for group, mean, error in zip(problem.groups, problem.prior_mean, problem.prior_error, strict=True)
             if group == letter
         ]
-        if shares and (times := scale.get(letter, 1.0) * float(np.median(shares))) > FAR:
+        if shares and (times := scale.get(letter, 1.0) * float(np.median(shares))) > SEVERAL_TIMES:
             far.append(f"coefficients of {what} differ from the card's by {times:.2g} times their size")
     return tuple(far)
 
@@ -204,23 +204,23 @@ def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None
 def _responses(problem: Problem, runs: Sequence[SampledRun]) -> _Responses | None:
     """The windows after moves of the rudder of runs; None where no velocities are known."""
     rudder = problem.model.input_names.index("rudder.command")
-    one, beside = problem.without(problem.free[1:]), []
+    one, nudged_runs = problem.without(problem.free[1:]), []
     for run in runs:
         inputs = run.inputs.copy()
         inputs[:, rudder] += _NUDGE
-        beside.append(replace(run, inputs=inputs))
+        nudged_runs.append(replace(run, inputs=inputs))
     try:
-        form, nudged = WeakForm(one.with_runs(tuple(runs))), WeakForm(one.with_runs(tuple(beside)))
+        form, nudged = WeakForm(one.with_runs(tuple(runs))), WeakForm(one.with_runs(tuple(nudged_runs)))
     except InputError:
         return None
     per_block = max(1, round(BLOCK * problem.ship_time / form.half))
-    before = round(_RESPONSE * problem.ship_time / form.half)
+    lead = round(_RESPONSE * problem.ship_time / form.half)
     found, windows = [], 0
     both = zip(form.runs, form.at(one.prior_mean), nudged.at(one.prior_mean), strict=True)
     for number, (windowed, at, by) in enumerate(both):
         angle = windowed.averaging @ windowed.run.inputs[:-1, rudder]
         yaw_rate = windowed.averaging @ windowed.middle[:, 2]
-        moves = [np.ptp(angle[max(0, place - before) : place + 1]) for place in range(len(angle))]
+        moves = [np.ptp(angle[max(0, place - lead) : place + 1]) for place in range(len(angle))]
         kept = np.array(moves, dtype=float) > _LEAST_RUDDER
         mean = np.eye(len(form.runs))[[number] * len(angle)]
         measured = windowed.change[:, 2]
