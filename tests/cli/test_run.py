@@ -2,9 +2,16 @@
 
 import csv
 import json
+import re
+import tomllib
 
+import numpy as np
 import pytest
 
+from tank2sim.api.captive_run import reduce_runs
+from tank2sim.errors import InputError
+from tank2sim.marks import CHECK
+from tank2sim.records.campaigns import read_campaign
 from tests.cli.command_line import refused, tank2sim
 from tests.identification.captive.generator import Campaign, write
 from tests.identification.captive.made_runs import oscillation
@@ -43,3 +50,46 @@ def test_a_steady_run_has_no_cycle_and_nothing_is_written(tmp_path):
     file = oscillation(tmp_path)
     refused(tank2sim("run", file.name, "--type", "straight", "-o", "h.csv", "--cycle", "c.csv", cwd=tmp_path), "cycle")
     assert not (tmp_path / "h.csv").exists()
+
+
+def disguised(file, name, change):
+    """A copy of a run's file under another name, its table changed."""
+    header = file.read_text().partition("\n")[0]
+    table = change(np.loadtxt(file, delimiter=",", skiprows=1))
+    np.savetxt(file.with_name(name), table, delimiter=",", header=header, comments="", fmt="%.9g")
+    return name
+
+
+COPIES = {
+    "again": lambda table: table,
+    "rounded": lambda table: np.column_stack([table[:, :-3], np.round(table[:, -3:], 1)]),
+    "thinned": lambda table: table[1::2],
+    "begun_later": lambda table: table[60:] - np.array([table[60, 0], *[0] * (table.shape[1] - 1)]),
+}
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_a_copy_is_no_repeat_of_a_run(tmp_path, how):
+    file = oscillation(tmp_path)
+    copy = disguised(file, f"{how}.csv", COPIES[how])
+    with pytest.raises(InputError, match=rf"{how}\.csv.*yaw\.csv"):
+        reduce_runs([file, tmp_path / copy], type="pure_yaw")
+
+
+def test_a_mirror_image_is_marked_and_a_repeat_is_not(tmp_path):
+    file, repeat = oscillation(tmp_path), oscillation(tmp_path, "repeat.csv")
+    sides = np.array([1, -1, -1, 1, 1, -1, -1])  # t_s, psi, r, speed, X, Y, N
+    image = disguised(file, "image.csv", lambda table: table * sides)
+    assert reduce_runs([file, repeat], type="pure_yaw").marks == ()
+    (mark,) = reduce_runs([file, tmp_path / image], type="pure_yaw").marks
+    assert mark.startswith(CHECK) and "image.csv" in mark and "mirror" in mark
+
+
+def test_a_run_of_a_campaign_is_given_once_however_it_was_changed(tmp_path):
+    made = write(Campaign(seed=3, size="linear", rate_hz=5.0), tmp_path / "made")
+    name = tomllib.loads(made.path.read_text())["runs"][0]["file"]
+    sheet = made.path.read_text().partition("[[runs]]")[2].partition("[[runs]]")[0]
+    disguised(made.path.parent / name, "other.csv", COPIES["thinned"])
+    made.path.write_text(made.path.read_text() + "\n[[runs]]" + sheet.replace(name, "other.csv"))
+    with pytest.raises(InputError, match=rf"other\.csv.*{re.escape(name)}"):
+        read_campaign(made.path)

@@ -17,7 +17,7 @@ from scipy.signal import correlate
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.marks import CHECK
-from tank2sim.records.audit.noise import rounding, white_noise
+from tank2sim.records.audit.noise import resolution, rounding, white_noise
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial
 
 PRINTED = 1e-3
@@ -88,6 +88,11 @@ _FINEST = 1 << 16
 _IN_STEP = 0.25
 """Correlation of the timing signal below which no shift is tried. Project choice: a copy has 1, and 0.4 with every
 third row of a signal that is noise alone."""
+_MORE_THAN_DIGITS = 1.5
+"""Times the noise of its rounding from which a signal has noise of its own (project choice)."""
+_STEPS_TO_TELL = 50
+"""Units from zero to the largest reading below which columns may agree by chance. Project choice: readings of five tows
+of one body by the same weight (Wilinski & Zellman 1984), 170 units up to the fastest, differ by ten units."""
 _NEIGHBOURHOOD = 0.02
 """Share of a record by which the timing signal may be wrong, with noise (project choice)."""
 _LEAST_VALUES = 8
@@ -186,21 +191,17 @@ def likeness(first: Recorded, second: Recorded) -> Likeness | None:
         pair = first.signals[name], second.signals[name]
         return white_noise(pair[0]), white_noise(pair[1]), max(_unit(values) for values in pair)
 
-    for alike, sign in ((Likeness.COPY, 1.0), (Likeness.MIRROR, -1.0)):
+    def together(shift: float, sign: float = 1.0) -> Iterator[_Pair]:
         signals = {name: second.signals[name] * (sign if name in _MIRRORED else 1.0) for name in names}
+        return _together(first, second.time_s + shift, signals, precision)
 
-        def together(shift: float, signals: Mapping[str, Array] = signals) -> Iterator[_Pair]:
-            return _together(first, second.time_s + shift, signals, precision)
-
-        shifts = list(_shifts(first, second.time_s, signals))
-        for shift in shifts:
-            if _copied(together(shift)):
-                return alike
-        if sign > 0:
-            shifts.append(_nearest(together, shifts[-1], first.time_s))
-            if any(_recorded_twice(together(shift)) for shift in shifts):
-                return Likeness.TWICE
-    return None
+    for alike, sign in ((Likeness.COPY, 1.0), (Likeness.MIRROR, -1.0)):
+        shifts = list(_shifts(first, second, sign))
+        if any(_copied(together(shift, sign)) for shift in shifts):
+            return alike
+    shifts = list(_shifts(first, second, 1.0))
+    shifts.append(_nearest(together, shifts[-1], first.time_s))
+    return Likeness.TWICE if any(_recorded_twice(together(shift)) for shift in shifts) else None
 
 
 def _nearest(together: Callable[[float], Iterator[_Pair]], shift: float, time: Array) -> float:
@@ -214,6 +215,26 @@ def _nearest(together: Callable[[float], Iterator[_Pair]], shift: float, time: A
     reach = max(_step(time), _NEIGHBOURHOOD * float(time[-1] - time[0]))
     bounds, options = (shift - reach, shift + reach), {"xatol": 0.01 * _step(time)}
     return float(minimize_scalar(apart, bounds=bounds, method="bounded", options=options).x)
+
+
+def has_noise(record: Recorded) -> bool:
+    """Whether a signal has noise that is not its rounding: mirror images without it may be computed, not copied."""
+
+    def noisy(values: Array) -> bool:
+        least = max(PRINTED * float(np.std(values)), _MORE_THAN_DIGITS * resolution(values) / math.sqrt(12.0))
+        return white_noise(values) > least
+
+    return any(map(noisy, record.signals.values()))
+
+
+def same_readings(first: Array, second: Array) -> bool:
+    """True if two columns (n,) of one table agree in all rows that both have, to half a unit of the coarser digits."""
+    known = ~np.isnan(first + second)
+    size = float(np.nanmax(np.abs(first), initial=0.0))
+    units = [_divisor(np.unique(np.append(values[np.isfinite(values)], 0.0)), size) for values in (first, second)]
+    if np.count_nonzero(known) < LEAST_ROWS or min(units) > size / _STEPS_TO_TELL:
+        return False
+    return float(np.max(np.abs(first - second)[known])) <= 0.5001 * max(units)
 
 
 def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
@@ -353,17 +374,18 @@ def _tracks(
     return {"x_m": (tracks[0].real, tracks[1].real), "y_m": (tracks[0].imag, tracks[1].imag)}
 
 
-def _shifts(first: Recorded, time: Array, second: Mapping[str, Array]) -> Iterator[float]:
+def _shifts(first: Recorded, other: Recorded, sign: float) -> Iterator[float]:
     """Times (s) to add to those of the second record: none, by the first rows, and as the timing signal fits best."""
+    time = other.time_s
     yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))
-    name = next((name for name in _TIMING if name in first.signals and name in second), None)
+    name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)
     if name is None:
         return
     step = min(_step(first.time_s), _step(time))
     step = max(step, max(float(times[-1] - times[0]) for times in (first.time_s, time)) / _FINEST)
     grids = [np.arange(times[0], times[-1] + step / 2, step) for times in (first.time_s, time)]
     a = _rate(name, grids[0], first.time_s, first.signals[name])
-    b = _rate(name, grids[1], time, second[name])
+    b = _rate(name, grids[1], time, other.signals[name] * (sign if name in _MIRRORED else 1.0))
     if any(len(each) < LEAST_ROWS or not np.ptp(each) > 0 for each in (a, b)):  # short, unknown or without a change
         return
     a, b = a - np.mean(a), b - np.mean(a)
@@ -406,15 +428,20 @@ def _unit(values: Array) -> float:
     different = np.unique(known[np.abs(known) >= size / 2])
     if len(different) < _LEAST_VALUES:
         return rounding(values)
+    return max(rounding(values), _divisor(different, size))
+
+
+def _divisor(different: Array, size: float) -> float:
+    """Greatest common divisor of the differences of rising values, by Euclid; it ends at a millionth of their size."""
     unit, least = 0.0, 1e-6 * size
     for step in np.diff(different).tolist():
         rest = step
-        while rest > least:  # Euclid
+        while rest > least:
             unit, rest = rest, unit % rest
             rest = 0.0 if unit - rest < least else rest
         if 0 < unit < 10 * least:
             break
-    return max(rounding(values), unit)
+    return unit
 
 
 def _step(time: Array) -> float:

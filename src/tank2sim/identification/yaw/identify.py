@@ -38,7 +38,7 @@ from tank2sim.identification.yaw.plot_data import (
     record_histories,
     residuals_as_json,
 )
-from tank2sim.records.yaw import Medium, YawRecord
+from tank2sim.records.yaw import Medium, YawRecord, refuse_copied_records
 
 YAW_METHODS = (
     "energy_least_squares",
@@ -192,18 +192,21 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     Raises
     ------
     InputError
-        The intervals of a record are not mirror images, the motor saturates in one, the encoder steps too rarely, or
-        the records do not separate the terms.
+        The intervals of a record are not mirror images, the motor saturates in one, the encoder steps too rarely, two
+        records are one, or the records do not separate the terms.
     """
     options = options or YawOptions()
     wet = tuple(record for record in records if record.medium == "water")
     dry = tuple(record for record in records if record.medium == "air")
     if not records:
         raise InputError("tank2sim yaw", "", "no record was given", "give one or more CSV files")
+    alike = refuse_copied_records(records)
     if not wet:
-        return _result(dry, "air", options, None)
+        found = _result(dry, "air", options, None)
+        return replace(found, notes=(*alike, *found.notes))
     air = _result(dry, "air", replace(options, terms=None), None) if dry else None
-    return _result(wet, "water", options, air)
+    found = _result(wet, "water", options, air)
+    return replace(found, notes=(*alike, *found.notes))
 
 
 def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
