@@ -26,6 +26,7 @@ from tank2sim.identification.captive.single_runs import (
     same_test,
     single_run,
 )
+from tank2sim.marks import CHECK
 from tank2sim.records.campaign_form import RUN_TYPES, CampaignFile, FilesSection, RunSheet, RunType, TankTest
 from tank2sim.records.campaigns import (
     FORCE_COLUMNS,
@@ -67,7 +68,7 @@ class CaptiveRunResult(Result):
     def __init__(self, runs: Sequence[SingleRun], campaign: Campaign | None, mirrored: Sequence[str] = ()) -> None:
         self.runs, self.campaign = tuple(runs), campaign
         notices = [*mirrored]
-        notices += [f"FAULT: {fault}" for run in runs for fault in run.faults]
+        notices += [f"{CHECK} {fault}" for run in runs for fault in run.faults]
         if campaign is None:
             notices.append(
                 "Without a campaign the forces are as recorded, with the reaction of the model's inertia, and no "

@@ -14,6 +14,7 @@ from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.diagnostics import (
+    check_added_inertia,
     check_current,
     check_explained,
     check_mirror,
@@ -282,7 +283,7 @@ def _result(
     if angle:
         estimates["output_error"] = angle.estimate
     body, remarks = _body(records, medium, options, air)
-    return YawIdentification(
+    identified = YawIdentification(
         records=records,
         medium=medium,
         torque_constant_NmpA=constant,
@@ -296,6 +297,9 @@ def _result(
         notes=(*notes, *remarks, *estimate_notes(fit, estimates)),
         air=air,
     )
+    added = {name: value for name in estimates if (value := identified.added_inertia(name)) is not None}
+    first = check_added_inertia(records[0], body.value_kgm2 if body else 0.0, added)
+    return replace(identified, notes=(*first, *identified.notes))
 
 
 Fits = tuple[EnergyFit, EnergyFit]
