@@ -10,6 +10,7 @@ import pytest
 
 from tank2sim.api.captive_run import reduce_runs
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.findings import drifting_zeros
 from tank2sim.marks import CHECK
 from tank2sim.records.campaigns import read_campaign
 from tests.cli.command_line import refused, tank2sim
@@ -93,3 +94,40 @@ def test_a_run_of_a_campaign_is_given_once_however_it_was_changed(tmp_path):
     made.path.write_text(made.path.read_text() + "\n[[runs]]" + sheet.replace(name, "other.csv"))
     with pytest.raises(InputError, match=rf"other\.csv.*{re.escape(name)}"):
         read_campaign(made.path)
+
+
+@pytest.mark.parametrize(
+    ("columns", "factor", "place"),
+    [("t_s", 1000.0, "t_s"), ("speed_mps", 1000.0, "speed_mps"), ("v_mps", 1000.0, "v_mps"), ("y_m", 1000.0, "y_m")],
+)
+def test_a_motion_that_no_carriage_makes_is_refused(tmp_path, columns, factor, place):
+    """Milliseconds and millimetres under s and m."""
+    t = np.arange(0, 30.05, 0.1)
+    made = {"t_s": t, "v_mps": 0.2 * np.cos(t), "speed_mps": np.full(len(t), 1.5)}
+    if columns == "y_m":
+        made["y_m"] = 0.2 * np.sin(t)
+        del made["v_mps"]
+    made |= {"X_N": -5 + 0 * t, "Y_N": 9 * np.cos(t), "N_Nm": 3 * np.cos(t)}
+
+    def write_run(name, table):
+        rows = np.column_stack(list(table.values()))
+        np.savetxt(tmp_path / name, rows, delimiter=",", header=",".join(table), comments="", fmt="%.9g")
+        return tmp_path / name
+
+    assert not reduce_runs(write_run("right.csv", made), type="pure_sway").marks
+    with pytest.raises(InputError, match=rf"wrong\.csv.*{place}"):
+        reduce_runs(write_run("wrong.csv", {**made, columns: factor * made[columns]}), type="pure_sway")
+
+
+def test_zeros_that_drift_within_the_runs_are_said(tmp_path):
+    names = [f"{number}.csv" for number in range(5)]
+    files = [oscillation(tmp_path, name) for name in names]
+    steady = [run.reduced for run in reduce_runs(files, type="pure_yaw").runs]
+    assert not list(drifting_zeros(steady))
+    for file in files:
+        table = np.loadtxt(file, delimiter=",", skiprows=1)
+        table[:, 4] += 2.0 * table[:, 0] / table[-1, 0]  # X, whose mean is -9 N
+        disguised(file, file.name, lambda _, table=table: table)
+    (message,) = drifting_zeros([run.reduced for run in reduce_runs(files, type="pure_yaw").runs])
+    assert "X gauge" in message
+    assert float(re.search(r"by (\S+) N ", message)[1]) == pytest.approx(2.0 * 4 / 4.3, rel=0.05)  # over whole periods

@@ -349,6 +349,24 @@ def test_units_and_signs_that_cannot_be_are_refused(folder, columns):
         identify_yaw([read_yaw_record(made)])
 
 
+def test_an_added_inertia_that_no_body_has_is_refused_or_marked(folder, columns, result):
+    def found(inertia, **changes):
+        made = written(folder / "inertia.csv", TRUTH, columns, **{"inertia_kgm2": inertia, **changes})
+        return identify_yaw([read_yaw_record(made)])
+
+    for inertia in (0.06, 204.0):
+        with pytest.raises(InputError, match=r"inertia\.csv.*added inertia"):
+            found(inertia)
+    with pytest.raises(InputError, match="added inertia"):
+        found(0.0204, torque_constant_NmpA=0.0051)
+    for unit in ({"inertia": 0.0204e-3}, {"inertia": 0.0204, "torque_constant_NmpA": 51.0}):
+        (mark,) = marked(found(**unit).notes)
+        assert "added inertia" in mark and "J_zz" in mark
+    (mark,) = marked(found(0.0500, inertia_error_kgm2=9e-4).notes)
+    assert "added inertia" in mark and "zero" in mark
+    assert not marked(found(0.0204, inertia_error_kgm2=2e-4).notes)
+
+
 def test_a_wrapped_angle_is_put_together_and_reported(folder, columns, result):
     wrapped = (columns["psi"] + 3.0) % (2 * np.pi)
     read = read_yaw_record(written(folder / "wrapped.csv", TRUTH, {**columns, "psi": wrapped}))
