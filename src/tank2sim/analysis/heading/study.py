@@ -285,14 +285,14 @@ def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[st
         rudder = math.degrees(float(np.mean(run["rudder.angle"][len(run.t) // 2 :])))
         found.append(
             f"{CHECK} the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
-            f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg of "
-            "rudder in the mean; the figures of course keeping mean nothing."
+            f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg "
+            "of rudder in the mean; the figures of course keeping mean nothing."
         )
     speed = float(np.mean(run["motion.u"][len(run.t) // 2 :]))
     if weather.current_mps >= abs(speed):
         found.append(
-            f"{CHECK} the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through the "
-            "water): it may hold its heading, but cannot hold a course over the ground."
+            f"{CHECK} the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
+            "the water): it may hold its heading, but cannot hold a course over the ground."
         )
     return found
 
