@@ -251,7 +251,7 @@ def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list
                 faults.setdefault(run.name, InputError(run.name, "", problem, remedy))
             elif alike is Likeness.MIRROR and has_noise(record):
                 remarks.append(
-                    f"{CHECK} {run.name} is the mirror image of {other.name}, noise included: it is no second run."
+                    f"{CHECK} {run.name} is the mirror image of {other.name}, noise included: not a second run."
                 )
         seen.append((run, record))
     return faults, remarks

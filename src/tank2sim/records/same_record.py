@@ -59,12 +59,12 @@ _BY_CHANCE = 1.5
 """Times the noise of two sensors that their difference may have. Project choice: the noise is known to some 10 %, and
 the mean square of 16 block means exceeds twice its expectation by chance once in a hundred records."""
 
-_TELLS = 0.01
-"""Share of a signal's spread that its block means must resolve, to tell a second recorder from a second run. Project
-choice: half of the least difference between runs of one manoeuvre (HSVA's zigzags: 2 to 12 % in yaw rate)."""
+_SHOWS = 0.01
+"""Share of a signal's spread that its block means must resolve, to distinguish a second recorder from a second run.
+Project choice: half of the least difference between runs of one manoeuvre (HSVA's zigzags: 2 to 12 % in yaw rate)."""
 
 _DIRECTIONS = ("psi_rad", "cog_rad", "angle_rad")
-"""Signals whose zero is no property of the run: it may be turned."""
+"""Signals whose zero is arbitrary: the run may be turned."""
 
 _MIRRORED = (
     *("v_mps", "v_ground_mps", "r_radps", "psi_rad", "cog_rad", "y_m", "phi_rad", "Y_N", "N_Nm"),
@@ -90,7 +90,7 @@ _IN_STEP = 0.25
 third row of a signal that is noise alone."""
 _MORE_THAN_DIGITS = 1.5
 """Times the noise of its rounding from which a signal has noise of its own (project choice)."""
-_STEPS_TO_TELL = 50
+_STEPS_TO_SHOW = 50
 """Units from zero to the largest reading below which columns may agree by chance. Project choice: readings of five tows
 of one body by the same weight (Wilinski & Zellman 1984), 170 units up to the fastest, differ by ten units."""
 _NEIGHBOURHOOD = 0.02
@@ -99,7 +99,7 @@ _LEAST_VALUES = 8
 """Different values of a signal that must be multiples of a unit for it to count as its rounding (project choice)."""
 
 
-class Recorded(Protocol):
+class TimedSignals(Protocol):
     """What two records are compared by: a trial, a captive run, a record of a rig."""
 
     @property
@@ -113,7 +113,7 @@ class Recorded(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A record that is no trial: times (n,) and signals (n,)."""
+    """A record other than a trial: times (n,) and signals (n,)."""
 
     time_s: Array
     signals: Mapping[str, Array]
@@ -155,7 +155,7 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
             problem = f"is both fitted and held out: it is the record of {before.path.name}"
             raise InputError(trial.path, "", problem, "hold out what is not fitted")
         if alike is not None:
-            proves = "as a hold-out it proves nothing" if others is not None else "it is no second run"
+            proves = "as a hold-out it proves nothing" if others is not None else "it is not a second run"
             notices.append(f"{CHECK} {trial.path.name} {_SAID[alike].format(before.path.name)}: {proves}.")
     return tuple(notices)
 
@@ -166,12 +166,12 @@ _SAID = {
 }
 
 
-def same_record(first: Recorded, second: Recorded) -> bool:
+def same_record(first: TimedSignals, second: TimedSignals) -> bool:
     """True if one of two records is a copy of the other, see :func:`likeness`."""
     return likeness(first, second) is Likeness.COPY
 
 
-def likeness(first: Recorded, second: Recorded) -> Likeness | None:
+def likeness(first: TimedSignals, second: TimedSignals) -> Likeness | None:
     """What two records have in common, whatever their clock, heading, origin, digits and rows; None for two runs.
 
     A copy has in all signals that both measured the same values at the same times, except for printed digits. A mirror
@@ -217,7 +217,7 @@ def _nearest(together: Callable[[float], Iterator[_Pair]], shift: float, time: A
     return float(minimize_scalar(apart, bounds=bounds, method="bounded", options=options).x)
 
 
-def has_noise(record: Recorded) -> bool:
+def has_noise(record: TimedSignals) -> bool:
     """Whether a signal has noise that is not its rounding: mirror images without it may be computed, not copied."""
 
     def noisy(values: Array) -> bool:
@@ -228,11 +228,17 @@ def has_noise(record: Recorded) -> bool:
 
 
 def same_readings(first: Array, second: Array) -> bool:
-    """True if two columns (n,) of one table agree in all rows that both have, to half a unit of the coarser digits."""
+    """True if two columns of one table agree in all rows that both have, to half a unit of the coarser digits.
+
+    Parameters
+    ----------
+    first, second : array (n,)
+        nan where nothing was read.
+    """
     known = ~np.isnan(first + second)
     size = float(np.nanmax(np.abs(first), initial=0.0))
     units = [_divisor(np.unique(np.append(values[np.isfinite(values)], 0.0)), size) for values in (first, second)]
-    if np.count_nonzero(known) < LEAST_ROWS or min(units) > size / _STEPS_TO_TELL:
+    if np.count_nonzero(known) < LEAST_ROWS or min(units) > size / _STEPS_TO_SHOW:
         return False
     return float(np.max(np.abs(first - second)[known])) <= 0.5001 * max(units)
 
@@ -299,7 +305,7 @@ class _Pair:
         of_mean = _BY_CHANCE * noise / math.sqrt(len(apart) / _BLOCKS)
         small = PRINTED * self.spread
         explained = float(np.std(apart)) <= max(_BY_CHANCE * noise, small)
-        return explained and float(np.std(means)) <= max(of_mean, small), of_mean <= _TELLS * self.spread
+        return explained and float(np.std(means)) <= max(of_mean, small), of_mean <= _SHOWS * self.spread
 
 
 def _copied(pairs: Iterable[_Pair]) -> bool:
@@ -312,19 +318,22 @@ def _copied(pairs: Iterable[_Pair]) -> bool:
 
 
 def _recorded_twice(pairs: Iterable[_Pair]) -> bool:
-    told = False
+    shown = False
     for pair in pairs:
         if len(pair.first) < _BLOCKS * LEAST_ROWS:
             return False
-        by_noise, tells = pair.by_noise()
+        by_noise, shows = pair.by_noise()
         if not by_noise:
             return False
-        told = told or (tells and pair.evidence)
-    return told
+        shown = shown or (shows and pair.evidence)
+    return shown
 
 
 def _together(
-    first: Recorded, time: Array, second: Mapping[str, Array], precision: Callable[[str], tuple[float, float, float]]
+    first: TimedSignals,
+    time: Array,
+    second: Mapping[str, Array],
+    precision: Callable[[str], tuple[float, float, float]],
 ) -> Iterator[_Pair]:
     """The signals of two records at the rows of the first, in one frame; empty if too few are at the same times."""
     inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
@@ -374,7 +383,7 @@ def _tracks(
     return {"x_m": (tracks[0].real, tracks[1].real), "y_m": (tracks[0].imag, tracks[1].imag)}
 
 
-def _shifts(first: Recorded, other: Recorded, sign: float) -> Iterator[float]:
+def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[float]:
     """Times (s) to add to those of the second record: none, by the first rows, and as the timing signal fits best."""
     time = other.time_s
     yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))

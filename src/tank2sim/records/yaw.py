@@ -137,7 +137,7 @@ def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[str, ...]:
                 remedy = "give each record once: a copy is not a second run"
                 raise InputError(record.path, "", f"is the record of {name} again", remedy)
             if alike is Likeness.MIRROR and has_noise(seen[number]):
-                said = f"is the mirror image of {name}, noise included: it is no second run"
+                said = f"is the mirror image of {name}, noise included, not a second run"
                 notices.append(f"{CHECK} {record.path.name} {said}.")
     return tuple(notices)
 

@@ -8,13 +8,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tank2sim.cards.plausibility import Caution
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.regression import solve
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
-from tank2sim.identification.captive.tank_conditions import Caution, Tank, tank_resonance, tank_size
+from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 from tank2sim.marks import CHECK
 from tank2sim.records.campaigns import FORCE_COLUMNS
@@ -27,7 +28,7 @@ _UNEXPLAINED = 2.0
 _ASYMMETRIC = 0.01
 _REPEATED_ENOUGH = 3
 _DRIFTS_ENOUGH, _SURE = 4, 4.0
-"""Runs, and standard errors of their mean drift, from which a common drift is no chance (project choice)."""
+"""Runs, and standard errors of their mean drift, from which a common drift is not chance (project choice)."""
 
 
 def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
