@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
+from tank2sim.marks import CHECK
 from tests.cli.command_line import refused, tank2sim
 
 
@@ -87,3 +88,16 @@ def test_what_cannot_be_asked_is_refused_at_its_place(options, source: str, plac
 
 def test_a_negative_seed_is_refused_on_the_command_line(tmp_path: Path) -> None:
     refused(tank2sim("autopilot", "mariner", "--seed", "-1", cwd=tmp_path), "--seed")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("weather", "word"), [({"wind_mps": 500.0}, "500 m/s"), ({"current_mps": 9.0}, "9 m/s"), ({"wind_mps": 15.0}, "")]
+)
+def test_a_course_that_is_not_held_is_said_first(weather, word) -> None:
+    result = t2s.load("mariner").autopilot(**weather)
+    marks = [mark for mark in result.marks if mark.startswith(CHECK)]
+    assert bool(marks) == bool(word)
+    if word:
+        assert word in marks[0] and repr(result).startswith(marks[0])
+    assert ("deg/s on the move" in result.headline[3]) == ("wind_mps" not in weather or weather["wind_mps"] < 100)

@@ -109,6 +109,6 @@ def test_a_wrong_force_convention_is_warned_of_before_the_numbers(path, conventi
     wrong = path.with_name(f"{convention}.toml")
     wrong.write_text(path.read_text().replace('"on_model"', f'"{convention}"'))
     shown = run(wrong).output
-    assert shown.startswith("warning: ")
+    assert shown.startswith("CHECK: ")
     assert shown.index("the added mass is negative") < shown.index("whole campaign")
-    assert "warning: " not in run(path).output
+    assert "CHECK: " not in run(path).output

@@ -106,3 +106,29 @@ def test_tows_one_by_one():
     assert second.force_N == tows.force_N and second.speed_mps[2, 0] == 0.023
     others = tows.without(1)
     assert len(others.names) == 4 and others.counts.tolist() == [4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 3]
+
+
+TABLE = bundled("models", "wilinski-zellman", "tows.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    "copy",
+    [
+        lambda speed, row: speed,
+        lambda speed, row: f"{float(speed):.2f}",
+        lambda speed, row: speed if row % 2 else "",
+    ],
+    ids=["again", "rounded", "every second row"],
+)
+def test_a_copy_of_a_tow_is_refused(write, copy):
+    lines, row = [], 0
+    for line in TABLE.splitlines():
+        if line.startswith("t_s"):
+            lines.append(f"{line},speed_6_mps")
+        elif line.startswith("#"):
+            lines.append(line)
+        else:
+            lines.append(f"{line},{copy(line.split(',')[3], row)}")
+            row += 1
+    with pytest.raises(InputError, match=r"speed_6_mps.*speed_3_mps"):
+        read_tows(write("\n".join(lines) + "\n"))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
-from tank2sim.analysis.heading.study import AutopilotStudy, StudySettings, check_settings, study_autopilot
+from tank2sim.analysis.heading.study import HELD_DEG, AutopilotStudy, StudySettings, check_settings, study_autopilot
 from tank2sim.analysis.heading.track_keeping import check_waypoints, read_waypoints
 from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
@@ -220,10 +220,13 @@ class AutopilotResult(ResultWithAutopilot):
             _limits_text(study.limits),
             f"Linear up to a step of {rate:.3g} deg (rate of the gear) and {angle:.3g} deg (angle)",
             f"Course keeping in current, wind and waves over {kept.duration_s:.0f} s: heading error "
-            f"{kept.heading_error_rms_deg:.3g} deg rms (mean {kept.heading_error_mean_deg:.2g}), rudder "
-            f"{kept.rudder_rms_deg:.3g} deg rms, {kept.rudder_travel_degps:.3g} deg/s on the move, "
-            f"at full rate {kept.rate_limited_percent:.3g} % of the time",
+            f"{kept.heading_error_rms_deg:.3g} deg rms (mean {kept.heading_error_mean_deg:.2g})",
         ]
+        if max(abs(kept.heading_error_mean_deg), kept.heading_error_rms_deg) <= HELD_DEG:
+            lines[-1] += (
+                f", rudder {kept.rudder_rms_deg:.3g} deg rms, {kept.rudder_travel_degps:.3g} deg/s on the move, at "
+                f"full rate {kept.rate_limited_percent:.3g} % of the time"
+            )
         if self.fmu:
             lines.append(self.fmu.text)
         return tuple(lines)

@@ -26,8 +26,16 @@ from tank2sim.identification.captive.single_runs import (
     same_test,
     single_run,
 )
+from tank2sim.marks import CHECK
 from tank2sim.records.campaign_form import RUN_TYPES, CampaignFile, FilesSection, RunSheet, RunType, TankTest
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun, read_campaign_form, read_captive_run
+from tank2sim.records.campaigns import (
+    FORCE_COLUMNS,
+    Campaign,
+    CaptiveRun,
+    copied_runs,
+    read_campaign_form,
+    read_captive_run,
+)
 from tank2sim.records.thinning import drawn_columns
 
 if TYPE_CHECKING:
@@ -51,13 +59,16 @@ class CaptiveRunResult(Result):
     runs : sequence of SingleRun
     campaign : Campaign or None
         Model and test, if they were given.
+    mirrored : sequence of str
+        Remarks on runs that are mirror images.
     """
 
     command = "run"
 
-    def __init__(self, runs: Sequence[SingleRun], campaign: Campaign | None) -> None:
+    def __init__(self, runs: Sequence[SingleRun], campaign: Campaign | None, mirrored: Sequence[str] = ()) -> None:
         self.runs, self.campaign = tuple(runs), campaign
-        notices = [f"FAULT: {fault}" for run in runs for fault in run.faults]
+        notices = [*mirrored]
+        notices += [f"{CHECK} {fault}" for run in runs for fault in run.faults]
         if campaign is None:
             notices.append(
                 "Without a campaign the forces are as recorded, with the reaction of the model's inertia, and no "
@@ -296,7 +307,12 @@ def reduce_runs(
     if type == "straight":
         angles = {"drift_rad": 0.0, "rudder_rad": 0.0} | angles
     test = form.test if form else TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
+    if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
+        raise InputError(again, "", "is given twice", "give each run once")
     runs = [_read(path, type, form, Path(campaign) if campaign else None, test, angles) for path in paths]
+    copies, mirrored = copied_runs(runs)
+    if copies:
+        raise next(iter(copies.values()))
     if form is None and speed_mps is None:
         for path, run in zip(paths, runs, strict=True):
             if np.ptp(run.speed_mps) == 0.0 and run.speed_mps[0] == 1.0:
@@ -312,7 +328,7 @@ def reduce_runs(
             full_scale=form.full_scale,
             runs=tuple(runs),
         )
-    return CaptiveRunResult([single_run(run, known_campaign) for run in runs], known_campaign)
+    return CaptiveRunResult([single_run(run, known_campaign) for run in runs], known_campaign, mirrored)
 
 
 def _read(

@@ -32,6 +32,7 @@ from tank2sim.identification.craft.problem import craft_driven_by, craft_problem
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.marks import CHECK
 from tank2sim.records.craft_trials import read_craft_trial
+from tank2sim.records.same_record import refuse_copies
 from tank2sim.units import from_si
 
 CraftTrialPaths = str | Path | Sequence[str | Path]
@@ -66,12 +67,13 @@ class CraftIdentificationResult(Result):
         held: Sequence[str] = (),
         driven_by: str = "revolutions",
         responses: Mapping[str, OrderResponse] | None = None,
+        alike: Sequence[str] = (),
     ) -> None:
         assert isinstance(before.card, CraftCard)
         self.before, self.fit, self.predictions, self.held = before, fit, list(predictions), list(held)
         self.driven_by, self.responses = driven_by, dict(responses or {})
         self.card = identified_craft(before.card, fit, self.responses)
-        self.notices = (*dict.fromkeys((*doubts(before.card), *doubts(self.card))), *self._notices())
+        self.notices = (*dict.fromkeys((*doubts(before.card), *doubts(self.card))), *alike, *self._notices())
 
     def _notices(self) -> list[str]:
         of_thrust = [
@@ -272,6 +274,7 @@ def identify_craft(
     if twice:
         raise InputError(sorted(twice)[0], "", "is fitted and held out", "give it once")
     read = [read_craft_trial(path, ship.card.thrusters) for path in (*fitted, *held)]
+    alike = (*refuse_copies(read[: len(fitted)]), *refuse_copies(read[: len(fitted)], read[len(fitted) :]))
     problem, driven_by = craft_problem(ship.card, read), craft_driven_by(ship.card, read)
     runs = problem.runs
     try:
@@ -284,7 +287,7 @@ def identify_craft(
     predictions = predict_free(fit, runs[len(fitted) :]) if held else []
     responses = order_responses(ship.card, read[: len(fitted)])
     names = [run.name for run in runs[len(fitted) :]]
-    return CraftIdentificationResult(ship, fit, predictions, names, driven_by, responses)
+    return CraftIdentificationResult(ship, fit, predictions, names, driven_by, responses, alike)
 
 
 def craft_trial_files(paths: CraftTrialPaths) -> list[Path]:

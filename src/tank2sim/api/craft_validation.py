@@ -25,6 +25,7 @@ from tank2sim.identification.craft.fit import (
 )
 from tank2sim.identification.craft.problem import craft_problem
 from tank2sim.records.craft_trials import read_craft_trial
+from tank2sim.records.same_record import refuse_copies
 
 NOT_ITS_OWN = (
     "a trial that the card was identified from shows how well it was fitted, and not how well the card predicts"
@@ -46,13 +47,16 @@ class CraftValidationResult(Result):
 
     command = "validate"
 
-    def __init__(self, ship: Ship, paths: Sequence[Path], predictions: Sequence[FreePrediction]) -> None:
+    def __init__(
+        self, ship: Ship, paths: Sequence[Path], predictions: Sequence[FreePrediction], alike: Sequence[str] = ()
+    ) -> None:
         self.ship, self.paths, self.predictions = ship, tuple(paths), tuple(predictions)
         known = {entry.run.file for entry in self.predictions}
         short = [path.name for path in self.paths if str(path) not in known]
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         self.notices = (
             *doubts(ship.card),
+            *alike,
             *([f"not longer than {least:g} s, and not predicted: {', '.join(short)}"] if short else []),
             NOT_ITS_OWN,
         )
@@ -139,7 +143,8 @@ def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult
     if not paths:
         remedy = "give trials that tank2sim log cut and identify did not fit"
         raise InputError("trials", "", "there are none, and a craft is validated by what it did", remedy)
-    problem = craft_problem(card, [read_craft_trial(path, card.thrusters) for path in paths])
+    read = [read_craft_trial(path, card.thrusters) for path in paths]
+    alike, problem = refuse_copies(read), craft_problem(card, read)
     try:
         with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
             predictions = predict_by_card(problem)
@@ -149,4 +154,4 @@ def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult
     if not predictions:
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         raise InputError("trials", "", f"none is longer than {least:g} s", "give longer ones")
-    return CraftValidationResult(ship, paths, predictions)
+    return CraftValidationResult(ship, paths, predictions, alike)

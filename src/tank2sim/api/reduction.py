@@ -115,8 +115,14 @@ class ReductionResult(Result):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Warnings of values that no known ship has."""
-        return tuple(f"warning: {finding}" for finding in self.findings)
+        """Whose size the card has, if the campaign states a ship."""
+        model = self.reduction.campaign.model
+        if self.ratio is not None or model.scale is None:
+            return ()
+        size = (
+            f"{model.length_m:.4g} m long; --scale ship makes that of the ship of {model.length_m * model.scale:.4g} m"
+        )
+        return (f"The card is of the model, {size}.",)
 
     @property
     def tables(self) -> tuple[ResultTable, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -205,7 +206,7 @@ def fitted_and_held(
     for trial in held.trials:
         if trial.name in {trial_fitted.name for trial_fitted in fitted.trials}:
             raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
-    refuse_copies(fitted.trials, held.trials)
+    held = replace(held, notices=(*refuse_copies(fitted.trials, held.trials), *held.notices))
     for trial in held.trials:
         if (name := fitted_as(card, trial)) is not None:
             problem = f"is held out, and {card.source} was fitted to it: it is the record of {name}"

@@ -12,18 +12,18 @@ Inside the program a :class:`CaptiveRun` has, whatever its file says:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.cards.reading import parsed_toml
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import named_in, read_text
+from tank2sim.marks import CHECK
 from tank2sim.records.averages import Condition, read_averages
 from tank2sim.records.campaign_form import (
     OSCILLATING,
@@ -42,6 +42,7 @@ from tank2sim.records.campaign_form import (
 )
 from tank2sim.records.csv_table import CsvTable
 from tank2sim.records.run_tables import read_run_table
+from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 
 FORCE_COLUMNS = ("X", "Y", "N")
 _FEWEST_READINGS = 16
@@ -208,9 +209,10 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
                 runs.append(read_captive_run(file, sheet, form.test, columns, form.files))
         except InputError as fault:
             faults.append(fault)
-    copies = _copies(runs)
+    copies, mirrored = copied_runs(runs)
     runs = [run for run in runs if run.name not in copies]
     faults += copies.values()
+    remarks += mirrored
     if faults and not keep_going:
         raise together(faults)
     if not runs:
@@ -228,30 +230,42 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     )
 
 
-def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
-    """Runs whose readings are those of a run before, to the last digit: name to fault.
+def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[str]]:
+    """Runs whose forces are those of a run before, as :func:`tank2sim.records.same_record.likeness` finds: name to
+    fault; and remarks on mirror images.
 
-    One record may be a part of the other, at its beginning or its end. Noise never repeats itself; records without
-    noise, of a computed campaign or a dead gauge, are not evidence.
+    Noise never repeats itself; records without noise, of a computed campaign or a dead gauge, are not evidence.
     """
-    found: dict[str, InputError] = {}
-    seen: dict[tuple[str, bytes], list[tuple[CaptiveRun, NDArray[np.float64]]]] = {}
+    faults: dict[str, InputError] = {}
+    remarks = []
+    seen: list[tuple[CaptiveRun, Recording]] = []
     for run in runs:
-        readings = np.column_stack([run.force(force) for force in FORCE_COLUMNS])
-        if run.is_average or len(readings) < _FEWEST_READINGS or not np.ptp(readings, axis=0).all():
+        record = Recording(run.time_s, {column: run.force(force) for force, column in _FORCE_COLUMNS.items()})
+        if run.is_average or len(run.time_s) < _FEWEST_READINGS or not all(map(np.ptp, record.signals.values())):
             continue
-        ends = [("first", readings[0].tobytes()), ("last", readings[-1].tobytes())]
-        for end in ends:
-            for other, others in seen.get(end, []):
-                common = min(len(readings), len(others))
-                part = slice(None, common) if end[0] == "first" else slice(-common, None)
-                if run.name not in found and np.array_equal(readings[part], others[part]):
-                    problem = f"has the forces of {other.name}, reading for reading"
-                    remedy = "one is a copy of the other: take it out, or give the run its own record"
-                    found[run.name] = InputError(run.name, "", problem, remedy)
-        for end in ends:
-            seen.setdefault(end, []).append((run, readings))
-    return found
+        for other, before in seen:
+            alike = likeness(before, record) if _similar(before, record) else None
+            if alike is Likeness.COPY:
+                problem = f"has the forces of {other.name}, reading for reading"
+                remedy = "one is a copy of the other: take it out, or give the run its own record"
+                faults.setdefault(run.name, InputError(run.name, "", problem, remedy))
+            elif alike is Likeness.MIRROR and has_noise(record):
+                remarks.append(
+                    f"{CHECK} {run.name} is the mirror image of {other.name}, noise included: not a second run."
+                )
+        seen.append((run, record))
+    return faults, remarks
+
+
+def _similar(first: Recording, second: Recording) -> bool:
+    """Whether means and scatter of all forces, or their mirror image, are such that a closer look is worth it."""
+    for name, values in first.signals.items():
+        other = second.signals[name]
+        scatter = float(np.std(values)), float(np.std(other))
+        means = abs(float(np.mean(values))), abs(float(np.mean(other)))
+        if abs(means[0] - means[1]) > max(scatter) or max(scatter) > 2 * min(scatter):
+            return False
+    return True
 
 
 def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputError:

@@ -1,16 +1,24 @@
-"""Whether two trials are one record: renamed, commented, printed with other digits, cut, or with fewer columns."""
+"""Whether two trials are one record: renamed, cut, thinned, rounded, turned, moved, mirrored, or recorded twice."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+from scipy.signal import correlate
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.audit.noise import rounding, white_noise
-from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step
+from tank2sim.marks import CHECK
+from tank2sim.records.audit.noise import resolution, rounding, white_noise
+from tank2sim.records.trials import MEASURED_COLUMNS, Trial
 
 PRINTED = 1e-3
 """Share of a signal's spread by which printing it with other digits may change it; two runs of one manoeuvre differ by
@@ -32,10 +40,10 @@ COMMON = 0.5
 LEAST_ROWS = 4
 """Rows at the same times below which records are not compared. Project choice: three numbers may agree by chance."""
 
-SIGNED = ("psi_rad", "x_m", "r_radps", "y_m", "u_mps", "sog_mps", "v_mps", "u_ground_mps", "v_ground_mps", "phi_rad")
+SIGNED = ("psi_rad", "x_m", "y_m", "r_radps", "u_mps", "sog_mps", "v_mps", "u_ground_mps", "v_ground_mps", "phi_rad")
 """Signals of a signature, the first of them first. Project choice: heading and position are in most copies."""
 
-MOST_SIGNED, LEAST_SIGNED_ROWS = 3, 16
+MOST_SIGNED, LEAST_SIGNED_ROWS = 4, 16
 """Signals of a signature, and rows; below twice as many. Project choice: a few lines on a card, and half of the rows
 are still enough to compare."""
 
@@ -43,44 +51,200 @@ STRIDES = (60, 12, 1)
 """The rows of a signature are a multiple of one of these apart, where the record is long enough. Project choice: a copy
 with every second, third, ... row still has them all."""
 
+_BLOCKS = 16
+"""Parts of a record over which the difference of two recordings is averaged. Project choice: some swings of a zigzag,
+and enough rows in each for a mean that shows a disturbance below the noise."""
 
-def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None) -> None:
+_BY_CHANCE = 1.5
+"""Times the noise of two sensors that their difference may have. Project choice: the noise is known to some 10 %, and
+the mean square of 16 block means exceeds twice its expectation by chance once in a hundred records."""
+
+_SHOWS = 0.01
+"""Share of a signal's spread that its block means must resolve, to distinguish a second recorder from a second run.
+Project choice: half of the least difference between runs of one manoeuvre (HSVA's zigzags: 2 to 12 % in yaw rate)."""
+
+_DIRECTIONS = ("psi_rad", "cog_rad", "angle_rad")
+"""Signals whose zero is arbitrary: the run may be turned."""
+
+_MIRRORED = (
+    *("v_mps", "v_ground_mps", "r_radps", "psi_rad", "cog_rad", "y_m", "phi_rad", "Y_N", "N_Nm"),
+    *("angle_rad", "current_A"),
+)
+"""Signals that change sign in a mirror."""
+
+_TRACK = ("x_m", "y_m")
+_COMPARED = (
+    *(name for name in MEASURED_COLUMNS if not name.startswith(("wind", "current"))),
+    "X_N",
+    "Y_N",
+    "N_Nm",
+    "angle_rad",
+    "current_A",
+)
+_TIMING = ("r_radps", "N_Nm", "Y_N", "current_A", "psi_rad", "cog_rad", "u_mps", "sog_mps", "x_m", "y_m")
+"""Signals by which two records are shifted onto each other, the first one that both have."""
+_FINEST = 1 << 16
+"""Rows of a record in the search for the shift. Project choice: it takes some hundredths of a second."""
+_IN_STEP = 0.25
+"""Correlation of the timing signal below which no shift is tried. Project choice: a copy has 1, and 0.4 with every
+third row of a signal that is noise alone."""
+_MORE_THAN_DIGITS = 1.5
+"""Times the noise of its rounding from which a signal has noise of its own (project choice)."""
+_STEPS_TO_SHOW = 50
+"""Units from zero to the largest reading below which columns may agree by chance. Project choice: readings of five tows
+of one body by the same weight (Wilinski & Zellman 1984), 170 units up to the fastest, differ by ten units."""
+_NEIGHBOURHOOD = 0.02
+"""Share of a record by which the timing signal may be wrong, with noise (project choice)."""
+_LEAST_VALUES = 8
+"""Different values of a signal that must be multiples of a unit for it to count as its rounding (project choice)."""
+
+
+class TimedSignals(Protocol):
+    """What two records are compared by: a trial, a captive run, a record of a rig."""
+
+    @property
+    def time_s(self) -> Array:
+        """Rising times (n,)."""
+
+    @property
+    def signals(self) -> Mapping[str, Array]:
+        """Name to values (n,), SI."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A record other than a trial: times (n,) and signals (n,)."""
+
+    time_s: Array
+    signals: Mapping[str, Array]
+
+
+class Likeness(StrEnum):
+    """What two records have in common."""
+
+    COPY = "copy"
+    MIRROR = "mirror image"
+    TWICE = "recorded twice"
+
+
+def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None) -> tuple[str, ...]:
     """Refuse trials that are one record: among themselves, or fitted and held out if others are given.
+
+    Returns
+    -------
+    tuple of str
+        Notices of mirror images and of runs that seem to be recorded twice.
 
     Raises
     ------
     InputError
         Names the second file, and which one it is again.
     """
-    if others is None:
-        for number, trial in enumerate(trials):
-            for before in trials[:number]:
-                if same_record(trial, before):
-                    problem = f"is the record of {before.path.name} again"
-                    raise InputError(trial.path, "", problem, "give each record once: a copy is not a second run")
-        return
-    for held in others:
-        for trial in trials:
-            if same_record(held, trial):
-                problem = f"is both fitted and held out: it is the record of {trial.path.name}"
-                raise InputError(held.path, "", problem, "hold out what is not fitted")
+    pairs = (
+        ((trial, before) for number, trial in enumerate(trials) for before in trials[:number])
+        if others is None
+        else ((held, trial) for held in others for trial in trials)
+    )
+    notices = []
+    for trial, before in pairs:
+        alike = likeness(trial, before)
+        if alike is Likeness.COPY:
+            if others is None:
+                problem = f"is the record of {before.path.name} again"
+                raise InputError(trial.path, "", problem, "give each record once: a copy is not a second run")
+            problem = f"is both fitted and held out: it is the record of {before.path.name}"
+            raise InputError(trial.path, "", problem, "hold out what is not fitted")
+        if alike is not None:
+            proves = "as a hold-out it proves nothing" if others is not None else "it is not a second run"
+            notices.append(f"{CHECK} {trial.path.name} {_SAID[alike].format(before.path.name)}: {proves}.")
+    return tuple(notices)
 
 
-def same_record(first: Trial, second: Trial) -> bool:
-    """True if all signals that both measured are the same at the same times, except for their printed digits.
+_SAID = {
+    Likeness.MIRROR: "is the mirror image of {}, noise included",
+    Likeness.TWICE: "differs from {} by the noise of the sensors alone, as a second recording of the same run does",
+}
 
-    Times count from the first row of each, or as they are, whichever fits. Both are at the size of one ship. A signal
-    that does not move says nothing.
+
+def same_record(first: TimedSignals, second: TimedSignals) -> bool:
+    """True if one of two records is a copy of the other, see :func:`likeness`."""
+    return likeness(first, second) is Likeness.COPY
+
+
+def likeness(first: TimedSignals, second: TimedSignals) -> Likeness | None:
+    """What two records have in common, whatever their clock, heading, origin, digits and rows; None for two runs.
+
+    A copy has in all signals that both measured the same values at the same times, except for printed digits. A mirror
+    image has them with port and starboard exchanged. A run recorded twice differs by no more than the white noise of
+    the sensors, also in means over a sixteenth of the record, where a second run shows its own disturbances. Both are
+    at the size of one ship. A signal that does not move says nothing.
     """
-    if sampling_step(first) < sampling_step(second):  # at the rows of the coarser one, between which nothing is drawn
+    if _step(first.time_s) < _step(second.time_s):  # at the rows of the coarser one, between which nothing is drawn
         first, second = second, first
-    names = [name for name in MEASURED_COLUMNS if name in first.signals and name in second.signals]
-    shifts = dict.fromkeys((0.0, float(first.time_s[0] - second.time_s[0])))
-    return bool(names) and any(_same_at(first, second, names, shift) for shift in shifts)
+    names = [name for name in _COMPARED if name in first.signals and name in second.signals]
+    if len(names) > 1 and sum(name in _TRACK for name in names) == 1:  # turned, it would be another
+        names = [name for name in names if name not in _TRACK]
+
+    @cache
+    def precision(name: str) -> tuple[float, float, float]:
+        """Noise of a signal in each record, and the coarser unit of their digits."""
+        pair = first.signals[name], second.signals[name]
+        return white_noise(pair[0]), white_noise(pair[1]), max(_unit(values) for values in pair)
+
+    def together(shift: float, sign: float = 1.0) -> Iterator[_Pair]:
+        signals = {name: second.signals[name] * (sign if name in _MIRRORED else 1.0) for name in names}
+        return _together(first, second.time_s + shift, signals, precision)
+
+    for alike, sign in ((Likeness.COPY, 1.0), (Likeness.MIRROR, -1.0)):
+        shifts = list(_shifts(first, second, sign))
+        if any(_copied(together(shift, sign)) for shift in shifts):
+            return alike
+    shifts = list(_shifts(first, second, 1.0))
+    shifts.append(_nearest(together, shifts[-1], first.time_s))
+    return Likeness.TWICE if any(_recorded_twice(together(shift)) for shift in shifts) else None
+
+
+def _nearest(together: Callable[[float], Iterator[_Pair]], shift: float, time: Array) -> float:
+    """The shift (s) at which all signals together are nearest, in the neighbourhood of one by the timing signal."""
+    if any(pair.apart > pair.spread for pair in together(shift)):
+        return shift
+
+    def apart(tried: float) -> float:
+        return sum(math.log(max(pair.apart / pair.spread, 1e-12)) for pair in together(tried))
+
+    reach = max(_step(time), _NEIGHBOURHOOD * float(time[-1] - time[0]))
+    bounds, options = (shift - reach, shift + reach), {"xatol": 0.01 * _step(time)}
+    return float(minimize_scalar(apart, bounds=bounds, method="bounded", options=options).x)
+
+
+def has_noise(record: TimedSignals) -> bool:
+    """Whether a signal has noise that is not its rounding: mirror images without it may be computed, not copied."""
+
+    def noisy(values: Array) -> bool:
+        least = max(PRINTED * float(np.std(values)), _MORE_THAN_DIGITS * resolution(values) / math.sqrt(12.0))
+        return white_noise(values) > least
+
+    return any(map(noisy, record.signals.values()))
+
+
+def same_readings(first: Array, second: Array) -> bool:
+    """True if two columns of one table agree in all rows that both have, to half a unit of the coarser digits.
+
+    Parameters
+    ----------
+    first, second : array (n,)
+        nan where nothing was read.
+    """
+    known = ~np.isnan(first + second)
+    size = float(np.nanmax(np.abs(first), initial=0.0))
+    units = [_divisor(np.unique(np.append(values[np.isfinite(values)], 0.0)), size) for values in (first, second)]
+    if np.count_nonzero(known) < LEAST_ROWS or min(units) > size / _STEPS_TO_SHOW:
+        return False
+    return float(np.max(np.abs(first - second)[known])) <= 0.5001 * max(units)
 
 
 def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
-    """Some rows of a trial by which :func:`same_record` knows it: times (s), and up to three signals, SI.
+    """Some rows of a trial by which :func:`same_record` knows it: times (s), and up to four signals, SI.
 
     Of the rows in which all of these are known, evenly spread; times to a thousandth of the step between rows, values
     to 1e-5 of their range. Empty if no signal moves.
@@ -97,7 +261,7 @@ def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
         rows = np.flatnonzero(known[names[0]])
     unit = next((unit for unit in STRIDES if len(rows) >= unit * LEAST_SIGNED_ROWS), 1)
     rows = rows[:: unit * max(1, len(rows) // (unit * LEAST_SIGNED_ROWS))]
-    time = _rounded(trial.time_s[rows], 1e-3 * sampling_step(trial))
+    time = _rounded(trial.time_s[rows], 1e-3 * _step(trial.time_s))
     signals = {name: trial.signals[name] for name in names}
     return time, {
         name: _rounded(signal[rows], 1e-5 * float(np.nanmax(signal) - np.nanmin(signal)))
@@ -110,22 +274,152 @@ def _rounded(values: Array, unit: float) -> list[float]:
     return [round(float(value), places) for value in values]
 
 
-def _same_at(first: Trial, second: Trial, names: Sequence[str], shift: float) -> bool:
-    time = second.time_s + shift
-    inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
-    spans = [float(times[-1] - times[0]) for times in (first.time_s, time)]
-    common = first.time_s[inside]
-    if len(common) < LEAST_ROWS or common[-1] - common[0] < COMMON * min(spans):
-        return False
-    alike = False
-    for name in names:
-        signals = first.signals[name], second.signals[name]
-        noise = min(white_noise(values) for values in signals), max(rounding(values) for values in signals)
-        verdict = _alike(signals[0][inside], _at(common, time, signals[1]), *noise)
-        if verdict is False:
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """One signal of two records at common times (m,), the noise of each, and the coarser unit of their digits."""
+
+    first: Array
+    second: Array
+    noises: tuple[float, float]
+    unit: float
+    evidence: bool = True
+
+    @property
+    def spread(self) -> float:
+        return float(np.std(self.first))
+
+    @property
+    def apart(self) -> float:
+        return float(np.sqrt(np.mean((self.first - self.second) ** 2)))
+
+    @property
+    def copied(self) -> bool:
+        tolerance = max(PRINTED * self.spread, NOISE * min(self.noises), _ROUNDED * self.unit / math.sqrt(12))
+        return self.apart <= min(tolerance, _FAR * self.spread)
+
+    def by_noise(self) -> tuple[bool, bool]:
+        """Whether the noise explains the difference, its means over parts included, and whether a run would show."""
+        apart = self.first - self.second
+        means = [float(np.mean(part)) for part in np.array_split(apart - np.mean(apart), _BLOCKS)]
+        noise = math.sqrt(self.noises[0] ** 2 + self.noises[1] ** 2 + self.unit**2 / 12)
+        of_mean = _BY_CHANCE * noise / math.sqrt(len(apart) / _BLOCKS)
+        small = PRINTED * self.spread
+        explained = float(np.std(apart)) <= max(_BY_CHANCE * noise, small)
+        return explained and float(np.std(means)) <= max(of_mean, small), of_mean <= _SHOWS * self.spread
+
+
+def _copied(pairs: Iterable[_Pair]) -> bool:
+    evidence = False
+    for pair in pairs:
+        if not pair.copied:
             return False
-        alike = alike or verdict is True
-    return alike
+        evidence = evidence or pair.evidence
+    return evidence
+
+
+def _recorded_twice(pairs: Iterable[_Pair]) -> bool:
+    shown = False
+    for pair in pairs:
+        if len(pair.first) < _BLOCKS * LEAST_ROWS:
+            return False
+        by_noise, shows = pair.by_noise()
+        if not by_noise:
+            return False
+        shown = shown or (shows and pair.evidence)
+    return shown
+
+
+def _together(
+    first: TimedSignals,
+    time: Array,
+    second: Mapping[str, Array],
+    precision: Callable[[str], tuple[float, float, float]],
+) -> Iterator[_Pair]:
+    """The signals of two records at the rows of the first, in one frame; empty if too few are at the same times."""
+    inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
+    common = first.time_s[inside]
+    spans = [float(times[-1] - times[0]) for times in (first.time_s, time)]
+    if len(common) < LEAST_ROWS or common[-1] - common[0] < COMMON * min(spans):
+        return
+    whole = {name: (first.signals[name], values) for name, values in second.items()}
+    along = ""
+    if all(name in whole for name in _TRACK):
+        whole |= _tracks(whole, inside, common, time)
+        along = _TRACK[0]
+    for name, (a, b) in whole.items():
+        values, others = a[inside], _at(common, time, b)
+        known = ~np.isnan(values + others)
+        if np.count_nonzero(known) < 2:
+            continue
+        values, others = values[known], others[known]
+        if name in _DIRECTIONS:
+            turned = np.exp(1j * (values - others))
+            others = values - np.angle(turned * np.conj(np.mean(turned)))
+        elif name in _TRACK:
+            others = others + np.mean(values) - np.mean(others)
+        if not np.std(values) > 0:
+            continue
+        apart, spread = float(np.sqrt(np.mean((values - others) ** 2))), float(np.std(values))
+        *noises, unit = np.max([precision(each) for each in (_TRACK if along and name in _TRACK else (name,))], axis=0)
+        if _FAR * spread < apart <= _ROUNDED * unit / math.sqrt(12):  # too coarse to say anything
+            continue
+        yield _Pair(values, others, (float(noises[0]), float(noises[1])), float(unit), name != along)
+
+
+def _tracks(
+    whole: Mapping[str, tuple[Array, Array]], inside: NDArray[np.bool_], common: Array, time: Array
+) -> dict[str, tuple[Array, Array]]:
+    """Both tracks along and across the main direction of the first, the second turned onto it."""
+    (x, other_x), (y, other_y) = (whole[name] for name in _TRACK)
+    first, second = x + 1j * y, other_x + 1j * other_y
+    there = first[inside], _at(common, time, other_x) + 1j * _at(common, time, other_y)
+    known = ~np.isnan(there[0] + there[1])
+    if not known.any():
+        return {}
+    a, b = (track[known] - np.mean(track[known]) for track in there)
+    axis = np.exp(-0.5j * np.angle(np.sum(a**2)))
+    onto = np.exp(1j * np.angle(np.sum(a * np.conj(b))))
+    tracks = first * axis, second * onto * axis
+    return {"x_m": (tracks[0].real, tracks[1].real), "y_m": (tracks[0].imag, tracks[1].imag)}
+
+
+def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[float]:
+    """Times (s) to add to those of the second record: none, by the first rows, and as the timing signal fits best."""
+    time = other.time_s
+    yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))
+    name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)
+    if name is None:
+        return
+    step = min(_step(first.time_s), _step(time))
+    step = max(step, max(float(times[-1] - times[0]) for times in (first.time_s, time)) / _FINEST)
+    grids = [np.arange(times[0], times[-1] + step / 2, step) for times in (first.time_s, time)]
+    a = _rate(name, grids[0], first.time_s, first.signals[name])
+    b = _rate(name, grids[1], time, other.signals[name] * (sign if name in _MIRRORED else 1.0))
+    if any(len(each) < LEAST_ROWS or not np.ptp(each) > 0 for each in (a, b)):  # short, unknown or without a change
+        return
+    a, b = a - np.mean(a), b - np.mean(a)
+    energy = correlate(a**2, np.ones_like(b), method="fft") + correlate(np.ones_like(a), b**2, method="fft")
+    rows = correlate(np.ones_like(a), np.ones_like(b), method="fft")
+    enough = rows >= max(COMMON * min(len(a), len(b)), LEAST_ROWS) - 0.5
+    match = np.where(enough, 2 * correlate(a, b, method="fft") / np.maximum(energy, 1e-12 * np.max(energy)), -1.0)
+    best = int(np.argmax(match))
+    if match[best] < _IN_STEP:
+        return
+    shift = float(grids[0][0] - grids[1][0]) + (best - (len(b) - 1)) * step
+
+    def apart(near: float) -> float:
+        inside = (grids[0] >= grids[1][0] + near) & (grids[0] <= grids[1][-1] + near)
+        return float(np.mean((a[inside] - np.interp(grids[0][inside], grids[1] + near, b)) ** 2))
+
+    near = minimize_scalar(apart, bounds=(shift - step, shift + step), method="bounded", options={"xatol": 1e-4 * step})
+    yield shift
+    yield float(near.x)
+
+
+def _rate(name: str, grid: Array, time: Array, values: Array) -> Array:
+    """The timing signal (n,) on an even grid, the rate of change of one that has no zero of its own."""
+    even = _at(grid, time, np.unwrap(values) if name in _DIRECTIONS and not np.isnan(values).any() else values)
+    return even if name in ("r_radps", "N_Nm", "Y_N", "current_A") or len(even) < LEAST_ROWS else np.gradient(even)
 
 
 def _at(common: Array, time: Array, values: Array) -> Array:
@@ -135,16 +429,29 @@ def _at(common: Array, time: Array, values: Array) -> Array:
     return np.interp(common, time[known], values[known])
 
 
-def _alike(first: Array, second: Array, noise: float, unit: float) -> bool | None:
-    """None where neither moves; `noise` is the smaller one of the two, `unit` the coarser one of their digits."""
-    known = ~np.isnan(first + second)
-    if np.count_nonzero(known) < 2:
-        return None
-    first, second = first[known], second[known]
-    spread = float(np.std(first))
-    if not spread > 0:
-        return None
-    apart = float(np.sqrt(np.mean((first - second) ** 2)))
-    if apart > _FAR * spread:
-        return False
-    return apart <= max(PRINTED * spread, NOISE * noise, _ROUNDED * unit / math.sqrt(12))
+def _unit(values: Array) -> float:
+    """Coarsest unit to which a signal (n,) is rounded: by its steps, or as the greatest common divisor of its larger
+    values, which have the fewest decimals."""
+    known = values[np.isfinite(values)]
+    size = float(np.max(np.abs(known), initial=0.0))
+    different = np.unique(known[np.abs(known) >= size / 2])
+    if len(different) < _LEAST_VALUES:
+        return rounding(values)
+    return max(rounding(values), _divisor(different, size))
+
+
+def _divisor(different: Array, size: float) -> float:
+    """Greatest common divisor of the differences of rising values, by Euclid; it ends at a millionth of their size."""
+    unit, least = 0.0, 1e-6 * size
+    for step in np.diff(different).tolist():
+        rest = step
+        while rest > least:
+            unit, rest = rest, unit % rest
+            rest = 0.0 if unit - rest < least else rest
+        if 0 < unit < 10 * least:
+            break
+    return unit
+
+
+def _step(time: Array) -> float:
+    return float(np.median(np.diff(time)))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, CsvTable, read_table
+from tank2sim.records.same_record import same_readings
 
 _SPEED = re.compile(r"speed_([1-9]\d*)_mps")
 FEWEST_TIMES = 5
@@ -99,7 +100,8 @@ def read_tows(path: Path | str) -> Tows:
     ------
     InputError
         The table is at fault (:func:`tank2sim.records.csv_table.read_table`), a column is not a speed in m/s, a tow has
-        no reading, there are fewer than five times with one, or the time does not rise from 0 or later.
+        no reading or those of another, there are fewer than five times with one, or the time does not rise from 0 or
+        later.
     """
     table = read_table(path)
     table.refuse_misspelt_keys(("force_N", "mass_kg", *BODY_KEYS))
@@ -129,6 +131,12 @@ def read_tows(path: Path | str) -> Tows:
             row = int(np.nanargmax(np.abs(readings)))
             problem = f"{readings[row]:.6g} m/s is faster than any body is towed"
             raise InputError(table.path, table.place(row, name), problem, f"give it in m/s, up to {FASTEST_MPS:g}")
+    moving = speed[time > 0]
+    for number, name in enumerate(names):
+        for before in range(number):
+            if same_readings(moving[:, before], moving[:, number]):
+                problem, remedy = f"has the readings of {names[before]}", "delete it: a copy is not a second tow"
+                raise InputError(table.path, f"column {name}", problem, remedy)
     read = ~np.isnan(speed).all(axis=1)
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"

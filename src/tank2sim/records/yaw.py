@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -12,7 +13,9 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.errors import InputError
+from tank2sim.marks import CHECK
 from tank2sim.records.csv_table import CsvTable, read_table
+from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 from tank2sim.units import to_si
 
 Medium = Literal["air", "water"]
@@ -113,6 +116,30 @@ def read_yaw_record(path: Path | str) -> YawRecord:
         constants=constants,
         notes=tuple(notes),
     )
+
+
+def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[str, ...]:
+    """Refuse a record that is another one again, also turned, cut, thinned or rounded; notices of mirror images.
+
+    Raises
+    ------
+    InputError
+        Names the second file, and which one it is again.
+    """
+    seen = [
+        Recording(record.time_s, {"angle_rad": record.angle_rad, "current_A": record.current_A}) for record in records
+    ]
+    notices = []
+    for number, record in enumerate(records):
+        for before in range(number):
+            alike, name = likeness(seen[number], seen[before]), records[before].path.name
+            if alike is Likeness.COPY:
+                remedy = "give each record once: a copy is not a second run"
+                raise InputError(record.path, "", f"is the record of {name} again", remedy)
+            if alike is Likeness.MIRROR and has_noise(seen[number]):
+                said = f"is the mirror image of {name}, noise included, not a second run"
+                notices.append(f"{CHECK} {record.path.name} {said}.")
+    return tuple(notices)
 
 
 def yaw_record_text(record: YawRecord) -> str:

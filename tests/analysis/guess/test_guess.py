@@ -17,6 +17,7 @@ from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.reading import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.marks import CHECK, marked
 from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate
@@ -154,3 +155,22 @@ def test_impossible_and_contradictory_figures_are_named(values, named) -> None:
 def test_dimensions_of_no_ship_are_refused(changed) -> None:
     with pytest.raises(InputError):
         ShipDimensions(**{**vars(TANKER), **changed})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("key", "value", "error", "word"),
+    [
+        ("tactical_diameter@turn35", 320.0, 16.0, "320 m"),  # a diameter of one length
+        ("overshoot_1@zigzag10", 0.16, 1.0, "rad"),
+    ],
+)
+def test_a_figure_outside_nine_of_ten_ships_is_marked_with_its_likely_unit(key, value, error, word) -> None:
+    marks = marked(guess_ship(TANKER, [figure(key, value, error)], "tanker", 150, 1).notices)
+    assert marks and marks[0].startswith(CHECK) and key in marks[0] and word in marks[0]
+
+
+@pytest.mark.slow
+def test_usual_figures_are_not_marked() -> None:
+    given = parse_figures("turn35", "advance=970 tactical=980") + parse_figures("zigzag10", "first=9.4 second=18")
+    assert not marked(guess_ship(TANKER, given, "tanker", 150, 1).notices)

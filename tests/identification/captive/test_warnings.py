@@ -7,7 +7,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.cards.plausibility import levers, unusual_signs, yaw_force
-from tank2sim.identification.captive.plausibility import force_convention
+from tank2sim.identification.captive.plausibility import force_convention, foreign_units
 from tank2sim.identification.captive.tank_conditions import (
     CarriedBody,
     FroudeScaling,
@@ -25,6 +25,7 @@ from tank2sim.identification.captive.tank_conditions import (
     similarity,
     standing_wave_frequency,
     tank_resonance,
+    tank_size,
     trim,
 )
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
@@ -207,3 +208,53 @@ def test_a_whole_campaign_is_judged(tmp_path):
     reversed_forces = dict(written.derivatives) | {"Yvdot": 0.02}
     (once,) = cautions_of_result(reversed_forces, {}, campaign)
     assert once.kind == "force convention" and once.message.startswith("Yvdot is 0.02")
+
+
+MARINER = {"Yv": -0.0116, "Nv": -0.00264, "Nr": -0.00166, "Yd": -0.00278, "Nd": 0.00139, "Yvdot": -0.00748} | {
+    "Nrdot": -0.000438}  # fmt: skip
+MARINER_BODY = CarriedBody(
+    length_m=160.93, mass_kg=0.00798 * 500 * 160.93**3, density_kgpm3=1000.0, beam_m=23.17, draught_m=7.468, x_G_m=-3.7
+)
+
+
+def misread(force, moment, removed):
+    """The Mariner's derivatives from readings that are so many times too small."""
+    inertias = {"Yvdot": 0.00798, "Nrdot": 0.000392, "Nr": 0.00798 * -3.7 / 160.93}
+    found = {}
+    for name, value in MARINER.items():
+        own = 0.0 if removed else inertias.get(name, 0.0)
+        found[name] = own - (own - value) / (moment if name[0] == "N" else force)
+    return found
+
+
+@pytest.mark.parametrize("removed", [False, True])
+@pytest.mark.parametrize(
+    ("force", "moment", "words"),
+    [
+        (9.80665, 9.80665, ["in kgf,", "in kgf m,"]),
+        (4.44822, 1.35582, ["in lbf,", "in lbf ft,"]),
+        (4.44822, 0.112985, ["in lbf,", "in lbf in,"]),
+        (1000.0, 1000.0, ["in kN,", "in kN m,"]),
+        (9.80665, 1.0, ["in kgf,"]),
+        (1.0, 9.80665, ["in kgf m,"]),
+        (9.80665, 0.0980665, ["in kgf,", "in kgf cm,"]),
+    ],
+)
+def test_a_foreign_unit_of_the_gauges_is_named(force, moment, words, removed):
+    text = said(foreign_units(misread(force, moment, removed), 0.00798, 0.000392, removed, MARINER_BODY))
+    assert all(word in text for word in words) and text.count("1 ") == len(words)
+
+
+def test_a_wrong_sign_or_convention_is_no_foreign_unit():
+    def found(derivatives, removed=False):
+        return list(foreign_units(derivatives, 0.00798, 0.000392, removed, MARINER_BODY))
+
+    assert not found(MARINER) and not found(MARINER, removed=True)
+    assert not found({**MARINER, "Yvdot": 0.00798 - 0.00748, "Nrdot": 0.000392 - 0.000438})  # inertia removed already
+    assert not found({name: -value for name, value in MARINER.items()})
+    assert not found({**MARINER, "Yvdot": 2 * 0.00798 + 0.00748, "Nrdot": 2 * 0.000392 + 0.000438, "Yv": 0.0116})
+
+
+def test_a_tank_larger_than_any_is_named():
+    assert "depth_m" in said(tank_size(Tank(12.0, 550.0))) and "breadth_m" in said(tank_size(Tank(1200.0, 5.5)))
+    assert not list(tank_size(Tank(70.0, 30.0))) and not list(tank_size(Tank()))

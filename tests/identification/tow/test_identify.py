@@ -14,6 +14,7 @@ from tank2sim.dynamics.surge import SurgeCoefficients
 from tank2sim.errors import InputError
 from tank2sim.identification.tow.identify import identify_tow, parse_terms
 from tank2sim.identification.tow.output_error import simulated_speeds
+from tank2sim.marks import CHECK, marked
 from tank2sim.records.tows import Tows, read_tows
 
 # what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
@@ -111,9 +112,28 @@ def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
     assert any("a speed polynomial of degree 2 does not follow the tows" in warning for warning in warnings)
 
 
-def test_a_body_lighter_than_said_has_negative_added_mass(table_1):
-    warnings = identify_tow(table_1, mass_kg=4000.0, terms=("B3",)).warnings
-    assert any("the added mass is negative" in warning for warning in warnings)
+@pytest.mark.parametrize(
+    ("force", "mass", "unit", "named"),
+    [
+        (11.63, 4000.0, 1.0, ""),
+        (11.63 / 9.80665, 2243.0, 1.0, "kgf"),
+        (11.63 / 4.44822, 2243.0, 1.0, "lbf"),
+        (11.63, 2.243, 1.0, "in t "),
+        (11.63, 2243.0 / 0.45359237, 1.0, "lb "),
+        (11.63, 2243.0, 100.0, "cm/s"),
+    ],
+)
+def test_an_added_mass_that_no_body_has_is_marked_with_the_likely_unit(table_1, force, mass, unit, named):
+    tows = replace(table_1, speed_mps=unit * table_1.speed_mps)
+    found = marked(identify_tow(tows, force, mass, terms=("B3",)).warnings)
+    assert found and all(
+        message.startswith(CHECK) and "added mass" in message and named in message for message in found
+    )
+
+
+def test_the_added_mass_of_the_paper_is_not_marked(table_1):
+    for terms in (("B3",), ("B3", "B2", "B1")):
+        assert not marked(identify_tow(table_1, terms=terms).warnings)
 
 
 def test_what_is_given_comes_before_the_file_and_is_reported(table_1):

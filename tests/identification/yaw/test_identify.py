@@ -21,6 +21,7 @@ from tank2sim.identification.yaw.identify import (
     torque_constant,
 )
 from tank2sim.identification.yaw.intervals import intervals, known_work
+from tank2sim.marks import marked
 from tank2sim.records.yaw import read_yaw_record, yaw_record_text
 from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig, yaw_record
 from tank2sim.simulation.yaw_rig_control import TunedController
@@ -348,6 +349,24 @@ def test_units_and_signs_that_cannot_be_are_refused(folder, columns):
         identify_yaw([read_yaw_record(made)])
 
 
+def test_an_added_inertia_that_no_body_has_is_refused_or_marked(folder, columns, result):
+    def found(inertia, **changes):
+        made = written(folder / "inertia.csv", TRUTH, columns, **{"inertia_kgm2": inertia, **changes})
+        return identify_yaw([read_yaw_record(made)])
+
+    for inertia in (0.06, 204.0):
+        with pytest.raises(InputError, match=r"inertia\.csv.*added inertia"):
+            found(inertia)
+    with pytest.raises(InputError, match="added inertia"):
+        found(0.0204, torque_constant_NmpA=0.0051)
+    for unit in ({"inertia": 0.0204e-3}, {"inertia": 0.0204, "torque_constant_NmpA": 51.0}):
+        (mark,) = marked(found(**unit).notes)
+        assert "added inertia" in mark and "J_zz" in mark
+    (mark,) = marked(found(0.0500, inertia_error_kgm2=9e-4).notes)
+    assert "added inertia" in mark and "zero" in mark
+    assert not marked(found(0.0204, inertia_error_kgm2=2e-4).notes)
+
+
 def test_a_wrapped_angle_is_put_together_and_reported(folder, columns, result):
     wrapped = (columns["psi"] + 3.0) % (2 * np.pi)
     read = read_yaw_record(written(folder / "wrapped.csv", TRUTH, {**columns, "psi": wrapped}))
@@ -387,3 +406,29 @@ def test_a_current_of_nearly_the_largest_of_the_motor_is_saturation_and_one_belo
         except InputError as error:
             sides.append("reaches the motor's" in str(error))
     assert sides == [True, False]
+
+
+@pytest.mark.slow
+def test_a_copy_of_a_record_is_refused_a_mirror_image_marked_and_a_repeat_taken(folder, columns):
+    pulse, none = 2 * np.pi / 3000, {"inertia_kgm2": 0.0204}
+
+    def noisy(seed):
+        noise = 0.002 * np.random.default_rng(seed).standard_normal(len(columns["t"]))
+        return {**columns, "psi": np.round(columns["psi"] / pulse) * pulse, "I": columns["I"] + noise}
+
+    def read(name, made, truth=TRUTH):
+        return read_yaw_record(written(folder / f"{name}.csv", truth, made, **none))
+
+    first = noisy(1)
+    copies = {
+        "thinned": {name: values[::2] for name, values in first.items()},
+        "turned": {**first, "psi": first["psi"] + 1.0},
+        "rounded": {**first, "I": np.round(first["I"], 3)},
+    }
+    for name, copy in copies.items():
+        with pytest.raises(InputError, match=rf"{name}\.csv.*first\.csv"):
+            identify_yaw([read("first", first), read(name, copy)])
+    assert not marked(identify_yaw([read("first", first), read("repeat", noisy(2))]).notes)
+    image = read("image", mirrored(first), replace(TRUTH, top=-TRUTH.top))
+    (mark,) = marked(identify_yaw([read("first", first), image]).notes)
+    assert "image.csv" in mark and "mirror" in mark

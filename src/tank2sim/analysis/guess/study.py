@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import InputError
+from tank2sim.marks import CHECK
 from tank2sim.simulation.bands import QUANTILES
 
 TRIAL_ERROR, OVERSHOOT_ERROR_DEG = 0.05, 1.0
@@ -26,6 +27,12 @@ Project choice: what repeated sea trials differ by."""
 
 KEPT_SAMPLES = 500
 """Members that the covariance next to the card keeps as samples. Project choice: a file of half a megabyte."""
+
+_OTHER_UNITS = {
+    "m": {"yards": 0.9144, "feet": 0.3048, "cables": 185.2, "nautical miles": 1852.0},
+    "deg": {"rad": math.degrees(1.0)},
+}
+"""Other units of figures, in that of the guess."""
 
 SETTLED = 0.7
 """Ratio of the standard errors of a number with and without the figures below which they settle it. Project choice:
@@ -59,7 +66,8 @@ class Guess:
     def notices(self) -> tuple[str, ...]:
         """Limits of the guess."""
         lost = self.members - len(self.found.prior)
-        messages = [
+        messages = [*self._outside()]
+        messages += [
             "a guess: the model (third order, cross-flow drag, rudder in the slipstream), deep and calm water, and "
             "figures of one loading are taken for granted",
             "rudder, surge and third-order terms have no published regression here: their prior is about what three "
@@ -74,6 +82,25 @@ class Guess:
                 f"{OVERSHOOT_ERROR_DEG:g} deg of overshoots"
             )
         return tuple(messages)
+
+    def _outside(self) -> Iterator[str]:
+        """Figures outside what nine of ten ships of these dimensions show, or the guess, by more than their errors."""
+        for figure in self.given:
+            before, after = (_quantiles(figures[figure.key]) for figures in (self.found.before, self.found.after))
+            error = figure.standard_error
+            if all(each["p5"] - error <= figure.value <= each["p95"] + error for each in (before, after)):
+                continue
+            unit = figure_unit(figure.key)
+            units = [
+                f"if that is in {name}: {figure.value * factor:.4g} {unit}"
+                for name, factor in _OTHER_UNITS[unit].items()
+                if before["p5"] <= figure.value * factor <= before["p95"]
+            ]
+            yield (
+                f"{CHECK} {figure.key} is {figure.value:g} {unit}, and nine of ten ships of these dimensions and speed "
+                f"have {before['p5']:.4g} to {before['p95']:.4g} (the guess {after['p5']:.4g} to {after['p95']:.4g})"
+                f"{'; ' + ', '.join(units) if units else '; check it, the dimensions and the speed'}."
+            )
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""

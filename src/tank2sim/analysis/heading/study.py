@@ -35,6 +35,7 @@ from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.marks import CHECK
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -54,6 +55,10 @@ LARGEST_CHANGE_DEG = 170.0
 
 _WAVES_SHOWN = 40
 """Interval of the histories of course keeping. Project choice: it shows single waves."""
+
+HELD_DEG = 10.0
+"""Heading error, mean or root mean square, from which a course is not held. Project choice: in seas that a ship can
+stand an autopilot keeps within a few degrees."""
 
 _BUSY_PERCENT = 10.0
 """Share of the time at full rate from which a notice reports that waves overload the gear.
@@ -263,6 +268,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
         tracks=tracks,
         waypoints=settings.waypoints,
         notices=(
+            *_not_held(kept, weather, runs["keeping"]),
             *outside.notices,
             *notices,
             *_begun_at(settings.speed_mps),
@@ -270,6 +276,25 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             *_of_the_gear(ship, design, kept, weather),
         ),
     )
+
+
+def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[str]:
+    """Marks of a weather in which the ship leaves its course, or is carried away."""
+    found = []
+    if max(abs(kept.heading_error_mean_deg), kept.heading_error_rms_deg) > HELD_DEG:
+        rudder = math.degrees(float(np.mean(run["rudder.angle"][len(run.t) // 2 :])))
+        found.append(
+            f"{CHECK} the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
+            f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg "
+            "of rudder in the mean; the figures of course keeping mean nothing."
+        )
+    speed = float(np.mean(run["motion.u"][len(run.t) // 2 :]))
+    if weather.current_mps >= abs(speed):
+        found.append(
+            f"{CHECK} the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
+            "the water): it may hold its heading, but cannot hold a course over the ground."
+        )
+    return found
 
 
 def _tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:

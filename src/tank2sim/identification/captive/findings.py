@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tank2sim.cards.plausibility import Caution
+from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.regression import solve
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
+from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
+from tank2sim.marks import CHECK
+from tank2sim.records.campaigns import FORCE_COLUMNS
 
 _SHEET = 0.05
+_DRIFT = 0.02
+"""Drift of a zero over half a run, as a share of the mean force of the runs, from which derivatives hold it. Project
+choice: the accuracy that calibrations of gauges have."""
 _UNEXPLAINED = 2.0
 _ASYMMETRIC = 0.01
 _REPEATED_ENOUGH = 3
+_DRIFTS_ENOUGH, _SURE = 4, 4.0
+"""Runs, and standard errors of their mean drift, from which a common drift is not chance (project choice)."""
 
 
 def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
@@ -43,13 +53,37 @@ def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
 
 
 def implausible(reduction: Reduction) -> tuple[str, ...]:
-    """Findings that question all derivatives: systematic errors of the records, and values that no ship has."""
+    """Findings that question all derivatives, marked: systematic errors of the records, values that no ship has."""
     values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
     errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
-    return (
-        *(error.message for error in reduction.systematic),
-        *(caution.message for caution in cautions_of_result(values, errors, reduction.campaign)),
-    )
+    cautions = cautions_of_result(values, errors, reduction.campaign)
+    found = [error.message for error in reduction.systematic] + [caution.message for caution in cautions]
+    found += [*drifting_zeros(reduction.runs)]
+    campaign, resonant = reduction.campaign, [run for caution in _resonances(reduction) for run in caution.runs]
+    if reduction.systematic and resonant:
+        found.append(f"standing waves of the tank would do the same to {_listed(resonant)}: compare without them.")
+    found += [caution.message for caution in tank_size(Tank(campaign.tank.breadth_m, campaign.tank.depth_m))]
+    return tuple(f"{CHECK} {message}" for message in found)
+
+
+def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
+    """Gauges whose zero drifts within the runs: half of it is in each mean, if the zero was taken before the run."""
+    runs = [run for run in runs if "trend" in run.labels]
+    for force in FORCE_COLUMNS if len(runs) >= _DRIFTS_ENOUGH else ():
+        drifts, means = [], []
+        for run in runs:
+            trend = run.basis[:, run.labels.index("trend")] * run.fits[force].coefficients[run.labels.index("trend")]
+            drifts.append(float(trend[-1] - trend[0]))
+            means.append(float(run.fits[force].coefficients[0]))
+        middle, size = float(np.median(drifts)), float(np.sqrt(np.mean(np.square(means))))
+        scatter = float(np.std(drifts)) / math.sqrt(len(drifts))
+        if abs(middle) > max(2 * _DRIFT * size, _SURE * scatter):
+            unit = "N m" if force == "N" else "N"
+            yield (
+                f"the zero of the {force} gauge drifts by {abs(middle):.3g} {unit} within a run (median of {len(runs)}"
+                f"), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before and after each run and "
+                "correct the records; standard errors do not hold it."
+            )
 
 
 def _omitted_runs(reduction: Reduction) -> Iterator[str]:
@@ -86,13 +120,20 @@ def _missing(reduction: Reduction) -> Iterator[str]:
         yield "[model] yaw_inertia_kgm2 is missing: the card has that of a radius of gyration of 0.25 L, an estimate."
 
 
-def _physics(reduction: Reduction) -> Iterator[str]:
-    campaign = reduction.campaign
-    runs = tuple(
+def _oscillating(reduction: Reduction) -> tuple[OscillationMotion, ...]:
+    return tuple(
         OscillationMotion(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
         for row in reduction.oscillations
     )
-    for caution in cautions_of_test(campaign, runs):
+
+
+def _resonances(reduction: Reduction) -> Iterator[Caution]:
+    tank, gravity = reduction.campaign.tank, reduction.campaign.test.gravity_mps2
+    return tank_resonance(_oscillating(reduction), Tank(tank.breadth_m, tank.depth_m), gravity)
+
+
+def _physics(reduction: Reduction) -> Iterator[str]:
+    for caution in cautions_of_test(reduction.campaign, _oscillating(reduction)):
         yield f"{caution.message}{f' Runs: {_listed(caution.runs)}.' if caution.runs else ''}"
 
 

@@ -18,6 +18,10 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import leading
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
 
+_FASTEST_SWAY = 0.95
+"""Largest sideways velocity as a share of the speed: a drift angle of 70 deg."""
+_LONGEST_WAY_M = 10e3
+"""Longest way of a run. Project choice: the longest tanks have 1.3 km, a water channel runs two hours."""
 _FOREIGN_MOTION = 0.1
 """Largest amplitude of a motion foreign to the type of a run, as a share of the expected motion."""
 _DRIFT_TOLERANCE_RAD = math.radians(1.0)
@@ -46,6 +50,18 @@ _PLATEAU = 5.0
 at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at the next, and 4.8 times at a stretch."""
 
 
+def motion_faults(run: CaptiveRun) -> Iterator[InputError]:
+    """A motion that no carriage makes: sideways as fast as ahead, or longer than any tank."""
+    speed = float(np.mean(run.speed_mps))
+    sway, way = float(np.max(np.abs(run.v_mps))), speed * run.duration_s
+    if sway > _FASTEST_SWAY * speed > 0:
+        problem = f"the model moves sideways at {sway:.4g} m/s, and at {speed:.4g} m/s along the tank"
+        yield InputError(run.name, "column v_mps or y_m", problem, "give them in m/s and m")
+    elif way > _LONGEST_WAY_M:
+        problem = f"the model runs {way / 1000:.3g} km in {run.duration_s:.4g} s, farther than any tank is long"
+        yield InputError(run.name, "column t_s or speed_mps", problem, "give the time in s and the speed in m/s")
+
+
 def record_faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
     """Faults of a record before its reduction: the first of each kind."""
     if run.is_average:
@@ -55,6 +71,7 @@ def record_faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
             yield InputError(fault.source, place, fault.problem, remedy)
         return
     yield from _clock(run)
+    yield from (fault for fault in motion_faults(run) if fault.place.startswith("column t_s"))
     yield from _impossible_values(campaign, run)
     yield from _foreign_motion(campaign, run)
     for force in FORCE_COLUMNS:
@@ -98,7 +115,7 @@ def _impossible_values(campaign: Campaign, run: CaptiveRun) -> Iterator[InputErr
         return
     length = campaign.model.length_m
     limits = (
-        ("v_mps", run.v_mps, 0.95 * speed, "m/s, below the speed of the model"),
+        ("v_mps", run.v_mps, _FASTEST_SWAY * speed, "m/s, below the speed of the model"),
         ("r_radps", run.r_radps, 3.0 * speed / length, "rad/s (r_degps for degrees)"),
         ("delta_rad", run.delta_rad, math.radians(80.0), "rad (delta_deg for degrees)"),
         ("psi_rad", run.psi_rad, math.pi, "rad (psi_deg for degrees)"),

@@ -21,7 +21,7 @@ from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun, reduced_run
 from tank2sim.identification.captive.motion import harmonic_basis
 from tank2sim.identification.captive.oscillation import OscillationDerivatives, oscillations
-from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
+from tank2sim.identification.captive.run_faults import motion_faults, record_faults, reduced_faults
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
 
 CYCLE_BINS = 72
@@ -187,8 +187,10 @@ def single_run(run: CaptiveRun, campaign: Campaign | None) -> SingleRun:
     Raises
     ------
     InputError
-        An oscillating run has no whole period or too few readings a period.
+        An oscillating run has no whole period or too few readings a period, or no carriage moves so.
     """
+    for fault in motion_faults(run):
+        raise fault
     reduced = reduced_run(run)
     faults = [*(record_faults(campaign, run) if campaign else ()), *reduced_faults(reduced)]
     coefficients = [*_motion_coefficients(reduced)]

@@ -31,6 +31,9 @@ LARGEST_REDUCED_FREQUENCY = {"sway": 2.0, "yaw": 3.0}
 NEAR_RESONANCE = 0.1
 """A harmonic of the motion this near (relatively) to a standing wave of the tank excites it: project choice."""
 
+WIDEST_TANK_M, DEEPEST_TANK_M = 150.0, 60.0
+"""Larger than any tank. Project choice: twice the widest basins (some 75 m) and the deepest pits (some 30 m)."""
+
 LARGEST_BLOCKAGE = 0.01
 """Midship section over tank section: project choice; blockage corrections of resistance begin to matter there."""
 
@@ -277,6 +280,17 @@ def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2
                     f"the tank ({wave:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
                     near,
                 )
+
+
+def tank_size(tank: Tank) -> Iterator[Caution]:
+    """A tank larger than any."""
+    for what, size, most in (("breadth_m", tank.breadth_m, WIDEST_TANK_M), ("depth_m", tank.depth_m, DEEPEST_TANK_M)):
+        if size is not None and size > most:
+            yield Caution(
+                "tank",
+                f"[tank] {what} is {size:g} m, and no tank has more than {most:g} m (if in cm: {size / 100:g} m):"
+                " what depends on it (resonance, blockage, shallow water) was not found.",
+            )
 
 
 def blockage(beam_m: float | None, draught_m: float | None, tank: Tank) -> Iterator[Caution]:

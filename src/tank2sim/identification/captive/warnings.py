@@ -14,7 +14,7 @@ from tank2sim.cards.plausibility import (
     yaw_damping,
     yaw_force,
 )
-from tank2sim.identification.captive.plausibility import force_convention
+from tank2sim.identification.captive.plausibility import force_convention, foreign_units
 from tank2sim.identification.captive.tank_conditions import (
     LEAST_DEPTH_RATIO,
     CarriedBody,
@@ -78,6 +78,8 @@ def cautions_of_result(
     body = body_of(campaign)
     deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
     draught_ratio = body.draught_m / body.length_m if body.draught_m else None
+    if deep and (foreign := tuple(foreign_units(derivatives, mass, inertia, campaign.inertia_removed, body))):
+        return foreign  # which is the cause of what else is wrong
     # A positive added mass is reported once, with its likely cause.
     other_derivatives = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
@@ -13,7 +14,33 @@ from tank2sim.arrays import Array
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.identification.tow.fit import TowFit
 from tank2sim.identification.tow.output_error import simulated_speeds
+from tank2sim.marks import CHECK
 from tank2sim.records.tows import Tows
+
+ADDED_SHARES = (0.0, 1.0)
+"""Added mass in surge over the mass with the water inside. A sphere has 0.5, slender bodies less (Lamb 1932, art. 92
+and 114); the upper limit, blunt ends near the surface, is a project choice."""
+
+USUAL_SHARES = (-0.05, 0.7)
+"""The same of usual bodies, with the error of an estimate, by which a foreign unit is recognised (project choice)."""
+
+FOREIGN_UNITS = {
+    "the force is in kgf": 9.80665,
+    "the force is in lbf": 4.4482216,
+    "the force is in kN": 1e3,
+    "the force is in gf": 9.80665e-3,
+    "the mass is in t": 1e-3,
+    "the mass is in lb": 1 / 0.45359237,
+    "the mass is in g": 1e3,
+    "the speeds are in cm/s": 1e2,
+    "the speeds are in mm/s": 1e3,
+    "the speeds are in knots": 3600 / 1852,
+    "the speeds are in km/h": 3.6,
+    "the speeds are in ft/s": 1 / 0.3048,
+    "the times are in ms": 1e-3,
+    "the times are in min": 60.0,
+}
+"""Slips, and the factor by which each makes M over m too small."""
 
 _CORRELATED = 0.99
 _TWO_SIDED_95 = 1.96
@@ -102,11 +129,8 @@ def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
 def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
     if fit.values[0] <= 0:
         yield f"{fit.method}: the mass M is negative ({fit.values[0]:.4g} kg), which no body has; do not use this fit."
-    elif fit.added_mass_kg < 0:
-        yield (
-            f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg); check the force and the mass of "
-            "the body with the water in it."
-        )
+    else:
+        yield from _added_mass(fit)
     if not np.isfinite(fit.largest_speed_error_mps):
         yield f"{fit.method}: the speed with these values grows without bound; do not use this fit."
     speeds = np.linspace(0.0, top_speed_mps, 401)[1:]
@@ -120,6 +144,27 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
     minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
     if minus and drags.min() >= 0:
         yield f"{fit.method}: the drag terms have opposite signs ({minus} negative) and largely cancel each other."
+
+
+def _added_mass(fit: TowFit) -> Iterator[str]:
+    """An added mass that is none, or more than the mass, by more than its error."""
+    share = fit.added_mass_kg / fit.mass_kg
+    error = 0.0 if fit.covariance is None else _TWO_SIDED_95 * math.sqrt(max(fit.covariance[0, 0], 0.0)) / fit.mass_kg
+    low, high = ADDED_SHARES
+    if low - error <= share <= high + error:
+        if share < 0:
+            yield f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
+        return
+    units = [
+        f"{name} (then {(1 + share) * factor - 1:.2g})"
+        for name, factor in FOREIGN_UNITS.items()
+        if USUAL_SHARES[0] <= (1 + share) * factor - 1 <= USUAL_SHARES[1]
+    ]
+    likely = f"; it would be that of a body if {' or if '.join(units)}" if units else ""
+    yield (
+        f"{CHECK} {fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
+        f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."
+    )
 
 
 def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[str]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.energy import EnergyFit, YawEstimate
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
+from tank2sim.marks import CHECK
 from tank2sim.records.yaw import YawRecord
 
 _NOT_QUITE_MIRRORED = 0.03
@@ -23,6 +25,9 @@ _NOT_THE_PROGRAMME = 1.5
 """A turn that differs from the programme by this factor is an error of units, not of tracking."""
 _PULSE_RAD = 2 * math.pi / 3000
 """Pulse of the paper's encoder; where (3) holds, the residual is about a quarter of it."""
+_LEAST_ADDED, _MOST_ADDED = 0.02, 10.0
+"""Added inertia over J_zz of bodies on the rig. Project choice: near a round body, and five times the most of ships in
+deep water, for walls, a shallow tank and light models."""
 _APART = 3.0
 _SHARPER = 3.0
 
@@ -115,6 +120,37 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
 
 def _span(ends: tuple[float, float]) -> str:
     return f"{ends[0]:.2f}-{ends[1]:.2f} s"
+
+
+def check_added_inertia(
+    record: YawRecord, inertia_kgm2: float, added: Mapping[str, tuple[float, float | None]]
+) -> list[str]:
+    """Notes, marked, on an added inertia (kg m2, with its error, by method) that is uncertain or that few bodies have;
+    InputError where all methods make it negative by more than its error: no body has that."""
+    if not added:
+        return []
+    value, error = next(iter(added.values()))
+    doubt = 2 * (error or 0.0)
+    ratio = value / inertia_kgm2
+    if all(each + 2 * (other or 0.0) < 0 for each, other in added.values()):
+        total = value + inertia_kgm2
+        problem = (
+            f"the added inertia is {value:.3g} kg m2, and no body has a negative one: J_zz is {inertia_kgm2:.4g} "
+            f"kg m2, body and water together have {total:.4g}"
+        )
+        remedy = "check J_zz, the torque constant, the unit of the current (A), and that the body in air was the same"
+        raise InputError(record.path, "", problem, remedy)
+    if value < doubt:
+        return [
+            f"{CHECK} the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
+            "kg m2; run a faster programme, more humps, or a body that carries more water."
+        ]
+    if not _LEAST_ADDED - doubt / inertia_kgm2 <= ratio <= _MOST_ADDED + doubt / inertia_kgm2:
+        return [
+            f"{CHECK} the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
+            "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+        ]
+    return []
 
 
 def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[str]:

@@ -14,6 +14,7 @@ from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.diagnostics import (
+    check_added_inertia,
     check_current,
     check_explained,
     check_mirror,
@@ -38,7 +39,7 @@ from tank2sim.identification.yaw.plot_data import (
     record_histories,
     residuals_as_json,
 )
-from tank2sim.records.yaw import Medium, YawRecord
+from tank2sim.records.yaw import Medium, YawRecord, refuse_copied_records
 
 YAW_METHODS = (
     "energy_least_squares",
@@ -192,18 +193,21 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     Raises
     ------
     InputError
-        The intervals of a record are not mirror images, the motor saturates in one, the encoder steps too rarely, or
-        the records do not separate the terms.
+        The intervals of a record are not mirror images, the motor saturates in one, the encoder steps too rarely, two
+        records are one, or the records do not separate the terms.
     """
     options = options or YawOptions()
     wet = tuple(record for record in records if record.medium == "water")
     dry = tuple(record for record in records if record.medium == "air")
     if not records:
         raise InputError("tank2sim yaw", "", "no record was given", "give one or more CSV files")
+    alike = refuse_copied_records(records)
     if not wet:
-        return _result(dry, "air", options, None)
+        found = _result(dry, "air", options, None)
+        return replace(found, notes=(*alike, *found.notes))
     air = _result(dry, "air", replace(options, terms=None), None) if dry else None
-    return _result(wet, "water", options, air)
+    found = _result(wet, "water", options, air)
+    return replace(found, notes=(*alike, *found.notes))
 
 
 def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
@@ -279,7 +283,7 @@ def _result(
     if angle:
         estimates["output_error"] = angle.estimate
     body, remarks = _body(records, medium, options, air)
-    return YawIdentification(
+    identified = YawIdentification(
         records=records,
         medium=medium,
         torque_constant_NmpA=constant,
@@ -293,6 +297,9 @@ def _result(
         notes=(*notes, *remarks, *estimate_notes(fit, estimates)),
         air=air,
     )
+    added = {name: value for name in estimates if (value := identified.added_inertia(name)) is not None}
+    first = check_added_inertia(records[0], body.value_kgm2 if body else 0.0, added)
+    return replace(identified, notes=(*first, *identified.notes))
 
 
 Fits = tuple[EnergyFit, EnergyFit]

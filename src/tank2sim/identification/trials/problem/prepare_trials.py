@@ -95,13 +95,13 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     for trial in trials:
         if names.count(trial.name) > 1:
             raise InputError(trial.path, "", "has the name of another trial", "give each file once, under its own name")
-    refuse_copies(trials)
+    alike = refuse_copies(trials)
     by_angle = ["delta_rad" in trial.signals for trial in trials]
     if any(by_angle) and not all(by_angle):
         odd = trials[by_angle.index(False)]
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
         raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
-    notices = [*_of_audit(audited), *dict.fromkeys(notices)]
+    notices = [*alike, *_of_audit(audited), *dict.fromkeys(notices)]
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices))
 
 
