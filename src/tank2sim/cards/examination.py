@@ -124,8 +124,10 @@ def doubts(card: Card) -> tuple[str, ...]:
         facts = list(_of_craft(card))
     else:
         return ()
+    if not facts:
+        return ()
     name = " ".join(card.ship.name.split())
-    return (f"{CHECK} {name}: {'; '.join(facts)}. Correct the card, or know why this ship differs.",) if facts else ()
+    return (f"{CHECK} {name}: {'; '.join(facts)}. Correct the card, or confirm that this ship is so.",)
 
 
 def _refuse_body(card: ManoeuvringCard | CraftCard) -> None:

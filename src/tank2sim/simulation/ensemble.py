@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
+from tank2sim.marks import CHECK
 from tank2sim.simulation.member_streams import member_stream
 
 Histories = NDArray[np.float32]
@@ -39,6 +40,9 @@ DRAWS = 1000
 at its bound every other draw is within, with ten such parameters one in a thousand."""
 
 NOT_WITHIN = f"not one of {DRAWS} draws is within the bounds of all parameters"
+
+TAIL = 0.05
+"""Fraction of the members beyond either end of a 90 % band: with as many lost, the band is of other ships."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +299,10 @@ class Ensemble:
     @property
     def notices(self) -> list[str]:
         """Notices on members that were drawn again, or that are unusable."""
-        messages = [f"{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()]
+        mark = f"{CHECK} " if self.members - self.usable > TAIL * self.members else ""
+        messages = [
+            f"{mark}{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()
+        ]
         return [*self.redrawn.in_words(self.members), *messages]
 
 
