@@ -180,6 +180,26 @@ def _temporary(target: _Target, data: bytes) -> Path:
     return temporary
 
 
+def read_bytes(path: str | Path) -> bytes:
+    """Content of a file or pipe.
+
+    Raises
+    ------
+    InputError
+        It is a device, which may have no end.
+    OSError
+        It cannot be read.
+    """
+    refuse_device(Path(path))
+    return Path(path).read_bytes()
+
+
+def refuse_device(path: Path) -> None:
+    """Raise InputError if a path is a device, which may have no end."""
+    if path.is_char_device() or path.is_block_device():
+        raise InputError(path, "", "is a device and may have no end", "give a file")
+
+
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file; a byte order mark is dropped, and every line ends in a line feed.
 
@@ -194,7 +214,7 @@ def read_text(path: Path) -> str:
 def read_exact_text(path: Path) -> str:
     """Text of a UTF-8 file unchanged, which encodes to the same bytes again. Raises as :func:`read_text`."""
     try:
-        return Path(path).read_bytes().decode("utf-8")
+        return read_bytes(path).decode("utf-8")
     except FileNotFoundError:
         raise InputError(path, "", "the file does not exist", "check the name") from None
     except UnicodeDecodeError as error:
@@ -305,7 +325,25 @@ FMU, SYSTEM, MATLAB, PYTHON, MODEL = (".fmu",), (".ssp",), (".m",), (".py",), ("
 """How the names of files of each kind end. Any other ending, and none, is taken for any kind."""
 
 _TEXTS = {*CARD, *TABLE, *MATLAB, *PYTHON, *MODEL}
-_ENDINGS = {*PAGE, *PICTURE, *JSON, *FMU, *SYSTEM, *_TEXTS, ".zip", ".xlsx", ".jpg", ".jpeg", ".gif"}
+_ENDINGS = {
+    *PAGE,
+    *PICTURE,
+    *JSON,
+    *FMU,
+    *SYSTEM,
+    *_TEXTS,
+    ".zip",
+    ".xlsx",
+    ".jpg",
+    ".jpeg",
+    ".gif",
+    ".tif",
+    ".tiff",
+    ".bmp",
+    ".eps",
+    ".ps",
+}
+_ENDINGS |= {".parquet", ".feather", ".h5", ".hdf5", ".mat", ".xls", ".ods", ".gz", ".docx", ".md"}
 _BEGINNINGS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
     (rb"\x89PNG", (".png",)),
     (rb"%PDF-", (".pdf",)),

@@ -33,13 +33,7 @@ def assumed_words(messages: Iterable[str]) -> str:
 
 
 def marked(messages: Iterable[str]) -> list[str]:
-    """The messages that contain a mark, each once, in their order."""
-    return list(
-        dict.fromkeys(
-            text
-            for text in messages
-            if any(
-                mark in text for mark in (EXTRAPOLATED, ASSUMED, ASSUMED_TANK, CHECK, LINEARISED, FORCED, UNCONFIRMED)
-            )
-        )
-    )
+    """The messages that contain a mark, each once: those with CHECK first, else in their order."""
+    marks = (EXTRAPOLATED, ASSUMED, ASSUMED_TANK, CHECK, LINEARISED, FORCED, UNCONFIRMED)
+    found = dict.fromkeys(text for text in messages if any(mark in text for mark in marks))
+    return sorted(found, key=lambda text: CHECK not in text)

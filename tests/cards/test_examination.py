@@ -30,7 +30,8 @@ IMPOSSIBLE = {
     "inertia ten times too large": ("mariner", "rigid_body.yaw_inertia", 39.2e-4),
     "prime II as prime": ("kvlcc2-mmg", "model.scaling", "prime"),
     "aground": ("mariner", "ship.water_depth_m", 7.0),
-    "craft with its mass in pounds": ("otter", "rigid_body.mass", 1e4),
+    "craft with its mass in pounds": ("otter", "rigid_body.mass", 176.0),
+    "coefficients without scale as dimensional": ("mariner", "model.scaling", "dimensional"),
 }
 
 IMPLAUSIBLE = {
@@ -51,6 +52,19 @@ IMPLAUSIBLE = {
     "half the rudder's area over L d": ("kvlcc2-mmg", {"ship.rudder_area_m2": 320 * 20.8 / 193}, "rudder area"),
     "revolutions per second as rpm": ("kvlcc2-mmg", {"propulsion.nominal_rpm": 1.7}, "advance ratio"),
     "range of the rudder in radians": ("kvlcc2", {"model.valid_rudder_deg": 0.61}, "valid_rudder_deg"),
+    "derivatives of the rudder per degree": (
+        "mariner",
+        {"derivatives.Yd": 278e-5 * RADIANS_PER_DEGREE, "derivatives.Nd": -139e-5 * RADIANS_PER_DEGREE},
+        "N_delta",
+    ),
+    "resistance that falls with speed": ("mariner", {"derivatives.Xu": 184e-5}, "Xu"),
+    "steering rate in deg/min": ("mariner", {"steering_gear.max_rate_degps": 300.0}, "max_rate_degps"),
+    "rudder's height in mm": ("kvlcc2-l7-mmg", {"rudder.height_m": 345.0}, "rudder height"),
+    "slope of the rudder's force per degree": ("kvlcc2-l7-mmg", {"rudder.f_alpha": 0.0479}, "f_alpha"),
+    "thrust that rises with J": ("kvlcc2-l7-mmg", {"propeller.k_1": 0.2753}, "k_1"),
+    "thrust deduction in place of 1 - t": ("kvlcc2-l7-mmg", {"propeller.t_P": 0.78}, "t_P"),
+    "flow straightening of the other sign": ("kvlcc2-l7-mmg", {"rudder.gamma_R_plus": -0.64}, "gamma_R_plus"),
+    "thrust for revolutions per second": ("otter", {"thrusters.0.ahead_Ns2": 2.0}, "thrust over weight"),
     "craft pushed on by drift": ("otter", {"derivatives.Yv": 20.0}, "Yv"),
     "craft with negative added inertia": ("otter", {"derivatives.Nrdot": 2.0}, "Nrdot"),
 }

@@ -26,7 +26,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.steering_card import find_steering_card
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, close_name
 from tank2sim.executors import PROCESSES
 from tank2sim.files import write_together
 from tank2sim.units import to_si
@@ -428,6 +428,11 @@ class Ship:
         model = self.model
         point = straight_course(model, speed_mps)
         kept, given, shown = (None if names is None else list(names) for names in (states, inputs, outputs))
+        for argument, names in (("states", kept), ("inputs", given), ("outputs", shown)):
+            for name in names or ():
+                if name not in model:
+                    known = (*model.state_names, *model.input_names, *(output.name for output in model.outputs))
+                    raise InputError(argument, "", f"{name!r} is not a variable of the model", close_name(name, known))
         settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 

@@ -26,6 +26,9 @@ FULLEST_BLOCK = 1.15
 """Largest volume over L B d. Nothing is fuller than a box; the rest is for a length between perpendiculars that is
 shorter than the waterline. Project choice."""
 
+LEAST_BLOCK = 0.02
+"""Smallest volume over L B d, a tenth of the finest hulls: less is a mass in another unit. Project choice."""
+
 LARGEST_GYRADIUS = 0.5
 """Largest radius of gyration over L: all mass at the ends of the hull."""
 
@@ -49,6 +52,8 @@ USUAL_OF_SHIPS = {
     "propeller diameter over draught": (0.1, 1.2),
     "metacentric height over beam": (-0.1, 0.5),
     "Y_v' over -pi (d/L)^2": (0.5, 6.0),
+    "N_delta'": (1e-4, 0.02),
+    "length (m)": (0.3, 460.0),
 }
 """Ranges of proportions beyond which no displacement vessel with a rudder is known. Merchant ships have L/B 5 to 8,
 B/d 2 to 4, C_B 0.5 to 0.87, an added mass ahead of 0.03 to 0.15 m, a Froude number of 0.1 to 0.35, a radius of
@@ -57,9 +62,30 @@ gyration of 0.22 to 0.28 L, x_G within 0.04 L, a rudder of L d/70 to L d/30 and 
 feet, beam and draught exchanged, a speed or an area of another scale, or one prime system taken for another. Project
 choice."""
 
+USUAL_OF_MMG = {
+    "K_T at rest (k_0)": (0.05, 1.2),
+    "slope of K_T (k_1)": (-1.5, 0.0),
+    "thrust deduction t_P": (-0.1, 0.5),
+    "wake fraction w_P0": (-0.1, 0.7),
+    "slope of the rudder's force (f_alpha)": (1.0, 5.0),
+    "t_R": (-0.1, 0.7),
+    "a_H": (-0.05, 1.0),
+    "eps": (0.4, 2.0),
+    "kappa": (0.0, 1.5),
+    "gamma_R_plus": (0.05, 1.5),
+    "gamma_R_minus": (0.05, 1.5),
+    "rudder height over draught": (0.2, 1.1),
+    "rudder height over its mean chord": (0.5, 4.0),
+}
+"""Ranges of the coefficients of propeller and rudder. Published ones (Yasukawa and Yoshimura 2015 and the papers of
+the method for tankers, container and car carriers): t_P 0.1 to 0.3, w_P0 0.2 to 0.5, f_alpha 2.2 to 3.3 for aspect
+ratios of 1.3 to 2.5, a_H 0.1 to 0.5, eps 0.8 to 1.3, kappa 0.4 to 0.7, gamma_R 0.2 to 0.8. Project choice: twice as
+wide and more."""
+
 USUAL_OF_CRAFT = {
     "length over beam": (0.5, 30.0),
     "Froude number": (0.01, 3.0),
+    "thrust over weight": (0.001, 1.0),
     "radius of gyration over length": (0.1, 0.5),
     "place of the centre of gravity over length": (-0.25, 0.25),
 }
@@ -70,6 +96,12 @@ _DEEP_DRAUGHTS = 4.0
 _LARGEST_PRIME_MASS = 0.1
 """m' = 2 C_B (B/L) (d/L) of ships is 0.003 to 0.04; mass over 1/2 rho L^2 d is 0.2 to 0.3. Project choice."""
 
+
+_SIGNIFICANT = 2.0
+"""Standard errors from which a value counts as certain: an interval of 95 %."""
+
+_LARGE_M, _FASTEST_RADPS = 20.0, math.radians(30.0)
+"""Length (m) from which a rudder that moves faster than this (rad/s) is one in deg/min. Project choice."""
 
 _LEVER_ROOM = 0.15
 """Room (over L) around the levers of measured ships: effects on a card share the force of rudder and drift with the
@@ -133,10 +165,14 @@ def doubts(card: Card) -> tuple[str, ...]:
 def _refuse_body(card: ManoeuvringCard | CraftCard) -> None:
     mass, gyradius_2 = _mass_kg(card), _gyradius_2(card)
     block = _block(card.ship, mass, card.environment.water_density_kgpm3)
-    if block is not None and block > FULLEST_BLOCK:
+    if block is not None and not LEAST_BLOCK < block < FULLEST_BLOCK:
         problem = f"is {mass:.4g} kg, {block:.3g} times the water that a box of length, beam and draught displaces"
         remedy = "check mass, scaling, length_m, beam_m and draught_m (all in m)"
         raise InputError(card.source, "rigid_body.mass", problem, remedy)
+    stated = card.ship.displacement_kg
+    if isinstance(card, CraftCard) and stated is not None and not 0.5 < mass / stated < 2.0:
+        problem = f"is {mass:.4g} kg, and ship.displacement_kg is {stated:.4g}"
+        raise InputError(card.source, "rigid_body.mass", problem, "give both in kg (or the mass in the card's scaling)")
     centre = card.rigid_body.x_G / (card.ship.length_m if isinstance(card, CraftCard) else 1.0)
     if not centre**2 <= gyradius_2 <= LARGEST_GYRADIUS**2:
         problem = (
@@ -157,7 +193,15 @@ def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
         values = " and ".join(f"{name}' = {hull[name]:.3g}" for name in turned)
         yield f"the rudder turns the ship the wrong way ({values}, starboard positive): check model.rudder_sign"
     yield from signs.values()
+    if (surge := hull.get("Xu", 0.0)) > _SIGNIFICANT * errors.get("Xu", 0.0):
+        yield f"Xu is {surge:+.3g}, and it is negative for every known ship: resistance grows with speed"
     yield from _proportions(card, USUAL_OF_SHIPS)
+    if hull.get("Nd", 0.0) > 0:
+        yield from _beyond("N_delta'", hull["Nd"], USUAL_OF_SHIPS, _SIGNIFICANT * errors.get("Nd", 0.0))
+    gear = card.steering_gear
+    if gear and gear.max_rate_radps and ship.length_m > _LARGE_M and gear.max_rate_radps > _FASTEST_RADPS:
+        place, shown = card.in_file("steering_gear.max_rate_radps", gear.max_rate_radps)
+        yield f"{place} is {shown:.3g}, and the gear of a ship makes 2 to 7 deg/s: check its unit"
     deep = not (ship.water_depth_m and ship.draught_m) or ship.water_depth_m >= _DEEP_DRAUGHTS * ship.draught_m
     slender = math.pi * (ship.draught_m / ship.length_m) ** 2 if ship.draught_m else None
     cautions = [*yaw_force(hull, body.mass)]
@@ -167,7 +211,10 @@ def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
         value = hull.get("Yv", 0.0)
         if slender and value < 0:
             yield from _beyond(
-                "Y_v' over -pi (d/L)^2", -value / slender, USUAL_OF_SHIPS, 2 * errors.get("Yv", 0.0) / slender
+                "Y_v' over -pi (d/L)^2",
+                -value / slender,
+                USUAL_OF_SHIPS,
+                _SIGNIFICANT * errors.get("Yv", 0.0) / slender,
             )
     if "Nd" not in signs:
         cautions += levers({name: value for name, value in hull.items() if name not in signs}, errors, _LEVER_ROOM)
@@ -185,11 +232,22 @@ def _of_mmg(card: MmgCard) -> Iterator[str]:
     rudder, propeller, ship = card.rudder, card.propeller, card.ship
     for name, value in (("x_R", rudder.x_R), ("x_H", rudder.x_H), ("x_P", propeller.x_P), ("l_R", rudder.l_R)):
         if value is not None and value > 0:
-            what = "the effective place of the rudder" if name == "l_R" else "this is forward of midships"
-            yield f"{name} is {value:+.3g}, and it is negative for every ship: {what}"
-    yield from _beyond(
-        "rudder area over L d", rudder.number * ship.rudder_area_m2 / (ship.length_m * ship.draught_m), USUAL_OF_SHIPS
-    )
+            yield f"{name} is {value:+.3g}, forward of midships, and it is negative for every known ship"
+    found = {
+        "K_T at rest (k_0)": propeller.k_0,
+        "slope of K_T (k_1)": propeller.k_1,
+        "thrust deduction t_P": propeller.t_P,
+        "wake fraction w_P0": propeller.w_P0,
+        "slope of the rudder's force (f_alpha)": rudder.f_alpha,
+        "rudder height over draught": rudder.height_m / ship.draught_m,
+        "rudder height over its mean chord": rudder.height_m**2 / ship.rudder_area_m2,
+        **{key: getattr(rudder, key) for key in ("t_R", "a_H", "eps", "kappa", "gamma_R_plus", "gamma_R_minus")},
+    }
+    for name, value in found.items():
+        if value is not None:
+            yield from _beyond(name, value, USUAL_OF_MMG, _SIGNIFICANT * card.interaction_errors.get(name, 0.0))
+    area = rudder.number * ship.rudder_area_m2
+    yield from _beyond("rudder area over L d", area / (ship.length_m * ship.draught_m), USUAL_OF_SHIPS)
     if card.propulsion is not None and propeller.k_0 is not None:
         speed = (1 - propeller.w_P0) * card.model.speed_mps
         advance = speed / (card.propulsion.nominal_radps / (2 * math.pi) * ship.propeller_diameter_m)
@@ -205,6 +263,9 @@ def _of_craft(card: CraftCard) -> Iterator[str]:
     known = {name: value for name, value in card.derivatives.items() if name in EXPECTED_SIGNS and value}
     yield from (caution.fact for caution in unusual_signs(known, card.uncertainty) if "Nv" not in caution.fact)
     yield from _proportions(card, USUAL_OF_CRAFT)
+    thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
+    weight = _mass_kg(card) * card.environment.gravity_mps2
+    yield from _beyond("thrust over weight", thrust / weight, USUAL_OF_CRAFT)
     for thruster in card.thrusters:
         for side, sign in (("port", -1.0), ("starboard", 1.0)):
             if side in thruster.name and thruster.y_m * sign < 0:
@@ -216,6 +277,7 @@ def _proportions(card: ManoeuvringCard | CraftCard, usual: dict[str, tuple[float
     of_length = length if isinstance(card, CraftCard) else 1.0
     block = _block(ship, _mass_kg(card), card.environment.water_density_kgpm3)
     found = {
+        "length (m)": length,
         "length over beam": _over(length, ship.beam_m),
         "beam over draught": _over(ship.beam_m, ship.draught_m),
         "block coefficient": block,
@@ -235,7 +297,7 @@ def _proportions(card: ManoeuvringCard | CraftCard, usual: dict[str, tuple[float
 def _beyond(name: str, value: float, usual: dict[str, tuple[float, float]], doubt: float = 0.0) -> Iterator[str]:
     low, high = usual[name]
     if not low - doubt <= value <= high + doubt:
-        yield f"{name} is {value:.3g}, and known ships have {low:.2g} to {high:.2g}"
+        yield f"{name} is {value:.3g}, and known ships have {low:.3g} to {high:.3g}"
 
 
 def _over(value: float | None, by: float | None) -> float | None:

@@ -14,6 +14,7 @@ import fmpy
 from fmpy.model_description import read_model_description
 
 from tank2sim.errors import InputError
+from tank2sim.files import refuse_device
 
 FmuType = Literal["ModelExchange", "CoSimulation"]
 
@@ -81,6 +82,7 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
         The file is missing, no FMU, damaged, too large, of another version of FMI than 2.0 or 3.0, names a file or
         library outside the archive, or has none for this machine.
     """
+    refuse_device(Path(path))
     try:
         with zipfile.ZipFile(path) as archive:
             _require_bounded(path, archive)
@@ -122,6 +124,7 @@ def embedded_card(path: Path) -> str | None:
     InputError
         The file is missing or no FMU.
     """
+    refuse_device(Path(path))
     try:
         with zipfile.ZipFile(path) as archive:
             _require_bounded(Path(path), archive)

@@ -13,7 +13,7 @@ import numpy as np
 
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
-from tank2sim.files import read_text
+from tank2sim.files import read_bytes, read_text
 from tank2sim.records.campaign_form import CampaignFile, SpeltColumn
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.spelt_units import unit_factor
@@ -127,7 +127,7 @@ def _column(file: Path, heading: str, place: int, rows: Iterable[tuple[int, list
 def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
     """Line numbers and cells of the lines that are neither empty nor comments, the first the header; units if any."""
     try:
-        text, _ = decoded_text(file.read_bytes())
+        text, _ = decoded_text(read_bytes(file))
     except OSError:
         text = read_text(file)  # which says what is wrong with it
     all_lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

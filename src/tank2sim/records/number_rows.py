@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.errors import InputError
+from tank2sim.files import read_bytes
 from tank2sim.records.csv_table import LARGEST
 
 NumberRows = Sequence[tuple[int, Sequence[str]]]
@@ -26,7 +27,7 @@ def read_bytes_as_text(path: Path | str) -> str:
         The file is missing or unreadable.
     """
     try:
-        text = Path(path).read_bytes().decode("latin-1")
+        text = read_bytes(path).decode("latin-1")
     except FileNotFoundError:
         raise InputError(path, "", "the file does not exist", "check the name") from None
     except OSError as error:

@@ -12,6 +12,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, close_name
+from tank2sim.files import read_bytes
 from tank2sim.records.binary_tables import RawColumn, binary_columns
 from tank2sim.records.campaign_form import ColumnEntry, FilesSection
 from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
@@ -100,7 +101,7 @@ def _table_of_arrays(path: Path, raw: Sequence[RawColumn]) -> CsvTable:
 
 def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, str]]:
     """Columns by their names in the file, and the units of its row of units."""
-    text = decoded_text(path.read_bytes())[0]
+    text = decoded_text(read_bytes(path))[0]
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
     separator = _SEPARATORS.get(files.separator or "", files.separator or "")

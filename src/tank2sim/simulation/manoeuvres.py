@@ -433,6 +433,8 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
     if len(rudders) > 1:
         raise InputError(source, "header", "has two rudder columns", "give delta_order_deg alone")
     times = columns["t_s"]
+    if not len(times):
+        raise InputError(source, "column t_s", "has no rows", "give one row for each order, the first at 0 s")
     if times[0] != 0 or np.any(np.diff(times) <= 0):
         raise InputError(source, "column t_s", "does not rise from 0", "begin at 0 and give each time once")
     if times[-1] > LONGEST_RUN_S:

@@ -8,6 +8,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.identification.trials.assessment.other_ship import far_from_card, other_ship
+from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.structures import STRUCTURES
@@ -46,9 +47,15 @@ def test_wide_errors_of_a_card_do_not_widen_the_test() -> None:
 def test_an_estimate_whose_coefficients_are_several_times_their_size_away_is_no_result() -> None:
     known = problem([trial(zigzag(20), name="own")])
     known = replace(known, prior_error=0.05 * np.abs(known.prior_mean))
-    assert far_from_card(known, {"Y": 10.0, "N": 10.0}) == ()  # half their size
-    (far,) = far_from_card(known, {"Y": 10.0, "N": 80.0})
+    found = equation_error(known)
+    assert far_from_card(known, replace(found, prior_scale={"Y": 10.0, "N": 10.0})) == ()  # half their size
+    (far,) = far_from_card(known, replace(found, prior_scale={"Y": 10.0, "N": 80.0}))
     assert "yaw" in far and "sway" not in far
+    place = known.free.index("derivatives.Nd")
+    values = found.values.copy()
+    values[place] *= 0.2
+    (far,) = far_from_card(known, replace(found, values=values, prior_scale={}))
+    assert far.startswith("Nd is 0.2")
 
 
 @pytest.mark.parametrize("off", [0.0, 0.3])

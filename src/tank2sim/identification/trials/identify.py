@@ -307,7 +307,7 @@ def _identified(
     if evidence and not options.force:
         raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
     fit = _fitted(card, structure, trials, options, progress, drifts=drifts)
-    evidence += far_from_card(fit.fitted.problem, fit.fitted.estimate.prior_scale)
+    evidence += far_from_card(fit.fitted.problem, fit.fitted.estimate)
     if evidence and not options.force:
         raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
     started, fitted, current = fit.started, fit.fitted, fit.current

@@ -8,7 +8,7 @@ equations, and errors that the card states do not widen the test.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.posterior import BLOCK
 from tank2sim.identification.trials.methods.weak_form import WeakForm
-from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
@@ -33,6 +33,11 @@ a card of the KVLCC2. Project choice."""
 FACTOR_ALONE = 2.5
 """The same by one trial alone, which a gust can distort. Project choice."""
 
+FACTOR_UNCLEAR = 4.0
+"""The same next to the card's own derivative, where gusts or another ship's drift hide the rudder's part of the card's
+accelerations: 0.3 to 3.2 on the KVLCC2 and the Esso Osaka, 0.16 where a tanker meets the Mariner's card. Project
+choice."""
+
 ERRORS = 2.0
 """Standard errors either way: an interval of 95 %."""
 
@@ -40,6 +45,8 @@ SEVERAL_TIMES = 2.0
 """Difference of coefficients over their size, median of an equation, from which an estimate is of another ship: the
 KVLCC2's from a Mariner's trials differ 11 times, cards by regression formulas from measured ones by half (project
 choice)."""
+
+RUDDER = "derivatives.Nd"
 
 _LEAST_RUDDER = np.deg2rad(1.0)
 """Standard deviation of the rudder below which a run does not show its moment (project choice)."""
@@ -73,9 +80,14 @@ def other_ship(problem: Problem) -> tuple[str, ...]:
         if run.inputs[:, rudder].std() > _LEAST_RUDDER:
             trials.setdefault(run.name.partition(" at ")[0], []).append(run)
     found = {name: effect for name, runs in trials.items() if (effect := _effect(problem, runs)) is not None}
-    if whole := _beyond("all trials together", list(found.values()), FACTOR) if found else "":
+    clear = {name: effect for name, effect in found.items() if effect.determined}
+    if whole := _beyond("all trials together", list(clear.values()), FACTOR) if clear else "":
         return (whole,)
-    return tuple(text for name, effect in found.items() if (text := _beyond(name, [effect], FACTOR_ALONE)))
+    alone = [_beyond(name, [effect], FACTOR_ALONE) for name, effect in clear.items()]
+    alone += [
+        _beyond(name, [effect.of_card_at_rest], FACTOR_UNCLEAR) for name, effect in found.items() if name not in clear
+    ]
+    return tuple(filter(None, alone))
 
 
 def evidence_of_other_ship(card: ManoeuvringCard, trials: Measured) -> tuple[str, ...]:
@@ -93,25 +105,30 @@ def not_of_ship(card: ManoeuvringCard, trials: Measured, evidence: Sequence[str]
     return InputError(names, "", f"not trials of the ship of {card.source}: {reasons}", remedy)
 
 
-def far_from_card(problem: Problem, scale: Mapping[str, float]) -> tuple[str, ...]:
-    """Evidence in an estimate: coefficients of sway and yaw that left the card's by several times their size.
+def far_from_card(fitted: Problem, estimate: Estimate) -> tuple[str, ...]:
+    """Evidence in an estimate: coefficients of sway or yaw, or the rudder's moment, that are another ship's.
 
     Parameters
     ----------
-    problem : Problem
-        Fitted, with the standard errors of the card.
-    scale : mapping
-        Equation (``Y``, ``N``) to the factor on these errors that the trials demand (:attr:`Estimate.prior_scale`).
+    fitted : Problem
+        With the standard errors of the card.
+    estimate : Estimate
+        Its ``prior_scale`` has the factors on these errors that the trials demand, by equation (``Y``, ``N``).
     """
     far = []
     for letter, what in (("Y", "sway"), ("N", "yaw")):
         shares = [
             error / abs(mean)
-            for group, mean, error in zip(problem.groups, problem.prior_mean, problem.prior_error, strict=True)
+            for group, mean, error in zip(fitted.groups, fitted.prior_mean, fitted.prior_error, strict=True)
             if group == letter
         ]
-        if shares and (times := scale.get(letter, 1.0) * float(np.median(shares))) > SEVERAL_TIMES:
+        times = estimate.prior_scale.get(letter, 1.0) * float(np.median(shares)) if shares else 0.0
+        if times > SEVERAL_TIMES:
             far.append(f"coefficients of {what} differ from the card's by {times:.2g} times their size")
+    if RUDDER in fitted.free and (mean := fitted.prior_mean[place := fitted.free.index(RUDDER)]):
+        ratio, error = estimate.values[place] / mean, abs(estimate.standard_errors[place] / mean)
+        if ratio - ERRORS * error > FACTOR_ALONE or ratio + ERRORS * error < 1 / FACTOR_ALONE:
+            far.append(f"Nd is {ratio:.2g} ± {ERRORS * error:.2g} times the card's")
     return tuple(far)
 
 
@@ -159,6 +176,11 @@ class RudderEffect:
         """True if yaw rate and rudder explain the card's own accelerations: gusts and noise of the drift do not."""
         return bool(np.sqrt(self.covariance[1, 1]) < _UNEXPLAINED * abs(self.modelled))
 
+    @property
+    def of_card_at_rest(self) -> RudderEffect:
+        """The same next to the card's own derivative, where its accelerations along the motion do not show it."""
+        return RudderEffect(self.measured, 1.0, self.covariance * np.outer([1, 0], [1, 0]))
+
     def less(self, factor: float) -> tuple[float, float]:
         """The measured coefficient less `factor` times the card's, and its standard error (Fieller 1954)."""
         weights = np.array([1.0, -factor])
@@ -197,8 +219,7 @@ def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None
     by_windows = inverse[0, 0] * (left.T @ left) / spare * _OVERLAP
     covariance = by_blocks if np.trace(by_blocks) > np.trace(by_windows) else by_windows
     measured, modelled = coefficients[0] / slope
-    effect = RudderEffect(float(measured), float(modelled), covariance / slope**2)
-    return effect if effect.determined else None
+    return RudderEffect(float(measured), float(modelled), covariance / slope**2)
 
 
 def _responses(problem: Problem, runs: Sequence[SampledRun]) -> _Responses | None:
