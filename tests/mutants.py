@@ -47,14 +47,20 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("dynamics/effects/propeller.py", "dynamics/effects/controllable_pitch.py"),
         ("tests/dynamics/effects/test_propeller_and_hull.py", "tests/dynamics/effects/test_controllable_pitch.py"),
     ),
-    "small craft": (("dynamics/small_craft.py", "cards/small_craft.py"), ("tests/dynamics/test_small_craft.py",)),
+    "small craft": (
+        ("dynamics/small_craft.py", "cards/small_craft.py"),
+        ("tests/dynamics/test_small_craft.py", "tests/analysis/heading/test_craft_autopilot.py"),
+    ),
     "roll": (("dynamics/roll.py",), ("tests/dynamics/test_roll.py",)),
     "card check": (
         ("cards/examination.py", "cards/plausibility.py"),
         ("tests/cards/test_examination.py", "tests/identification/captive/test_warnings.py"),
     ),
     "guess": (("analysis/guess/*.py",), ("tests/analysis/guess",)),
-    "logs": (("logs/clock.py", "logs/current.py", "logs/delays.py", "logs/quantities.py"), ("tests/logs",)),
+    "logs": (
+        ("logs/clock.py", "logs/current.py", "logs/delays.py", "logs/quantities.py"),
+        ("tests/logs/test_clock.py", "tests/logs/test_current.py", "tests/logs/test_delays.py", "tests/logs"),
+    ),
     "gap judge": (
         ("gap/proof/judge.py", "gap/proof/improvement.py", "gap/diagnosis/error_intervals.py"),
         (
@@ -69,7 +75,10 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("identification/trials/assessment/other_ship.py", "records/same_record.py"),
         ("tests/identification/trials/test_other_ship.py", "tests/records/test_same_record.py"),
     ),
-    "simulator rules": (("fmu/simulator_rules.py",), ("tests/fmu/test_passport.py",)),
+    "simulator rules": (
+        ("fmu/simulator_rules.py",),
+        ("tests/fmu/test_simulator_rules.py", "tests/fmu/test_passport.py"),
+    ),
     "lanes": (
         ("simulation/lane_runs.py", "simulation/lane_spirals.py", "simulation/lane_figures.py"),
         ("tests/simulation/test_lanes.py", "tests/simulation/test_stop.py"),
@@ -148,8 +157,8 @@ def numbers_of(room: str, path: Path) -> list[Mutant]:
     return found
 
 
-_WORDS = {"description", "display_unit", "nominal", "problem", "remedy", "source", "text", "unit"}
-"""Names of variables and arguments that hold words, or the sizes that scale what is shown."""
+_WORDS = {"description", "display_unit", "nominal", "problem", "remedy", "source", "text", "typical", "unit"}
+"""Names of variables and arguments that hold words, or the sizes that scale what is shown or searched."""
 
 
 def _not_changed(node: ast.AST) -> Iterator[ast.AST]:
@@ -171,6 +180,8 @@ def _not_changed(node: ast.AST) -> Iterator[ast.AST]:
             yield node
         case ast.IfExp(body=ast.Constant(str() as words)) if " " in words:
             yield node
+        case ast.Compare(ast.BinOp(op=ast.Mult() | ast.Div()) as product, [_], [ast.Constant(0)]):
+            yield product  # a product has the sign of the ratio
 
 
 def survives(mutant: Mutant, package: Path, selections: Sequence[str] = SELECTIONS) -> bool:
