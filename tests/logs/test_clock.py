@@ -11,9 +11,20 @@ from tank2sim.logs.streams import LogStream
 TRUE = 1_700_000_000.0 + np.arange(100.0)
 
 
+def near(times: np.ndarray, expected: np.ndarray) -> bool:
+    """Equal to a microsecond: a relative tolerance of times since 1970 would be hours."""
+    return bool(np.abs(times - expected).max() < 1e-6)
+
+
 def test_a_clock_that_rises_stays_as_it_is() -> None:
     times, findings = continued_clock(TRUE, "clock")
     assert np.array_equal(times, TRUE) and findings == []
+
+
+def test_two_falls_one_after_the_other_add_up_and_one_leap_ends_one_of_them() -> None:
+    clock = TRUE - 500.0 * (TRUE[30] <= TRUE) - 70.0 * (TRUE[50] <= TRUE)
+    times, findings = continued_clock(clock, "clock")
+    assert near(times, TRUE) and len(findings) == 2
 
 
 def test_a_gap_is_no_fault() -> None:
@@ -26,21 +37,21 @@ def test_a_gap_is_no_fault() -> None:
 @pytest.mark.parametrize("fall_s", [3.0, 60.0, 86400.0])
 def test_a_clock_set_back_runs_on(fall_s) -> None:
     times, (finding,) = continued_clock(np.where(TRUE[60] <= TRUE, TRUE - fall_s, TRUE), "clock")
-    assert np.allclose(times, TRUE) and finding.kind == "fault"
+    assert near(times, TRUE) and finding.kind == "fault"
     assert finding.evidence["fall_s"] == pytest.approx(fall_s - 1)
 
 
 def test_a_clock_set_back_and_right_again_is_right_again() -> None:
     late = np.where((TRUE[30] <= TRUE) & (TRUE[70] > TRUE), TRUE - 500, TRUE)
     times, findings = continued_clock(late, "clock")
-    assert np.allclose(times, TRUE) and len(findings) == 1
+    assert near(times, TRUE) and len(findings) == 1
 
 
 @pytest.mark.parametrize("leap_s", [18.0, 3600.0])
 def test_a_leap_ahead_for_a_while_is_taken_back(leap_s) -> None:
     ahead = np.where((TRUE[30] <= TRUE) & (TRUE[70] > TRUE), TRUE + leap_s, TRUE)
     times, (finding,) = continued_clock(ahead, "clock")
-    assert np.allclose(times, TRUE) and finding.evidence["leap_s"] == pytest.approx(leap_s)
+    assert near(times, TRUE) and finding.evidence["leap_s"] == pytest.approx(leap_s)
 
 
 @pytest.mark.parametrize(
@@ -50,8 +61,8 @@ def test_a_later_leap_ends_a_fall_only_if_it_is_as_large_to_two_samples(late_s: 
     """The clock falls by 499 s where it should rise by 1, and leaps later by about as much; else that is a gap."""
     clock = np.where(TRUE[30] <= TRUE, TRUE - 500.0, TRUE) + np.where(TRUE[70] <= TRUE, late_s, 0.0)
     times, findings = continued_clock(clock, "clock")
-    assert np.allclose(times[:70], TRUE[:70]) and len(findings) == 1
-    assert np.allclose(times[70:], clock[70:] if right_again else clock[70:] + 500.0)
+    assert near(times[:70], TRUE[:70]) and len(findings) == 1
+    assert near(times[70:], clock[70:] if right_again else clock[70:] + 500.0)
 
 
 @pytest.mark.parametrize(("back_s", "taken_back"), [(3600.0, True), (3601.0, True), (3599.0, True), (3605.0, False)])
@@ -59,9 +70,9 @@ def test_a_leap_is_taken_back_only_if_the_fall_is_as_large_to_two_samples(back_s
     clock = np.where(TRUE[30] <= TRUE, TRUE + 3600.0, TRUE) - np.where(TRUE[70] <= TRUE, back_s, 0.0)
     times, (finding,) = continued_clock(clock, "clock")
     if taken_back:
-        assert np.allclose(times, np.where(TRUE[70] > TRUE, TRUE, clock)) and "leap_s" in finding.evidence
+        assert near(times, np.where(TRUE[70] > TRUE, TRUE, clock)) and "leap_s" in finding.evidence
     else:
-        assert np.allclose(times[:70], clock[:70]) and np.allclose(times[70:], TRUE[70:] + 3600.0)
+        assert near(times[:70], clock[:70]) and near(times[70:], TRUE[70:] + 3600.0)
         assert finding.evidence["fall_s"] == pytest.approx(back_s - 1)
 
 
@@ -71,7 +82,7 @@ def test_a_fall_of_more_than_one_and_a_half_steps_is_a_clock_set_back(step_s: fl
     true = step_s * np.arange(100.0)
     clock = np.where(true >= true[60], true - (1 + steps) * step_s, true)
     times, findings = continued_clock(clock, "clock")
-    assert bool(findings) == fault and np.allclose(times, true if fault else clock)
+    assert bool(findings) == fault and near(times, true if fault else clock)
 
 
 def test_a_receiver_that_lost_whole_weeks_of_its_counter_is_set_right_and_a_recorder_is_not() -> None:
