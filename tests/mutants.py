@@ -45,7 +45,11 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "propeller": (
         ("dynamics/effects/propeller.py", "dynamics/effects/controllable_pitch.py"),
-        ("tests/dynamics/effects/test_propeller_and_hull.py", "tests/dynamics/effects/test_controllable_pitch.py"),
+        (
+            "tests/dynamics/effects/test_propeller_and_hull.py",
+            "tests/dynamics/effects/test_controllable_pitch.py",
+            "tests/dynamics/effects/test_harbour.py",
+        ),
     ),
     "small craft": (
         ("dynamics/small_craft.py", "cards/small_craft.py"),
