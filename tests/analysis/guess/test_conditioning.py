@@ -61,6 +61,24 @@ def test_a_figure_moves_the_members_as_exact_estimation_does_and_nothing_else(li
     )
 
 
+class Silent:
+    """A stream of random numbers that are all zero."""
+
+    def standard_normal(self, shape: tuple[int, ...]) -> np.ndarray:
+        return np.zeros(shape)
+
+
+def test_a_step_takes_each_member_by_the_covariances_of_the_members() -> None:
+    """p + C_py (C_yy + 4 R)^-1 (y - f), Emerick and Reynolds (2013), with the sample covariances of five members."""
+    stream = np.random.default_rng(5)
+    values, shown = stream.normal(size=(5, 3)), stream.normal(size=(5, 2))
+    target, errors = np.array([0.5, -0.2]), np.array([0.3, 0.6])
+    moved = conditioning._moved(values, shown, (target, errors), Silent())
+    both = np.cov(np.hstack([values, shown]).T)
+    gain = both[:3, 3:] @ np.linalg.inv(both[3:, 3:] + 4 * np.diag(errors**2))
+    np.testing.assert_allclose(moved, values + (target - shown) @ gain.T, rtol=1e-12)
+
+
 def test_without_figures_the_members_stay_as_they_are_drawn(linear) -> None:
     found = conditioned(CARD, [], MEMBERS, 1)
     np.testing.assert_array_equal(found.posterior, found.prior)
