@@ -69,6 +69,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("gap/proof/judge.py", "gap/proof/improvement.py", "gap/diagnosis/error_intervals.py"),
         (
             "tests/gap/test_judge_by_simulation.py",
+            "tests/gap/test_improvement.py",
             "tests/gap/test_cross_check.py",
             "tests/gap/test_error_intervals.py",
             "tests/gap/test_workflow.py",

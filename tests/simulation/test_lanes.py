@@ -275,6 +275,11 @@ def test_what_lanes_do_not_have_is_left_to_single_runs(mariner) -> None:
     assert not runs_in_lanes(Turn(TEN, wait_s=2.0)) and not runs_in_lanes(Zigzag(TEN, TEN, course=0.1))
     with pytest.raises(NoLanesError):
         LaneManoeuvres(mariner.with_values({"initial.trim": 1.0}))
+    for other in ("otter", "container", "wilinski-zellman"):  # no rudder, roll, a rig
+        with pytest.raises(NoLanesError):
+            LaneManoeuvres(build(read_card(other)))
+    with pytest.raises(NoLanesError):
+        lane_runs.LaneRunner(build(read_card("otter")))
     x = ca.MX.sym("x")
     with pytest.raises(NoLanesError):
         lane_function(ca.Function("f", [x], [x]), "f")

@@ -12,7 +12,7 @@ from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.guess import conditioning
 from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, GivenFigure, GuessMembers, conditioned
 from tank2sim.analysis.guess.prior import ShipDimensions, prior_card, rudder_by_rules
-from tank2sim.analysis.guess.study import Guess
+from tank2sim.analysis.guess.study import Guess, guess_ship
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 
@@ -113,6 +113,35 @@ def test_figures_contradict_each_other_from_three_and_a_half_deviations_of_one_b
     named = first if refused.value.place.startswith("tactical") else 0.8 * first - 3.8 * deviation
     expected = [1000.0 * math.exp(0.8 * named + side * 2 * deviation) for side in (-1, 1)]
     assert [low, high] == pytest.approx(expected, rel=0.05)
+
+
+def test_the_card_has_means_and_errors_of_the_members_and_their_covariance(linear) -> None:
+    guess = guess_ship(TANKER, [given(ADVANCE, 0.3), given(TACTICAL, -0.2)], "tanker", 600, 1)
+    values, card = guess.found.posterior, guess.card
+    assert isinstance(card, ManoeuvringCard)
+    for place, name in enumerate(DRAWS.names):
+        mean, spread = values[:, place].mean(), values[:, place].std(ddof=1)
+        group, _, key = name.partition(".")
+        if group == "derivatives":
+            found, error = card.derivatives[key], card.uncertainty[key]
+        else:
+            (effect,) = (one for one in card.effects if one.name == group)
+            found, error = effect.parameters[key], effect.uncertainty[key]
+        assert found == pytest.approx(mean, rel=1e-5, abs=1e-12) and error == pytest.approx(spread, rel=1e-4), name
+    assert card.covariance is not None and len(card.covariance.samples) == 500
+    np.testing.assert_allclose(card.covariance.matrix, np.cov(values.T), rtol=1e-9)
+    assert card.ship.name == "tanker" and guess.prior.derivatives["Nv"] == CARD.derivatives["Nv"]
+
+
+@pytest.mark.parametrize(("value", "error", "words"), [(1000.0, 50.0, True), (1000.0, 49.0, False)])
+def test_errors_that_were_not_given_and_ships_that_were_left_out_are_said(value, error, words) -> None:
+    members = np.zeros((180, len(SPREAD)))
+    found = GuessMembers(DRAWS, members, members, {}, {})
+    notices = Guess(TANKER, (GivenFigure("turn35", "advance", value, error),), found, CARD, CARD, 200, 1).notices
+    assert any(notice.startswith("20 of 200") for notice in notices)
+    assert any("5 % of distances, 1 deg" in notice for notice in notices) == words
+    whole = Guess(TANKER, (), found, CARD, CARD, 180, 1).notices
+    assert len(whole) == 2
 
 
 def test_members_that_show_no_figure_are_left_out_and_too_few_are_refused(linear, monkeypatch) -> None:
