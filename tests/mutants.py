@@ -28,27 +28,30 @@ ROOT = Path(__file__).resolve().parents[1]
 SELECTIONS = ("not slow and not long", "slow and not long")
 PASSED = (0, 5)  # all tests pass, or none is selected
 
+EFFECTS = "tests/dynamics/effects"
+
 ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "mmg": (("dynamics/mmg/*.py", "cards/mmg.py"), ("tests/dynamics/mmg", "tests/cards/test_mmg_card.py")),
     "waves": (
         ("dynamics/effects/waves.py", "analysis/wave_response.py"),
-        ("tests/dynamics/effects/test_waves.py", "tests/analysis/test_wave_response.py"),
+        (f"{EFFECTS}/test_ranges.py", f"{EFFECTS}/test_waves.py", "tests/analysis/test_wave_response.py"),
     ),
     "banks": (
         ("dynamics/effects/banks.py", "dynamics/effects/harbour.py"),
-        ("tests/dynamics/effects/test_banks.py", "tests/dynamics/effects/test_harbour.py"),
+        (f"{EFFECTS}/test_ranges.py", f"{EFFECTS}/test_banks.py", f"{EFFECTS}/test_harbour.py"),
     ),
-    "ships near": (("dynamics/effects/ships_near.py",), ("tests/dynamics/effects/test_ships_near.py",)),
+    "ships near": (("dynamics/effects/ships_near.py",), (f"{EFFECTS}/test_ranges.py", f"{EFFECTS}/test_ships_near.py")),
     "rudder and gear": (
         ("dynamics/effects/gear.py", "dynamics/effects/loaded_rudder.py"),
-        ("tests/dynamics/effects/test_rudder_and_gear.py", "tests/dynamics/effects/test_every_effect.py"),
+        (f"{EFFECTS}/test_ranges.py", f"{EFFECTS}/test_rudder_and_gear.py", f"{EFFECTS}/test_every_effect.py"),
     ),
     "propeller": (
         ("dynamics/effects/propeller.py", "dynamics/effects/controllable_pitch.py"),
         (
-            "tests/dynamics/effects/test_propeller_and_hull.py",
-            "tests/dynamics/effects/test_controllable_pitch.py",
-            "tests/dynamics/effects/test_harbour.py",
+            f"{EFFECTS}/test_ranges.py",
+            f"{EFFECTS}/test_propeller_and_hull.py",
+            f"{EFFECTS}/test_controllable_pitch.py",
+            f"{EFFECTS}/test_harbour.py",
         ),
     ),
     "small craft": (

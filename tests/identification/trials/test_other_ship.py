@@ -143,8 +143,9 @@ def test_means_of_trials_have_the_errors_of_their_scatter_if_that_is_larger() ->
 @pytest.mark.parametrize(("times", "far"), [(19.0, False), (21.0, True)])
 @pytest.mark.parametrize("letter", ["Y", "N"])
 def test_an_estimate_is_far_from_a_card_at_a_difference_of_twice_its_coefficients(letter, times, far) -> None:
-    """Errors of 10 % of each coefficient, of the other sign too, widened by so many times."""
+    """Errors of 10 % of its coefficients, widened by so many times, next to errors of 1 % of the other equation."""
     known = problem([trial(zigzag(20), name="own")])
-    known = replace(known, prior_error=0.1 * np.abs(known.prior_mean))
+    shares = [0.1 if name.startswith(f"derivatives.{letter}") else 0.01 for name in known.free]
+    known = replace(known, prior_error=np.array(shares) * np.abs(known.prior_mean))
     other = {"Y": "N", "N": "Y"}[letter]
     assert bool(far_from_card(known, {letter: times, other: 1.0})) == far
