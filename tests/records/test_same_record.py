@@ -165,9 +165,9 @@ def test_signals_that_are_never_known_at_once_still_make_a_signature():
 
 
 def swinging(rows: int = 401, **signals: np.ndarray) -> Trial:
-    """A heading without noise that swings by +-1 with a spread of 0.707, once a second."""
+    """A heading without noise that swings by +-1 ever faster, once a second."""
     time = np.arange(float(rows))
-    return Trial(Path("made.csv"), time, {"psi_rad": np.sin(time / 7.3), **signals}, columns={})
+    return Trial(Path("made.csv"), time, {"psi_rad": np.sin(time / 7.3 * (1 + time / 900)), **signals}, columns={})
 
 
 @pytest.mark.parametrize(("apart", "same"), [(0.9e-3, True), (1.2e-3, False)])
@@ -187,15 +187,6 @@ def test_records_are_the_same_within_half_of_the_smaller_noise(noise: float, sam
     assert same_record(one, changed(one, signals={"psi_rad": other})) == same
 
 
-@pytest.mark.parametrize(("digits_of", "same"), [(1.0, True), (1.4, False)])
-def test_records_are_the_same_within_what_rounding_to_the_coarser_digits_leaves(digits_of: float, same: bool) -> None:
-    """A record in steps of 0.1, u/sqrt(12) off, and one that is so much farther off in the same steps."""
-    exact = np.sin(np.arange(401.0) / 7.3)
-    coarse = np.round(exact, 1)
-    other = coarse + digits_of * (exact - coarse)
-    assert same_record(swinging(psi_rad=coarse), changed(swinging(), signals={"psi_rad": other})) == same
-
-
 @pytest.mark.parametrize(("rows", "same"), [(190, False), (210, True)])
 def test_records_are_compared_if_they_share_half_of_the_shorter_one(rows: int, same: bool) -> None:
     """A record of 400 s against one that begins within it and ends after it, by the same clock."""
@@ -213,9 +204,9 @@ def test_three_rows_in_common_say_nothing_and_four_do() -> None:
 
 
 def test_one_signal_that_differs_makes_another_record_and_one_that_rests_says_nothing() -> None:
-    one = swinging(x_m=np.arange(401.0))
+    one = swinging(u_mps=5.0 + np.cos(np.arange(401.0) / 31.0))
     assert same_record(one, changed(one))
-    assert not same_record(one, changed(one, signals={**one.signals, "x_m": 1.1 * one.signals["x_m"]}))
+    assert not same_record(one, changed(one, signals={**one.signals, "u_mps": 1.1 * one.signals["u_mps"]}))
     resting = swinging(delta_rad=np.zeros(401))
     assert same_record(resting, changed(resting))
     only = replace(resting, signals={"delta_rad": np.zeros(401)})

@@ -78,6 +78,7 @@ def test_with_the_engine_stopped_she_coasts_to_a_fifth_of_her_speed(ship, quadra
 needs_lanes = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
 
 
+@pytest.mark.slow
 @needs_lanes
 @pytest.mark.parametrize("share", [None, 1.0, 0.0])
 def test_stops_of_many_ships_have_the_closed_form_each_by_its_own_mass(ship, quadratic, share) -> None:
@@ -104,6 +105,7 @@ def test_stops_of_many_ships_have_the_closed_form_each_by_its_own_mass(ship, qua
         assert abs(figures["side_reach_m"]) < 1e-6 and abs(figures["heading_change_deg"]) < 1e-6
 
 
+@pytest.mark.slow
 @needs_lanes
 def test_stops_of_many_ships_turn_as_far_aside_as_single_ones(mariner_card) -> None:
     """A ship that is not alike to both sides: its reaches and change of heading differ from those straight ahead."""
@@ -117,6 +119,7 @@ def test_stops_of_many_ships_turn_as_far_aside_as_single_ones(mariner_card) -> N
     assert abs(expected["side_reach_m"]) > 1 and abs(expected["heading_change_deg"]) > 0.1
 
 
+@pytest.mark.slow
 @needs_lanes
 def test_a_ship_that_does_not_stop_in_the_longest_time_has_no_figures(ship) -> None:
     weak = Stop(-0.001 * N0)

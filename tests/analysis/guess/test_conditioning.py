@@ -136,12 +136,27 @@ def test_the_card_has_means_and_errors_of_the_members_and_their_covariance(linea
 @pytest.mark.parametrize(("value", "error", "words"), [(1000.0, 50.0, True), (1000.0, 49.0, False)])
 def test_errors_that_were_not_given_and_ships_that_were_left_out_are_said(value, error, words) -> None:
     members = np.zeros((180, len(SPREAD)))
-    found = GuessMembers(DRAWS, members, members, {}, {})
+    shown = {ADVANCE: 1000.0 + np.linspace(-80.0, 80.0, 180)}
+    found = GuessMembers(DRAWS, members, members, shown, shown)
     notices = Guess(TANKER, (GivenFigure("turn35", "advance", value, error),), found, CARD, CARD, 200, 1).notices
     assert any(notice.startswith("20 of 200") for notice in notices)
     assert any("5 % of distances, 1 deg" in notice for notice in notices) == words
     whole = Guess(TANKER, (), found, CARD, CARD, 180, 1).notices
     assert len(whole) == 2
+
+
+@pytest.mark.parametrize(
+    ("value", "place", "marked"),
+    [(1139.0, "before", False), (1143.0, "before", True), (861.0, "after", False), (857.0, "after", True)],
+)
+def test_a_figure_outside_nine_of_ten_ships_by_more_than_its_error_is_marked(value, place, marked) -> None:
+    """Figures evenly from 900 to 1100: nine of ten are within 910 to 1090; the error of the figure is 50 or so."""
+    members = np.zeros((181, len(SPREAD)))
+    narrow, wide = np.linspace(900.0, 1100.0, 181), np.linspace(0.0, 2000.0, 181)
+    figures = {"before": {ADVANCE: wide}, "after": {ADVANCE: wide}, place: {ADVANCE: narrow}}
+    found = GuessMembers(DRAWS, members, members, figures["before"], figures["after"])
+    guess = Guess(TANKER, (GivenFigure("turn35", "advance", value, 51.0),), found, CARD, CARD, 181, 1)
+    assert any(notice.startswith("CHECK") for notice in guess.notices) == marked
 
 
 def test_members_that_show_no_figure_are_left_out_and_too_few_are_refused(linear, monkeypatch) -> None:
