@@ -299,6 +299,24 @@ def test_a_card_at_fault_is_refused_at_its_place(old: str, new: str, place: str)
     assert caught.value.place == place
 
 
+@pytest.mark.parametrize(
+    ("old", "inside", "beyond", "place"),
+    [
+        ("x_G = 0.153125", "x_G = 0.99", "x_G = 1.01", "rigid_body.x_G"),  # half of the 2 m
+        ("y_m = 0.395", "y_m = 1.99", "y_m = 2.01", "thrusters.1.x_m"),
+    ],
+)
+def test_places_on_a_craft_are_refused_from_the_bounds_on_that_its_length_gives(old, inside, beyond, place) -> None:
+    def refused_at(new: str) -> str:
+        try:
+            parse_card(TEXT.replace(old, new, 1), "card.toml")
+        except InputError as error:
+            return error.place
+        return ""
+
+    assert refused_at(beyond) == place != refused_at(inside)
+
+
 def test_a_craft_without_thrust_only_loses_energy() -> None:
     model = build(OTTER)
     body = np.array([[85.281521, 0, 0], [0, 162.5, 12.25], [0, 12.25, 40.044924]])
