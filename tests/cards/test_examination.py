@@ -70,6 +70,104 @@ IMPLAUSIBLE = {
 }
 
 
+def sized(beam: float, draught: float) -> dict[str, float]:
+    return {"ship.beam_m": beam, "ship.draught_m": draught}
+
+
+SECTION = 23.17 * 7.468
+BOUNDS = {
+    "length over beam": (lambda value: sized(160.93 / value, SECTION * value / 160.93), 1.5, 20.0),
+    "beam over draught": (lambda value: sized((SECTION * value) ** 0.5, (SECTION / value) ** 0.5), 1.0, 12.0),
+    "Froude number": (lambda value: {"model.speed_mps": value * (9.80665 * 160.93) ** 0.5}, 0.03, 0.7),
+    "centre of gravity": (lambda value: {"rigid_body.x_G": value}, -0.1, 0.1),
+    "radius of gyration": (lambda value: {"rigid_body.yaw_inertia": 798e-5 * value**2}, 0.15, 0.4),
+    "added mass ahead": (lambda value: {"derivatives.Xudot": -value * 798e-5}, 0.01, 0.4),
+    "metacentric height": (lambda value: {"ship.metacentric_height_m": value * 23.17}, None, 0.5),
+    "propeller diameter": (lambda value: {"ship.propeller_diameter_m": value * 7.468}, 0.1, 1.2),
+    "block coefficient by mass": (lambda value: {"ship.block_coefficient": 0.597196 / value}, 0.75, 1.33),
+    "block coefficient is": (lambda value: {"rigid_body.mass": value / 0.597196 * 798e-5}, 0.2, 1.0),
+}
+"""Size: the Mariner with a proportion, by hand, and the bounds that ships are within."""
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_a_proportion_is_doubted_just_beyond_its_bounds_and_not_just_within(name: str) -> None:
+    changed, low, high = BOUNDS[name]
+    for bound, out in ((low, -1), (high, 1)):
+        if bound is None:
+            continue
+        for sign, doubted in ((out, True), (-out, False)):
+            at = bound + sign * 0.01 * abs(bound)
+            changes = {"rigid_body.yaw_inertia": 0.25**2 * 798e-5, "rigid_body.x_G": 0.0, **changed(at)}
+            if "rigid_body.mass" in changes:
+                changes["rigid_body.yaw_inertia"] = 0.25**2 * changes["rigid_body.mass"]
+            (text,) = doubts(read_card("mariner", changes)) or ("",)
+            assert (name in text) == doubted, (at, text)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "low", "high"),
+    [
+        ("Yvdot", 798e-5, 0.5, 1.6),
+        ("Nrdot", 39.2e-5, 0.25, 2.0),
+        ("Nr", 3.14159265 * (7.468 / 160.93) ** 2, 0.05, 1.0),
+        ("Y_v'", 3.14159265 * (7.468 / 160.93) ** 2, 0.5, 6.0),
+    ],
+)
+def test_a_derivative_is_doubted_beyond_the_sizes_of_hulls_by_more_than_two_of_its_errors(
+    name, unit, low, high
+) -> None:
+    key = "Yv" if name == "Y_v'" else name
+    error = 0.02 * unit
+    for bound, out in ((low, -1), (high, 1)):
+        for errors, doubted in ((2.2, True), (1.8, False)):
+            value = -(bound * unit + out * errors * error)
+            value += 798e-5 * 0.023 * (key == "Nr")  # her N_r has -m' x_G' in it
+            card = read_card("mariner", {f"derivatives.{key}": value, f"uncertainty.{key}": error})
+            (text,) = doubts(card) or ("",)
+            assert (f"{name} is" in text or f"{name} over" in text) == doubted, text
+
+
+@pytest.mark.parametrize(("moment", "force", "low", "high"), [("Nv", "Yv", -0.25, 0.75), ("Nd", "Yd", -0.7, -0.2)])
+def test_a_lever_is_doubted_beyond_that_of_ships_and_the_room_of_effects(moment, force, low, high) -> None:
+    """N_v/Y_v of -0.1 to 0.6 and N_d/Y_d of -0.55 to -0.35, with 0.15 either way, of a ship without errors."""
+    hull = read_card("mariner").derivatives
+    for bound, out in ((low, -1), (high, 1)):
+        for beyond, doubted in ((0.01, True), (-0.01, False)):
+            value = (bound + out * beyond) * hull[force]
+            if moment == "Nv" and value > 0:
+                continue  # the sign is doubted in place of the lever
+            value = -value if moment == "Nd" else value  # her file has the rudder positive to port
+            exact = {f"uncertainty.{name}": 1e-9 for name in (moment, force)}
+            (text,) = doubts(read_card("mariner", {f"derivatives.{moment}": value, **exact})) or ("",)
+            assert (f"{moment}/{force} is" in text) == doubted, text
+
+
+def test_shallow_water_raises_no_doubt_of_added_masses_and_damping_and_deep_water_does() -> None:
+    changes = {"derivatives.Yvdot": -2.5 * 798e-5, "uncertainty.Yvdot": 1e-5}
+    assert "Yvdot" in doubts(read_card("mariner", changes))[0]
+    assert "Yvdot" in doubts(read_card("mariner", {**changes, "ship.water_depth_m": 4.1 * 7.468}))[0]
+    assert doubts(read_card("mariner", {**changes, "ship.water_depth_m": 3.9 * 7.468})) == ()
+
+
+@pytest.mark.parametrize(("depth", "refused"), [(7.468, True), (7.5, False)])
+def test_a_ship_is_aground_in_water_as_deep_as_its_draught(depth: float, refused: bool) -> None:
+    if refused:
+        with pytest.raises(InputError, match="aground"):
+            read_card("mariner", {"ship.water_depth_m": depth})
+    else:
+        read_card("mariner", {"ship.water_depth_m": depth})
+
+
+@pytest.mark.parametrize(
+    ("key", "least"), [("steering_gear.max_angle_deg", 2.0), ("steering_gear.max_rate_degps", 0.2)]
+)
+def test_a_gear_is_one_from_two_degrees_and_a_fifth_of_a_degree_a_second(key: str, least: float) -> None:
+    read_card("mariner", {key: 1.01 * least})
+    with pytest.raises(InputError):
+        read_card("mariner", {key: 0.99 * least})
+
+
 @pytest.mark.parametrize("name", sorted(bundled_cards()))
 def test_bundled_cards_raise_no_doubt(name: str) -> None:
     assert doubts(read_card(name)) == ()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 
+import numpy as np
 import pytest
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import parse_card, revised
 from tank2sim.cards.card import MmgCard
-from tank2sim.cards.mmg import fujii
+from tank2sim.cards.mmg import fujii, open_water_fit
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters
 from tank2sim.errors import InputError
@@ -140,6 +142,77 @@ def test_a_faulty_mmg_card_is_refused_in_one_line_with_its_key(old: str, new: st
         build(mmg_of(TEXT.replace(old, new, 1)))
     line = str(error.value)
     assert "\n" not in line and line.startswith(f"ship.toml: {key}:"), line
+
+
+def test_a_rudder_is_as_high_as_the_propeller_or_states_its_share_in_the_race() -> None:
+    def with_height(metres: float, more: str = "") -> MmgCard:
+        return mmg_of(TEXT.replace("height_m = 0.345", f"height_m = {metres}{more}"))
+
+    assert with_height(0.217).rudder.height_m == 0.217
+    with pytest.raises(InputError) as refused:
+        with_height(0.215)
+    assert refused.value.place == "rudder.height_m"
+    assert with_height(0.215, "\neta = 0.9").interaction("eta") == 0.9
+
+
+@pytest.mark.parametrize(("times", "taken"), [(0.28, False), (0.32, True), (7.8, True), (8.2, False)])
+def test_a_sway_damping_is_taken_for_one_of_the_scaling_within_bounds_of_slender_wings(
+    times: float, taken: bool
+) -> None:
+    """Y_v' over -pi (d/L)^2, in the prime II of the card -pi d/L."""
+    text = TEXT.replace("Yv = -0.315", f"Yv = {-times * 3.14159265 * 0.46 / 7.0!r}")
+    if taken:
+        mmg_of(text)
+    else:
+        with pytest.raises(InputError) as refused:
+            mmg_of(text)
+        assert refused.value.place == "derivatives.Yv"
+
+
+def test_revolutions_hold_the_resistance_with_thrust_deduction_wake_and_two_propellers() -> None:
+    """(1 - t) z rho n^2 D^4 K_T(J) = 1/2 rho L d U^2 R_0, J = (1 - w) U/(n D)."""
+    two = TEXT.replace("[propeller]", "[propeller]\nnumber = 2\ny_P = 0.03").replace(
+        "[rudder]", "[rudder]\nnumber = 2\ny_R = 0.03"
+    )
+    for text, number in ((TEXT, 1), (two, 2)):
+        card = mmg_of(text)
+        assert card.propulsion is not None
+        n = card.propulsion.nominal_radps / (2 * math.pi)
+        J = 0.6 * 1.179 / (n * 0.216)
+        thrust = 1000.0 * n**2 * 0.216**4 * (0.2931 - 0.2753 * J - 0.1385 * J**2)
+        assert 0.78 * number * thrust == pytest.approx(0.5 * 1000 * 7 * 0.46 * 1.179**2 * 0.022, rel=1e-9)
+
+
+@pytest.mark.parametrize(("points", "coefficients"), [(3, (0.3, -0.2, -0.1)), (9, (0.05, -0.03, -0.02))])
+def test_an_open_water_fit_is_the_least_squares_parabola_and_tells_its_largest_error(points, coefficients) -> None:
+    J = np.linspace(0.0, 0.8, points)
+    values = np.polynomial.polynomial.polyval(J, coefficients)
+    fit = open_water_fit(J.tolist(), values.tolist(), "x.toml")
+    assert fit.coefficients == pytest.approx(coefficients, rel=1e-9) and fit.largest_error < 1e-12
+    bent = values + 0.01 * (-1.0) ** np.arange(points)
+    expected = np.polynomial.polynomial.polyfit(J, bent, 2)
+    fit = open_water_fit(J.tolist(), bent.tolist(), "x.toml")
+    assert fit.coefficients == pytest.approx(expected, rel=1e-6)
+    left = np.abs(np.polynomial.polynomial.polyval(J, expected) - bent).max()
+    assert fit.largest_error == pytest.approx(left, rel=1e-6, abs=1e-12)
+
+
+def test_torque_needs_its_curve_whole_once_and_with_its_J() -> None:
+    def refused_at(more: str, text: str = TEXT) -> str:
+        with pytest.raises(InputError) as refused:
+            mmg_of(text.replace("[propeller]\n", f"[propeller]\n{more}\n", 1))
+        return refused.value.place
+
+    table = TEXT.replace("k_0 = 0.2931\nk_1 = -0.2753\nk_2 = -0.1385", "J = [0.0, 0.3, 0.6]\nK_T = [0.3, 0.2, 0.1]")
+    assert refused_at("q_0 = 0.03\nq_1 = -0.02") == "propeller.q_2"
+    assert refused_at("eta_R = 1.01") == "propeller.eta_R"
+    assert refused_at("K_Q = [0.03, 0.02, 0.01]") == "propeller.J"
+    assert refused_at("q_0 = 0.03\nK_Q = [0.03, 0.02, 0.01]", table) == "propeller.K_Q"
+    card = mmg_of(table.replace("[propeller]\n", "[propeller]\nK_Q = [0.03, 0.021, 0.01]\n"))
+    given = card.propeller
+    assert given.eta_R == 1.0
+    at = [given.q_0 + given.q_1 * J + given.q_2 * J**2 for J in (0.0, 0.3, 0.6)]
+    assert at == pytest.approx([0.03, 0.021, 0.01])
 
 
 def test_a_ship_without_resistance_that_thrust_can_balance_has_no_revolutions() -> None:

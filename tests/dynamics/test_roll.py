@@ -6,6 +6,7 @@ import csv
 import math
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics import build
 from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.roll import natural_period_s
+from tank2sim.dynamics.roll import natural_period_s, roll_fault
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Manoeuvre, Orders, Turn, Zigzag
 from tank2sim.simulation.run import simulate
@@ -179,9 +180,27 @@ def test_a_faulty_card_is_refused_in_one_line_with_its_key(old: str, new: str, k
     assert error.value.place == key
 
 
-def test_the_effect_of_heel_is_refused_on_a_ship_that_rolls_by_itself() -> None:
-    from dataclasses import replace
+@pytest.mark.parametrize(("share", "positive"), [(0.999, True), (1.001, False)])
+@pytest.mark.parametrize("pair", [("Ypdot", "Kvdot"), ("Krdot", "Npdot")])
+def test_added_masses_that_couple_roll_are_refused_where_the_mass_matrix_is_no_longer_positive(
+    pair: tuple[str, str], share: float, positive: bool
+) -> None:
+    """Sway, roll and yaw: m_y, c; J_x; c, J_z. Coupled to roll by a, a^2 reaches what roll and the other two leave."""
+    card = rolling_card()
+    body, d, roll = card.rigid_body, card.derivatives, card.roll
+    assert roll is not None and roll.z_G == 0
+    assert d["Yrdot"] == d["Nvdot"] != 0
+    m_y, coupled = body.mass - d["Yvdot"], body.mass * body.x_G - d["Yrdot"]
+    J_x, J_z = roll.roll_inertia - d["Kpdot"], body.yaw_inertia - d["Nrdot"]
+    own = m_y - coupled**2 / J_z if pair[0] == "Ypdot" else J_z - coupled**2 / m_y
+    largest = math.sqrt(own * J_x)
+    added = {**d, "Ypdot": 0.0, "Kvdot": 0.0, **dict.fromkeys(pair, share * largest)}
+    assert (roll_fault(replace(card, derivatives=added)) == "") == positive
+    heavy = replace(card, derivatives={**added, **dict.fromkeys(pair, -share * largest)})
+    assert (roll_fault(heavy) == "") == positive
 
+
+def test_the_effect_of_heel_is_refused_on_a_ship_that_rolls_by_itself() -> None:
     from tank2sim.dynamics.effects import EFFECTS
 
     card = rolling_card()

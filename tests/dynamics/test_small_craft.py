@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from tank2sim.cards import CraftCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.small_craft import craft_unit, revolutions_for, thrust_of
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
@@ -139,6 +141,84 @@ def test_thrust_ahead_falls_with_speed_and_thrust_astern_does_not() -> None:
         assert less == pytest.approx(loss / 85.281521, abs=1e-12)
 
 
+@pytest.mark.parametrize("along", [-1.5, 0.0, 1.5])
+@pytest.mark.parametrize("thrust", [-60.0, -1.0, 3.0, 100.0])
+def test_revolutions_for_a_thrust_are_the_ones_that_a_thruster_gives_it_at(thrust: float, along: float) -> None:
+    """Ahead the root of k n^2 - l u n = T that is positive, whichever way the craft moves; astern -sqrt(-T/k)."""
+    ahead, astern, loss = 0.011, 0.0065, 0.05
+    found = float(ca.evalf(revolutions_for(ca.SX(thrust), ca.SX(along), ca.SX(ahead), ca.SX(astern), ca.SX(loss))))
+    root = max(np.roots([ahead, -loss * along, -thrust]).real) if thrust > 0 else -math.sqrt(-thrust / astern)
+    assert found == pytest.approx(root, rel=1e-9)
+    n, u = ca.SX(found), ca.SX(along)
+    assert float(ca.evalf(thrust_of(n, u, ca.SX(ahead), ca.SX(astern), ca.SX(loss)))) == pytest.approx(thrust, rel=1e-9)
+
+
+def quantity(model: Model, name: str, at: dict[str, float]) -> float:
+    x = np.array(model.initial(model.parameter_values())).ravel()
+    for key, value in at.items():
+        if key in model.state_names:
+            x[model.state_names.index(key)] = value
+    inputs = model.input_values({key: value for key, value in at.items() if key in model.input_names})
+    function = ca.Function("q", [model.x, model.u, model.p], [model.expand(model.symbol(name))])
+    return float(function(x, inputs, model.parameter_values()))
+
+
+@pytest.mark.parametrize(("u", "expected"), [(0.0, 1.0), (1.0, 1.0), (3.0, 1.0), (3.15, 0.5), (3.3, 0.0), (-3.15, 0.5)])
+def test_validity_falls_to_half_a_tenth_of_the_cruising_speed_beyond_the_range(u: float, expected: float) -> None:
+    fastest = OTTER.model.speed_range_mps[1]
+    at = {"motion.u": math.copysign(fastest + abs(u) - 3.0, u) if abs(u) >= 3 else u}
+    assert quantity(build(OTTER), "validity", at) == pytest.approx(expected, abs=1e-3)
+
+
+def test_orders_are_held_within_the_largest_revolutions_either_way() -> None:
+    model = build(OTTER)
+    for order, reached in ((300.0, 103.930864), (-300.0, -101.736666), (50.0, 50.0), (-20.0, -20.0)):
+        inputs = np.array(model.input_values())
+        inputs[model.input_names.index("thrusters.port.command")] = order
+        function = ca.Function("q", [model.x, model.u, model.p], [model.expand(model.symbol("thrusters.port.order"))])
+        found = float(function(model.initial(model.parameter_values()), inputs, model.parameter_values()))
+        assert found == pytest.approx(reached, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("azimuth_deg", "order_deg", "rate_degps"),
+    [(0.0, 10.0, 20.0), (0.0, 4.0, 10.0), (5.0, -60.0, -20.0), (30.0, 60.0, 0.0)],
+)
+def test_a_thruster_turns_by_its_lag_and_rate_to_orders_within_its_reach(
+    azimuth_deg: float, order_deg: float, rate_degps: float
+) -> None:
+    """(order - azimuth)/0.4 s, at most 20 deg/s; orders beyond 30 deg are held there."""
+    at = TEXT.index("[[thrusters]]")
+    outboard = (
+        '[[thrusters]]\nname = "stern"\nx_m = -1.0\nahead_Ns2 = 0.02216\nastern_Ns2 = 0.01\nmax_rpm = 990\n'
+        "max_azimuth_deg = 30\nazimuth_time_constant_s = 0.4\nmax_azimuth_rate_degps = 20\n"
+    )
+    model = build(parse_card(f"{TEXT[:at]}{outboard}", "outboard.toml"))
+    x = np.array(model.initial(model.parameter_values())).ravel()
+    x[model.state_names.index("thrusters.stern.azimuth")] = math.radians(azimuth_deg)
+    inputs = np.array(model.input_values())
+    inputs[model.input_names.index("thrusters.stern.azimuth_command")] = math.radians(order_deg)
+    rates = np.array(model.rhs(x, inputs, model.parameter_values())).ravel()
+    found = math.degrees(rates[model.state_names.index("thrusters.stern.azimuth")])
+    assert found == pytest.approx(rate_degps, abs=1e-9)
+
+
+def test_the_step_is_a_fifth_of_the_shortest_lag_and_a_two_hundredth_of_a_length() -> None:
+    assert build(OTTER).step_s == pytest.approx(0.005)  # 2 m / 1.5 m/s / 200 = 0.0067, to 1, 2, 5 of a power of ten
+    lag = ("max_radps = 103.930864", "max_radps = 103.930864\ntime_constant_s = 0.02")
+    assert changed(lag).step_s == pytest.approx(0.002)
+
+
+def test_units_of_terms_follow_from_what_they_multiply() -> None:
+    """Force over velocities: kg/s and kg/m, with a metre more for a moment and for each yaw rate."""
+    expected = {
+        "Xu": "kg/s", "Yr": "kg.m/s", "Nv": "kg.m/s", "Nr": "kg.m2/s", "Xuabsu": "kg/m", "Yvabsr": "kg",
+        "Nrabsv": "kg.m", "Nrabsr": "kg.m2", "Nvdot": "kg.m",
+    }  # fmt: skip
+    found = {name: craft_unit(name) for name in expected}
+    assert found == expected
+
+
 def test_an_outboard_at_the_stern_that_pushes_to_port_turns_the_craft_to_starboard() -> None:
     at = TEXT.index("[[thrusters]]")
     outboard = (
@@ -217,6 +297,24 @@ def test_a_card_at_fault_is_refused_at_its_place(old: str, new: str, place: str)
     with pytest.raises(InputError) as caught:
         build(parse_card(TEXT.replace(old, new, 1), "card.toml"))
     assert caught.value.place == place
+
+
+@pytest.mark.parametrize(
+    ("old", "inside", "beyond", "place"),
+    [
+        ("x_G = 0.153125", "x_G = 0.99", "x_G = 1.01", "rigid_body.x_G"),  # half of the 2 m
+        ("y_m = 0.395", "y_m = 1.99", "y_m = 2.01", "thrusters.1.x_m"),
+    ],
+)
+def test_places_on_a_craft_are_refused_from_the_bounds_on_that_its_length_gives(old, inside, beyond, place) -> None:
+    def refused_at(new: str) -> str:
+        try:
+            parse_card(TEXT.replace(old, new, 1), "card.toml")
+        except InputError as error:
+            return error.place
+        return ""
+
+    assert refused_at(beyond) == place != refused_at(inside)
 
 
 def test_a_craft_without_thrust_only_loses_energy() -> None:

@@ -13,7 +13,7 @@ from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.proof import judge, judge_surroundings
 from tank2sim.gap.proof.improvement import NamedEffects, Proof
 from tank2sim.gap.proof.judge import Judge, Judged
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Passed, Refitted
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Passed, Refitted
 from tank2sim.gap.search import model_choice
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import decide
@@ -168,3 +168,67 @@ def test_a_doubtful_effect_stays_whose_place_a_coefficient_far_off_would_take(
     judge = Judge(Prover(lambda effects: 1.0, lambda effects: 1.0 if force in effects else moved), 0.5)
     judged = judge.with_fewer(found, decide(found))
     assert (force in judged.decision.best.hypothesis.effects) == stays
+
+
+def passed(before: float, after: float, *, held_out: bool = False) -> Passed:
+    """A trial that is missed by so many noises by the given card and by the improved one."""
+    one = replay(after)
+    return replace(one, held_out=held_out, before={"motion.r": np.full(50, before * NOISE)})
+
+
+@pytest.mark.parametrize(
+    ("fitted", "held", "clearly"),
+    [
+        ((10.0, 4.0), None, True),
+        ((10.0, 7.5), None, False),
+        ((2.9, 0.5), None, False),  # a gap that is not far above the noise
+        ((10.0, 4.0), (10.0, 4.0), True),
+        ((20.0, 4.0), (10.0, 9.0), False),  # what is held out stays as it was: the fitted trials alone say nothing
+        ((20.0, 4.0), (10.0, 6.9), True),
+        ((20.0, 4.0), (10.0, 15.0), False),
+    ],
+)
+def test_a_second_explanation_must_bring_the_trials_held_out_clearly_closer_too(fitted, held, clearly) -> None:
+    results = [passed(*fitted)] + ([passed(*held, held_out=True)] if held else [])
+    assert judge._closes_clearly(results) == clearly
+
+
+@pytest.mark.parametrize(
+    ("gain", "coefficients", "named"),
+    [
+        (30.0, 2.0 / 1.04, True),  # within 5 % of what the card's coefficients alone reach
+        (30.0, 2.0 / 1.06, False),
+        (41.0, 1.0, True),  # far ahead by its score: coefficients are not asked for
+        (39.0, 1.0, False),
+    ],
+)
+def test_a_name_not_far_ahead_must_follow_the_trials_as_closely_as_coefficients_alone(
+    monkeypatch, gain: float, coefficients: float, named: bool
+) -> None:
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    monkeypatch.setattr(judge, "closes_gap", lambda *arguments: True)
+    found = Search(CALM, (fit(-gain, FORCE, width=0.3), fit(0, width=1.5)), ())
+    judged = Judge(Prover(lambda effects: 2.0 if effects else coefficients), 0.5).judge(found, decide(found))
+    assert judged.decision.verdict == (MISSING if named else NO_EFFECT_MISSING)
+    assert judged.withheld == (() if named else (NAMES[FORCE],))
+
+
+@pytest.mark.parametrize(("second", "named"), [(6.0, True), (8.0, False)])
+def test_after_a_name_was_excluded_the_next_must_close_the_gap_clearly(monkeypatch, second: float, named: bool) -> None:
+    """The best by its score brings no simulation closer; the second leaves 60 or 80 % of the misfit."""
+    monkeypatch.setattr(model_choice, "find_strangeness", lambda likelihood, fit: ())
+    found = Search(CALM, (fit(-300, FORCE, width=0.3), fit(-250, DRAG, width=0.3), fit(0, width=1.5)), ())
+
+    class Trials(Prover):
+        def prove(self, best: ExplanationFit) -> Proof:
+            proof, effects = super().prove(best), best.hypothesis.effects
+            after = 12.0 if NAMES[FORCE] in effects else second if effects else 10.0
+            return replace(proof, results=[passed(10.0, after)])
+
+    judged = Judge(Trials(lambda effects: 1.0), 0.5).judge(found, decide(found))
+    assert judged.withheld[0] == NAMES[FORCE] and len(judged.withheld) == (1 if named else 2)
+    assert (judged.decision.verdict == MISSING) == named
+    if named:
+        assert judged.decision.best.hypothesis.effects == (NAMES[DRAG],)
+    else:
+        assert judged.decision.verdict == OUTSIDE_LIBRARY  # 10 noises are left, and nothing explains them

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.logs.delays import rate_delay
+from tank2sim.logs.delays import RateDelay, rate_delay
 from tests.logs.made_logs import frame, voyage
 
 STEP = 0.1
@@ -31,6 +31,46 @@ def test_a_known_delay_is_found_within_its_standard_error(delay) -> None:
     assert found is not None and found.standard_error_s < 0.02
     assert abs(found.delay_s - delay) < 4 * found.standard_error_s + 0.01
     assert found.certain == (delay != 0.0)
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_a_rate_of_another_scale_is_as_late_with_the_same_error(scale) -> None:
+    """Delays are times: they and their errors do not change with the unit of the rate."""
+    time, heading, rate = swinging()
+    rate = rate + 3e-4 * np.random.default_rng(3).normal(size=len(time))
+    plain, scaled = (rate_delay(time, heading, time + 0.8, factor * rate) for factor in (1.0, scale))
+    assert plain is not None and scaled is not None
+    assert scaled.delay_s == pytest.approx(0.8, abs=0.01)
+    assert scaled.standard_error_s == pytest.approx(plain.standard_error_s, rel=1e-3)
+
+
+def test_the_standard_error_is_the_scatter_of_the_delay() -> None:
+    time, heading, rate = swinging()
+    found = []
+    for seed in range(20):
+        noise = 2e-3 * np.random.default_rng(seed).normal(size=(2, len(time)))
+        found.append(rate_delay(time, heading + noise[0], time + 0.4, rate + noise[1]))
+    scatter = np.std([one.delay_s for one in found], ddof=1)
+    assert np.mean([one.standard_error_s for one in found]) == pytest.approx(scatter, rel=0.5)
+
+
+@pytest.mark.parametrize(("seconds", "known"), [(359, True), (299, False)])
+def test_six_minutes_are_needed(seconds, known) -> None:
+    time, heading, rate = swinging(seconds)
+    assert (rate_delay(time, heading, time + 0.3, rate) is not None) == known
+
+
+@pytest.mark.parametrize(
+    ("delay", "error", "certain"), [(0.2, 0.03, True), (0.2, 0.05, False), (0.09, 0.001, False), (-0.11, 0.001, True)]
+)
+def test_a_delay_is_certain_from_a_tenth_of_a_second_and_five_errors(delay, error, certain) -> None:
+    assert RateDelay(delay, error).certain == certain
+
+
+def test_a_delay_of_more_than_three_seconds_is_none() -> None:
+    time, heading, rate = swinging()
+    assert rate_delay(time, heading, time + 2.8, rate) is not None
+    assert rate_delay(time, heading, time + 3.3, rate) is None
 
 
 def test_what_noise_hides_is_not_certain() -> None:

@@ -10,6 +10,7 @@ from tank2sim.errors import InputError
 from tank2sim.marks import CHECK
 from tank2sim.records.reading import looks_like_a_trial, read_trial_file
 from tank2sim.records.same_record import Likeness, likeness, refuse_copies, same_record, signature
+from tank2sim.records.trials import Trial
 from tests.records.motions import NOISE, motion, trial
 
 MOTIONS = {kind: motion(kind) for kind in ("zigzag", "turn", "straight")}
@@ -161,6 +162,55 @@ def test_signals_that_are_never_known_at_once_still_make_a_signature():
     assert same_record(signed(one), one)
     still = replace(one, signals={"psi_rad": np.zeros_like(one.time_s)})
     assert signature(still) == ([], {})
+
+
+def swinging(rows: int = 401, **signals: np.ndarray) -> Trial:
+    """A heading without noise that swings by +-1 ever faster, once a second."""
+    time = np.arange(float(rows))
+    return Trial(Path("made.csv"), time, {"psi_rad": np.sin(time / 7.3 * (1 + time / 900)), **signals}, columns={})
+
+
+@pytest.mark.parametrize(("apart", "same"), [(0.9e-3, True), (1.2e-3, False)])
+def test_records_are_the_same_up_to_a_thousandth_of_their_spread(apart: float, same: bool) -> None:
+    one = swinging()
+    heading = one.signals["psi_rad"]
+    shift = apart * np.std(heading) * np.sign(np.cos(13.0 * one.time_s))
+    assert same_record(one, changed(one, signals={"psi_rad": heading + shift})) == same
+
+
+@pytest.mark.parametrize(("noise", "same"), [(0.45, True), (0.55, False)])
+def test_records_are_the_same_within_half_of_the_smaller_noise(noise: float, same: bool) -> None:
+    stream = np.random.default_rng(2)
+    heading = np.sin(np.arange(4001.0) / 73.0) + 0.02 * stream.standard_normal(4001)
+    other = heading + noise * 0.02 * np.sign(stream.standard_normal(4001))
+    one = swinging(4001, psi_rad=heading)
+    assert same_record(one, changed(one, signals={"psi_rad": other})) == same
+
+
+@pytest.mark.parametrize(("rows", "same"), [(190, False), (210, True)])
+def test_records_are_compared_if_they_share_half_of_the_shorter_one(rows: int, same: bool) -> None:
+    """A record of 400 s against one that begins within it and ends after it, by the same clock."""
+    whole = swinging(801)
+    first = replace(whole, time_s=whole.time_s[:401], signals={"psi_rad": whole.signals["psi_rad"][:401]})
+    later = slice(401 - rows, 801 - rows + 1)
+    second = changed(whole, time_s=whole.time_s[later], signals={"psi_rad": whole.signals["psi_rad"][later]})
+    assert same_record(first, second) == same_record(second, first) == same
+
+
+def test_three_rows_in_common_say_nothing_and_four_do() -> None:
+    for rows, same in ((3, False), (4, True)):
+        one = swinging(rows)
+        assert same_record(one, changed(one)) == same
+
+
+def test_one_signal_that_differs_makes_another_record_and_one_that_rests_says_nothing() -> None:
+    one = swinging(u_mps=5.0 + np.cos(np.arange(401.0) / 31.0))
+    assert same_record(one, changed(one))
+    assert not same_record(one, changed(one, signals={**one.signals, "u_mps": 1.1 * one.signals["u_mps"]}))
+    resting = swinging(delta_rad=np.zeros(401))
+    assert same_record(resting, changed(resting))
+    only = replace(resting, signals={"delta_rad": np.zeros(401)})
+    assert not same_record(only, changed(only))
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
 from tank2sim.native.library import cached_library
-from tank2sim.simulation import lane_runs
+from tank2sim.simulation import lane_runs, lane_spirals, manoeuvres
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
@@ -96,6 +96,27 @@ def test_spirals_in_lanes_are_those_of_single_runs_to_the_error_of_their_steps(n
             # Steps begin anew where the steadiness is judged: states are interpolated between other samples.
             np.testing.assert_allclose(found.states[number, inside, place], values, rtol=1e-5, atol=1e-2)
     assert (found.figures["loop_width_deg"] > 0).all() == (name == "kvlcc2")
+
+
+@pytest.mark.parametrize("lengths", [None, 3.3])
+def test_a_spiral_holds_each_rudder_for_the_longest_time_at_most(monkeypatch, mariner_card, mariner, lengths) -> None:
+    """Of 3.3 L/u0 the turn is not steady: 3 rudders end at 9.9 L/u0, however the longest time was said."""
+    for module in (lane_spirals, manoeuvres):
+        monkeypatch.setattr(module, "SPIRAL_HOLD", 3.3)
+    passage = mariner_card.ship.length_m / mariner_card.model.speed_mps
+    hold = None if lengths is None else lengths * passage
+    spiral = SpiralManoeuvre((LARGE, 0.0, -LARGE))
+    members, p = ships(mariner_card, mariner, 3)
+    times = np.array([3.2, 3.4, 9.85, 9.95]) * passage
+    found = LaneManoeuvres(mariner).run(spiral, p, hold, times)
+    assert np.isfinite(found.states[:, :3]).all() and np.isnan(found.states[:, 3]).all()
+    rudder = found.states[:, :, mariner.state_names.index("rudder.angle")]
+    assert (rudder[:, 0] > 0.5).all() and (rudder[:, 1] < rudder[:, 0]).all() and (rudder[:, 2] < -0.3).all()
+    for number, member in enumerate(members):
+        single = simulate(mariner, spiral, duration_s=hold, parameters=member)
+        assert single.trajectory.t[-1] == pytest.approx(9.9 * passage)
+        for figure, value in single_figures(single.figures).items():
+            assert found.figures[figure][number] == pytest.approx(value, rel=1e-6, abs=1e-9), figure
 
 
 def test_a_ship_that_leaves_all_bounds_in_a_spiral_and_the_range_of_its_card_are_found(mariner_card, mariner) -> None:
@@ -254,6 +275,11 @@ def test_what_lanes_do_not_have_is_left_to_single_runs(mariner) -> None:
     assert not runs_in_lanes(Turn(TEN, wait_s=2.0)) and not runs_in_lanes(Zigzag(TEN, TEN, course=0.1))
     with pytest.raises(NoLanesError):
         LaneManoeuvres(mariner.with_values({"initial.trim": 1.0}))
+    for other in ("otter", "container", "wilinski-zellman"):  # no rudder, roll, a rig
+        with pytest.raises(NoLanesError):
+            LaneManoeuvres(build(read_card(other)))
+    with pytest.raises(NoLanesError):
+        lane_runs.LaneRunner(build(read_card("otter")))
     x = ca.MX.sym("x")
     with pytest.raises(NoLanesError):
         lane_function(ca.Function("f", [x], [x]), "f")

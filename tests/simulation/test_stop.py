@@ -12,7 +12,9 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import Model, build
 from tank2sim.errors import InputError
+from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.figures import figures_of
+from tank2sim.simulation.lane_figures import LaneManoeuvres
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trajectory import Trajectory
@@ -71,6 +73,59 @@ def test_with_the_engine_stopped_she_coasts_to_a_fifth_of_her_speed(ship, quadra
     assert result.figures["head_reach_lengths"] == pytest.approx(reach, rel=0.03)
     assert result.figures["time_to_stop_s"] == pytest.approx(time * L / U0, rel=0.05)
     assert result.trajectory["motion.u"][-1] == pytest.approx(COASTING_END * U0, rel=1e-9)
+
+
+needs_lanes = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
+
+
+@pytest.mark.slow
+@needs_lanes
+@pytest.mark.parametrize("share", [None, 1.0, 0.0])
+def test_stops_of_many_ships_have_the_closed_form_each_by_its_own_mass(ship, quadratic, share) -> None:
+    stop = Stop() if share is None else Stop(-share * N0)
+    added = ship.parameter_names.index("derivatives.Xudot")
+    p = np.tile(ship.parameter_values(), (3, 1))
+    p[:, added] *= (1.0, 3.0, 5.0)
+    found = LaneManoeuvres(ship).run(stop, p)
+    assert found.fine.all()
+    for number, times in enumerate((1.0, 3.0, 5.0)):
+        heavier = replace(
+            quadratic, derivatives={**quadratic.derivatives, "Xudot": times * quadratic.derivatives["Xudot"]}
+        )
+        if share == 0.0:
+            reach, time = closed_form(heavier, 0.0, COASTING_END)
+        else:
+            reach, time = closed_form(heavier, (FULL_ASTERN if share is None else share) ** 2)
+        figures = {name: values[number] for name, values in found.figures.items()}
+        room = 0.03 if share == 0.0 else 5e-3
+        assert figures["track_reach_lengths"] == pytest.approx(reach, rel=room)
+        assert figures["head_reach_m"] == pytest.approx(reach * L, rel=room)
+        assert figures["time_to_stop_s"] == pytest.approx(time * L / U0, rel=2 * room)
+        assert figures["stopped_at_mps"] == pytest.approx(COASTING_END * U0 if share == 0.0 else 0.0, abs=1e-9)
+        assert abs(figures["side_reach_m"]) < 1e-6 and abs(figures["heading_change_deg"]) < 1e-6
+
+
+@pytest.mark.slow
+@needs_lanes
+def test_stops_of_many_ships_turn_as_far_aside_as_single_ones(mariner_card) -> None:
+    """A ship that is not alike to both sides: its reaches and change of heading differ from those straight ahead."""
+    text = mariner_card.text.replace("[5.4, 9.3]", "[3.9, 9.3]") + f"\n[propulsion]\nnominal_rpm = 84.0\nXnn = {XNN}\n"
+    model = build(parse_card(text, "ship.toml"))
+    start = model.parameter_values({"initial.psi": 0.7}) if "initial.psi" in model else model.parameter_values()
+    found = LaneManoeuvres(model).run(Stop(), start[None])
+    expected = simulate(model, Stop(), parameters=dict(zip(model.parameter_names, start.tolist(), strict=True))).figures
+    for name, value in expected.items():
+        assert found.figures[name][0] == pytest.approx(value, rel=1e-9), name
+    assert abs(expected["side_reach_m"]) > 1 and abs(expected["heading_change_deg"]) > 0.1
+
+
+@pytest.mark.slow
+@needs_lanes
+def test_a_ship_that_does_not_stop_in_the_longest_time_has_no_figures(ship) -> None:
+    weak = Stop(-0.001 * N0)
+    assert set(simulate(ship, weak).figures.values()) == {None}
+    found = LaneManoeuvres(ship).run(weak, ship.parameter_values()[None])
+    assert all(np.isnan(values[0]) for values in found.figures.values())
 
 
 def test_a_longer_run_goes_astern_and_has_the_same_figures_and_a_shorter_one_has_none(ship) -> None:

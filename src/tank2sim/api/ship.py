@@ -431,7 +431,7 @@ class Ship:
         for argument, names in (("states", kept), ("inputs", given), ("outputs", shown)):
             for name in names or ():
                 if name not in model:
-                    known = (*model.state_names, *model.input_names, *(output.name for output in model.outputs))
+                    known = (*model.state_names, *model.input_names, *model.outputs)
                     raise InputError(argument, "", f"{name!r} is not a variable of the model", close_name(name, known))
         settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)

@@ -270,8 +270,8 @@ def thrust_of(n: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, loss: ca.SX) 
 def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, loss: ca.SX) -> ca.SX:
     """Revolutions n (rad/s, positive ahead) that give a thrust: the inverse of :func:`thrust_of`.
 
-    Ahead, k n^2 - l u_T n = T has one root that is not negative; a thrust of 0 is that of a propeller at rest only for
-    u_T = 0, and of one that turns with the water where the craft moves ahead.
+    Ahead, k n^2 - l u_T n = T has one root that is not negative, also where the craft moves astern (u_T < 0). A thrust
+    of 0 is that of a propeller at rest, or of one that turns with the water where the craft moves ahead.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, lo
     along, ahead, astern, loss : casadi.SX
         As of :func:`thrust_of`.
     """
-    lost = loss * ca.fmax(along, 0)
+    lost = loss * along
     forward = (lost + ca.sqrt(lost**2 + 4 * ahead * ca.fmax(thrust, 0))) / (2 * ahead)
     return ca.if_else(thrust >= 0, forward, -ca.sqrt(ca.fmax(-thrust, 0) / astern))
 

@@ -51,6 +51,38 @@ def test_a_sloping_bank_counts_by_the_mean_of_its_nearness_over_the_draught(slop
     assert sloping / wall == pytest.approx((expected - far) / (1 / (35.0 + B / 2) - far), rel=1e-5)
 
 
+@pytest.mark.parametrize("share", [1e-5, 0.99e-3, 1.01e-3, 0.05, 0.5, 0.94, 0.96, 2.0])
+def test_the_nearness_of_a_slope_is_its_mean_at_every_steepness_up_to_the_steepest(share: float) -> None:
+    """Mean of 1/y from y (1 - s) to y (1 + s), by quadrature; a bank steeper than 0.95 counts as one of 0.95."""
+    s = min(share, 0.95)
+    x, weights = np.polynomial.legendre.leggauss(60)
+    distance = ca.SX.sym("distance")
+    found = ca.Function("f", [distance], [mean_nearness(distance, ca.SX(share * 20.0))])(20.0)
+    assert float(found) == pytest.approx(weights @ (1 / (1 + s * x)) / 2 / 20.0, rel=1e-10)
+
+
+def test_validity_is_half_where_the_bank_is_one_and_a_half_times_as_near_as_was_measured() -> None:
+    """y_B = 0.26 + 0.26/2 = B/2/(B/2 + distance), less the far side; on either side."""
+    distance = B / 2 / (0.39 + B / 2 / (FAR_M + B / 2)) - B / 2
+    for side in ("port", "starboard"):
+        model = ship({"bank": bank(**{side: distance})})
+        assert values(model, ["validity_by.bank"], AHEAD)[0] == pytest.approx(0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("turns", "speed", "at_work"), [(0.3, 1.0, 0.5), (0.15, 0.5, 0.5), (0.6, 1.0, 1.0), (-0.5, 1.0, 0.0)]
+)
+def test_a_propeller_counts_as_at_work_by_its_revolutions_for_the_speed(
+    turns: float, speed: float, at_work: float
+) -> None:
+    moving = state(speed * U0, 0.0, 0.0)
+    none, part, whole = (
+        added_forces("bank", bank(starboard=20.0), {**moving, "propeller.speed": share * N0})
+        for share in (0.0, turns, 1.0)
+    )
+    np.testing.assert_allclose(part, none + at_work * (whole - none), rtol=1e-3, atol=1e-3)
+
+
 def test_a_stopped_propeller_lets_the_ship_be_pushed_away_near_the_bottom_alone() -> None:
     model_at = {"bank": bank(starboard=20.0), "finite_depth": {"depth_m": 1.1 * T, "resistance": 0.0}}
     ordered = {name: model_at[name] for name in ("finite_depth", "bank")}

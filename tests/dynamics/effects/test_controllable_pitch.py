@@ -46,6 +46,56 @@ def test_the_series_is_near_the_open_water_curve_of_a_tankers_propeller() -> Non
         assert b_series_thrust(J, 0.721, 0.431, 4) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ("at", "thrust", "torque"),
+    [
+        ((0.55, 0.8, 0.65, 5), 0.1574409603, 0.02300639701),
+        ((0.3, 1.2, 0.4, 3), 0.3737088289, 0.06412075962),
+        ((0.9, 1.1, 0.9, 6), 0.1445084552, 0.03016430948),
+    ],
+)
+def test_the_series_has_the_values_of_another_transcription_of_its_polynomials(at, thrust, torque) -> None:
+    """J, P/D, A_E/A_0 and Z; K_T and K_Q at a Reynolds number of 2e6 by a public program with its own tables."""
+    assert b_series_thrust(*at) == pytest.approx(thrust, rel=1e-9)
+    assert b_series_torque(*at) == pytest.approx(torque, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "order", "pitch", "per_passage"),
+    [
+        ({}, 0.9, 0.85, 0.05 / 0.05),  # the lag of a twentieth of a passage
+        ({}, -0.8, 0.8, -2 * 0.8 / 0.7),  # all the way astern in 0.7 passages
+        ({}, 1.3, -0.8, 2 * 0.8 / 0.7),
+        ({"reversal_s": 3 * L / U0, "time_constant_s": 0.1 * L / U0}, -0.8, 0.8, -2 * 0.8 / 3),
+        ({"reversal_s": 3 * L / U0, "time_constant_s": 0.1 * L / U0}, 0.81, 0.8, 0.1),
+    ],
+)
+def test_the_pitch_goes_to_its_order_by_lag_and_time_of_reversal(more, order, pitch, per_passage) -> None:
+    at = {**state(U0, 0.0, 0.0), "propeller.pitch": order, "propeller.pitch_actual": pitch}
+    (rate,) = values(ship({"controllable_pitch": {**PITCH, **more}}), ["propeller.pitch_rate"], at)
+    assert rate == pytest.approx(per_passage * U0 / L, rel=1e-9)
+
+
+def test_a_propeller_of_which_nothing_is_said_has_four_blades_of_55_percent_and_a_slip_of_30() -> None:
+    said = {**PITCH, "blades": 4, "area_ratio": 0.55, "astern": 0.7, "advance_share": 0.7}
+    other = {**PITCH, "blades": 5, "area_ratio": 0.7, "astern": 0.5, "advance_share": 0.6}
+    for pitch in (1.1, -0.6):
+        at = {**state(5.0, 0.0, 0.0), "propeller.pitch_actual": pitch, "propeller.speed": N0}
+        usual, stated, another = (added_forces("controllable_pitch", one, at)[0] for one in (PITCH, said, other))
+        assert usual == pytest.approx(stated, rel=1e-12) != pytest.approx(another, rel=1e-3)
+
+
+@pytest.mark.parametrize(("pitch", "turns"), [(1.1, -0.5), (-0.6, 0.0), (0.5, 0.01)])
+def test_a_propeller_that_stops_or_turns_astern_has_no_thrust_by_its_pitch(pitch: float, turns: float) -> None:
+    """n < 0 is no order of such a propeller; below 2 % of the revolutions J is held, and n^2 is nothing."""
+    at = {**state(5.0, 0.0, 0.0), "propeller.pitch_actual": pitch, "propeller.speed": turns * N0}
+    X = added_forces("controllable_pitch", PITCH, at)[0]
+    J = min(0.7 * 0.8 * 5.0 / U0 / 0.02, 1.6)
+    change = (at_pitch(J, pitch) - at_pitch(J, 0.8)) / at_pitch(0.56, 0.8)
+    expected = 0.5 * RHO * L**2 * U0**2 * 77e-5 * max(turns, 0.0) ** 2 * change
+    assert pytest.approx(expected, rel=1e-9, abs=1e-6) == X
+
+
 def test_thrust_has_no_step_over_the_pitch_and_falls_with_it() -> None:
     for J in (0.0, 0.3, 0.7):
         pitches = np.linspace(-1.4, 1.4, 281)

@@ -11,7 +11,7 @@ from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 
-from .ships import N0, RHO, U0, L, added_forces, ship, state
+from .ships import N0, RHO, U0, G, L, T, added_forces, ship, state
 
 TELEGRAPH = {"time_constant_s": 4.0, "start_s": 6.0, "reversal_s": 25.0}
 
@@ -41,6 +41,24 @@ def test_an_order_that_nothing_can_follow_is_refused(
     with pytest.raises(InputError) as caught:
         model.input_values({input_name: wrong})
     assert caught.value.place == input_name
+
+
+@pytest.mark.parametrize(("name", "side"), [("bow_tunnel_thruster", 1), ("stern_tunnel_thruster", -1)])
+def test_a_thruster_of_which_nothing_is_said_is_one_of_the_ships_size_at_its_end(name: str, side: int) -> None:
+    """6e-5 rho g L^2 T at 0.42 L, half of it left at 0.038 sqrt(g L): about 100 N/m2 of L T and 3 knots."""
+    whole = 6e-5 * RHO * G * L**2 * T
+    assert 80 < whole / (L * T) < 140
+    for u, left in ((0.0, 1.0), (0.038 * math.sqrt(G * L), 0.5)):
+        found = added_forces(name, {"command": -1.0}, state(u, 0.0, 0.0))
+        np.testing.assert_allclose(found, [0.0, -whole * left, -side * 0.42 * L * whole * left], rtol=1e-6, atol=1e-3)
+
+
+def test_tugs_without_places_are_forward_and_aft_by_turns() -> None:
+    for tug in (1, 2, 3, 4):
+        given = {"force_1_N": 0.0, "direction_1_deg": 0.0, f"force_{tug}_N": 1e5, f"direction_{tug}_deg": 90.0}
+        found = added_forces("tugs", given, state(0.5, 0.0, 0.0))
+        place = 0.45 * L * (1 if tug % 2 else -1)
+        np.testing.assert_allclose(found, [0.0, 1e5, place * 1e5], rtol=1e-6, atol=1e-3)
 
 
 def test_thrusters_turn_a_stopped_ship_on_the_spot() -> None:

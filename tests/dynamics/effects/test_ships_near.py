@@ -309,6 +309,24 @@ def test_clearance_is_the_least_distance_of_the_centre_lines_less_half_of_both_b
         assert found + (B + 15.0) / 2 == pytest.approx(least, abs=0.03)
 
 
+def test_another_ship_of_which_nothing_is_said_has_the_own_sizes() -> None:
+    own = {"length_m": L, "beam_m": B, "draught_m": T, "block_coefficient": CB}
+    at = state(6.0, 0.2, 0.003)
+    plain, same, larger = (
+        values(ship({"other_ship": {**NEAR, **more}}), list(FORCES), at)
+        for more in ({}, own, {**own, "beam_m": 1.2 * B})
+    )
+    np.testing.assert_allclose(plain, same, rtol=1e-12)
+    assert abs(larger[1] / plain[1]) > 1.1
+
+
+@pytest.mark.parametrize(("beams", "expected"), [(2.05, 1.0), (1.5, 0.5), (1.0, 0.0)])
+def test_validity_is_half_where_the_sides_are_half_a_beam_apart(beams: float, expected: float) -> None:
+    given = other(0.0, beams * B, 0.0, 6.0)
+    found = seen(("validity_by.other_ship",), given, state(U0, 0.0, 0.0))[0]
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
 def test_validity_falls_near_and_with_the_depth_froude_number_of_the_other_ship() -> None:
     def validity(starboard: float, speed: float = 6.0, depth: float | None = None) -> float:
         given = other(0.0, starboard, 0.0, speed)

@@ -227,13 +227,16 @@ def test_waves_from_port_do_the_same_mirrored() -> None:
 
 
 def test_the_pose_is_that_of_the_manoeuvre_with_the_motions_on_top() -> None:
-    text = table({"surge": lambda w, b: 1j * np.cos(b), "sway": lambda w, b: 0.5j * np.sin(b), **FLAT})
+    yaw = {"yaw": lambda w, b: 0.02j * np.sin(2 * b)}
+    text = table({"surge": lambda w, b: 1j * np.cos(b), "sway": lambda w, b: 0.5j * np.sin(b), **FLAT, **yaw})
     at = {**state(5.0, 0.0, 0.0), "motion.x": 30.0, "motion.y": 40.0, "motion.psi": 0.6, "waves.clock": 3.0}
     model = sea_ship(text)
-    surge, sway, heave, roll = values(model, ["waves.surge", "waves.sway", "waves.heave", "waves.roll"], at)
-    x, y, z, phi, psi = values(model, ["pose.x", "pose.y", "pose.z", "pose.phi", "pose.psi"], at)
+    moved = [f"waves.{motion}" for motion in ("surge", "sway", "heave", "roll", "pitch", "yaw")]
+    surge, sway, heave, roll, pitch, turned = values(model, moved, at)
+    pose = values(model, [f"pose.{name}" for name in ("x", "y", "z", "phi", "theta", "psi")], at)
     north, east = surge * np.cos(0.6) - sway * np.sin(0.6), surge * np.sin(0.6) + sway * np.cos(0.6)
-    np.testing.assert_allclose([x, y, z, phi, psi], [30 + north, 40 + east, heave, roll, 0.6], rtol=1e-12)
+    np.testing.assert_allclose(pose, [30 + north, 40 + east, heave, roll, pitch, 0.6 + turned], rtol=1e-12)
+    assert min(abs(north), abs(east), abs(heave), abs(roll), abs(pitch), abs(turned)) > 1e-4
 
 
 def test_a_sea_outside_the_frequencies_of_the_table_takes_the_validity() -> None:
@@ -248,6 +251,26 @@ def test_a_sea_outside_the_frequencies_of_the_table_takes_the_validity() -> None
     )
     np.testing.assert_array_equal([inside[0], calm[0]], 1.0)
     assert outside[0] == outside[1] == 0.0
+
+
+@pytest.mark.parametrize("height", [0.5, 6.0])
+def test_validity_is_half_where_a_quarter_less_of_the_sea_than_asked_lies_in_the_table(height: float) -> None:
+    """Of a Bretschneider sea the share exp(-5/4 (wp/w)^4) lies below w: the table that ends at w has 65 % of it."""
+    peak = 2 * np.pi / SEA["period_s"]
+    end = peak * (5 / 4 / np.log(1 / 0.65)) ** 0.25
+    model = sea_ship(table(FLAT, at=np.linspace(0.1, end, 30)), height_m=height)
+    assert values(model, ["validity_by.waves"], REST)[0] == pytest.approx(0.5, abs=0.06)
+    more = sea_ship(table(FLAT, at=np.linspace(0.1, peak * (5 / 4 / np.log(1 / 0.92)) ** 0.25, 30)), height_m=height)
+    assert values(more, ["validity_by.waves"], REST)[0] == 1.0
+
+
+@pytest.mark.parametrize("psi_deg", [40.0, -50.0, 200.0])
+def test_validity_is_half_at_a_speed_of_a_third_of_the_waves(psi_deg: float) -> None:
+    """wp U/g = 0.15 + 0.35/2, whatever the direction: half way between what the formula holds for and 0.5."""
+    speed = 0.325 * G * SEA["period_s"] / (2 * np.pi)
+    drift = 0.2
+    at = {**state(speed * np.cos(drift), speed * np.sin(drift), 0.0), "motion.psi": np.radians(psi_deg)}
+    assert values(sea_ship(table(FLAT)), ["validity_by.wave_speed"], at)[0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_card_without_a_table_is_refused_in_one_line() -> None:

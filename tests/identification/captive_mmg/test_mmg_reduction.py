@@ -256,6 +256,37 @@ def test_sizes_and_units_that_no_ship_has_are_refused_by_their_keys(tmp_path, ol
         t2s.reduce_to_mmg(path)
 
 
+def test_what_a_fit_says_of_its_coefficients_follows_from_their_errors(tmp_path) -> None:
+    fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
+    assert fit.open == fit.at_limit == ()
+    a_H, x_H = (fit.names.index(name) for name in ("a_H", "x_H"))
+    arm, error = fit.yaw_arm()
+    assert arm == pytest.approx(-0.5 + fit.values[a_H] * fit.values[x_H])
+    block = fit.covariance[np.ix_([a_H, x_H], [a_H, x_H])]
+    drawn = np.random.default_rng(1).multivariate_normal(fit.values[[a_H, x_H]], 1e-4 * block, 20_000)
+    assert 1e-2 * error == pytest.approx(np.std(drawn[:, 0] * drawn[:, 1]), rel=0.03)
+    assert fit.in_errors("k_0") == pytest.approx(abs(fit.value("k_0")) / fit.random[fit.names.index("k_0")])
+    assert fit.value("Nothing") == 0.0
+    for name, value, at_limit in (
+        ("eps", 2.9995, True),
+        ("eps", 2.99, False),
+        ("C_1", 0.01, True),
+        ("C_1", 0.1, False),
+    ):
+        values = fit.values.copy()
+        values[fit.names.index(name)] = value
+        assert replace(fit, values=values).at_limit == ((name,) if at_limit else ())
+    for share, is_open in ((0.69, False), (0.71, True)):
+        random = fit.random.copy()
+        random[fit.names.index("kappa")] = share * ORDINARY["kappa"][1]
+        assert replace(fit, random=random).open == (("kappa",) if is_open else ())
+
+
+def test_ordinary_ships_enclose_the_kvlcc2_within_about_a_deviation() -> None:
+    apart = {name: abs(KVLCC2[name] - mean) / spread for name, (mean, spread) in ORDINARY.items()}
+    assert set(ORDINARY) == set(KVLCC2) & set(ORDINARY) and max(apart.values()) <= 0.5
+
+
 def test_a_hull_whose_derivatives_no_ship_has_marks_the_result(tmp_path) -> None:
     fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
     for name, value in (("Nr", 0.03), ("Nr", -0.5), ("Nr", -0.005), ("Nv", 0.1), ("l_R", 0.5), ("t_P", 0.75)):
@@ -318,6 +349,15 @@ def test_runs_with_a_history_give_the_coefficients_of_their_means(tmp_path, on_m
     assert by_runs.names == by_rows.names
     np.testing.assert_allclose(by_runs.values, by_rows.values, rtol=1e-3, atol=1e-5)
     np.testing.assert_allclose(by_runs.errors, by_rows.errors, rtol=1e-2)
+
+
+@pytest.mark.parametrize("on_model", [False, True])
+def test_means_of_runs_with_a_history_are_the_rows_of_a_table(tmp_path, on_model) -> None:
+    by_rows = read_steady_tests(write_campaign(tmp_path, KVLCC2, seed=4))
+    by_runs = read_steady_tests(as_runs(tmp_path, on_model=on_model))
+    np.testing.assert_allclose(by_runs.motion, by_rows.motion, rtol=1e-6, atol=1e-6)
+    for place, values in enumerate(by_rows.readings.T):
+        np.testing.assert_allclose(by_runs.readings[:, place], values, rtol=1e-3, atol=0.01 * np.std(values))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import read_card
-from tank2sim.identification.trials.assessment.other_ship import far_from_card, other_ship
+from tank2sim.identification.trials.assessment.other_ship import (
+    RudderEffect,
+    _beyond,
+    _mean,
+    far_from_card,
+    other_ship,
+)
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
@@ -96,3 +102,58 @@ def test_a_mariner_is_no_tanker_in_any_structure(data: Path) -> None:
         assert other_ship(
             problem_from_card(STRUCTURES[name].start(read_card("kvlcc2-captive")), trials.trials, trials.driven_by)
         )
+
+
+def effect(measured: float, error: float = 0.0, modelled: float = 1.0, its_error: float = 0.0) -> RudderEffect:
+    return RudderEffect(measured, modelled, np.diag([error, its_error]) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("measured", "error", "words"),
+    [
+        (2.4, 0.0, ""),  # less 2 is 0.4, and errors of 10 % of the larger coefficient are 0.24
+        (2.6, 0.0, "more than 2 times"),
+        (2.6, 0.2, ""),
+        (0.45, 0.0, ""),  # less 1/2 is -0.05, its error 0.05
+        (0.38, 0.0, "less than 0.5 times"),
+        (0.38, 0.06, ""),
+        (0.02, 0.03, "less than 0.5 times"),
+        (-0.05, 0.03, "less than 0.5 times"),  # by chance of the other sign
+        (-0.5, 0.03, "to the other side"),
+        (-3.0, 0.03, "to the other side"),
+    ],
+)
+def test_a_rudder_is_another_ships_by_its_size_beyond_two_errors_of_both(measured, error, words) -> None:
+    """Of a card's 1: the difference to twice and half of it, over the errors of scatter and of any model, 10 %."""
+    found = _beyond("a", [effect(measured, error)], 2.0)
+    assert (words in found) if words else found == ""
+
+
+def test_a_card_whose_rudder_turns_to_the_other_side_is_compared_by_size_too() -> None:
+    assert effect(-2.0, 0.0, -1.0).less(2.0) == (0.0, pytest.approx(0.2))
+    assert effect(3.0, 0.3, 1.0, 0.2).less(2.0) == (1.0, pytest.approx(np.hypot(np.hypot(0.3, 0.4), 0.3)))
+
+
+@pytest.mark.parametrize(("error", "determined"), [(0.24, True), (0.26, False)])
+@pytest.mark.parametrize("modelled", [1.0, -1.0])
+def test_a_trial_shows_the_rudder_where_the_cards_own_part_is_known_to_a_quarter(error, determined, modelled) -> None:
+    assert effect(1.0, 0.0, modelled, error).determined == determined
+
+
+def test_means_of_trials_have_the_errors_of_their_scatter_if_that_is_larger() -> None:
+    assert _mean([(1.0, 0.1), (2.0, 0.1)]) == (pytest.approx(1.5), pytest.approx(0.5))  # Birge: as they differ
+    assert _mean([(1.0, 0.5), (1.1, 0.5)]) == (pytest.approx(1.05), pytest.approx(0.5 / np.sqrt(2)))
+    assert _mean([(1.0, 0.1), (2.0, 0.2)])[0] == pytest.approx(1.2)
+    assert _mean([(1.0, 0.1)]) == (1.0, pytest.approx(0.1))
+
+
+@pytest.mark.parametrize(("times", "far"), [(19.0, False), (21.0, True)])
+@pytest.mark.parametrize("letter", ["Y", "N"])
+def test_an_estimate_is_far_from_a_card_at_a_difference_of_twice_its_coefficients(letter, times, far) -> None:
+    """Errors of 10 % of its coefficients, widened by so many times, next to errors of 1 % of the other equation."""
+    known = problem([trial(zigzag(20), name="own")])
+    shares = [0.1 if name.startswith(f"derivatives.{letter}") else 0.01 for name in known.free]
+    known = replace(known, prior_error=np.array(shares) * np.abs(known.prior_mean))
+    other = {"Y": "N", "N": "Y"}[letter]
+    found = replace(equation_error(known), prior_scale={letter: times, other: 1.0})
+    assert bool(far_from_card(known, found)) == far
