@@ -37,6 +37,8 @@ OTHER_MEANINGS = {
     '"current": _current(result)': "key of the JSON of identify: the current found with the coefficients",
     '"wind" if true else': "part of the name of a quantity of a log",
     'quantity.startswith("wind")': "the same",
+    'startswith(("wind", "current"))': "beginnings of the names of columns",
+    'in ("max", "current")': "names of files of the system",
     '"bank": "Polygon"': "kind of a feature of a scenario",
     '"bank": {}': "the same",
     'document.pop("waves"': "section of a card",
