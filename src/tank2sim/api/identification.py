@@ -149,7 +149,9 @@ class IdentificationResult(Result):
         """Estimates, errors of the yaw rate, figures; bootstrap and cross-validation where asked for."""
         found = self.identification
         estimate = found.estimate
-        title = f"{found.card.ship.name}: {len(estimate.free)} coefficients from {len(found.problem.runs)} trials"
+        count = len({run.name.partition(" at ")[0] for run in found.problem.runs})
+        trials = f"{count} trial{'s' * (count > 1)}"
+        title = f"{found.card.ship.name}: {len(estimate.free)} coefficients from {trials}"
         tables = [ResultTable(title, ("", "found", "before", "from trials"), estimate_rows(self._found))]
         if found.posterior is not None:
             heads = ("", "95 %", "R-hat", "effective size")

@@ -114,9 +114,9 @@ class ShipDimensions:
             if not low <= value <= high:
                 problem = f"is {value:g} {units[name]}".rstrip()
                 raise InputError(f"--{name}", "", problem, f"ships have {low:g} to {high:g} {units[name]}".rstrip())
-        if not 3.0 <= self.length_m / self.beam_m <= 12.0:
+        if not 2.2 <= self.length_m / self.beam_m <= 12.0:  # harbour tugs have 2.6
             problem = f"is 1/{self.length_m / self.beam_m:.3g} of the length"
-            raise InputError("--beam", "", problem, "ships have 1/12 to 1/3: give metres")
+            raise InputError("--beam", "", problem, "ships have 1/12 to 1/2.2: give metres")
         if not 1.5 <= self.beam_m / self.draught_m <= 8.0:
             problem = f"is 1/{self.beam_m / self.draught_m:.3g} of the beam"
             raise InputError("--draught", "", problem, "ships have 1/8 to 1/1.5: give metres")
