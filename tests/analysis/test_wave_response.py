@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.analysis.wave_response import HullInWaves, _frequencies, _inertia
 from tank2sim.cards import parse_card
 from tank2sim.cards.wave_table import WaveTable, wave_table
 from tank2sim.errors import InputError
@@ -77,6 +79,29 @@ def test_a_hull_alike_fore_and_aft_is_pushed_and_turned_alike(answer: WaveTable)
     np.testing.assert_allclose(Y[::-1], Y, atol=0.05 * np.max(np.abs(Y)))
     np.testing.assert_allclose(N[::-1], -N, atol=0.05 * np.max(np.abs(N)))
     assert abs(N[1]) > 10 * abs(N[2])
+
+
+@pytest.mark.parametrize(("mesh", "shortest"), [(1.0, 20.0), (30.0, 30.0)])
+def test_frequencies_are_of_waves_from_twelve_lengths_to_an_eighth_or_what_the_mesh_shows(mesh, shortest) -> None:
+    body = SimpleNamespace(minimal_computable_wavelength=mesh)
+    found = _frequencies(body, HullInWaves(3.0, 8.0, 40.0), G, 160.0)
+    np.testing.assert_allclose(2 * np.pi * G / found[[0, -1]] ** 2, [12 * 160.0, shortest], rtol=1e-9)
+    assert len(found) == 24 and np.ptp(found[1:] / found[:-1]) < 1e-9
+    given = HullInWaves(3.0, 8.0, 40.0, frequencies_radps=[0.4, 0.9])
+    np.testing.assert_array_equal(_frequencies(body, given, G, 160.0), [0.4, 0.9])
+
+
+def test_the_mass_matrix_has_the_kinetic_energy_of_points() -> None:
+    """About the origin, x forward, y to port, z up: of a body of eight points about its centre at (3, 0, -2)."""
+    radii = np.array([2.0, 5.0, 5.0])
+    squares = (radii @ radii) / 2 - radii**2  # mean squares of x, y and z about the centre that give these radii
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    points = np.array([3.0, 0.0, -2.0]) + corners * np.sqrt(squares)
+    motion = np.array([0.3, -0.7, 0.2, 0.05, -0.02, 0.11])
+    velocities = motion[:3] + np.cross(motion[3:], points)
+    energy = 0.5 * 80.0 * np.mean(np.sum(velocities**2, axis=1))
+    matrix = _inertia(80.0, np.array([3.0, 0.0, -2.0]), HullInWaves(3.0, 2.0, 5.0))
+    assert 0.5 * motion @ matrix @ motion == pytest.approx(energy, rel=1e-12)
 
 
 def with_sea(ship: t2s.Ship, period_s: float) -> t2s.Ship:

@@ -203,6 +203,19 @@ def test_a_thruster_turns_by_its_lag_and_rate_to_orders_within_its_reach(
     assert found == pytest.approx(rate_degps, abs=1e-9)
 
 
+@pytest.mark.parametrize("azimuth_deg", [-30.0, 0.0, 25.0])
+def test_a_thruster_loses_thrust_by_the_speed_along_its_own_direction(azimuth_deg: float) -> None:
+    at = TEXT.index("[[thrusters]]")
+    outboard = (
+        '[[thrusters]]\nname = "stern"\nx_m = -1.0\nahead_Ns2 = 0.02216\nastern_Ns2 = 0.01\nmax_rpm = 990\n'
+        "max_azimuth_deg = 30\nazimuth_time_constant_s = 0.4\nspeed_loss_kg = 0.05\n"
+    )
+    model, a = build(parse_card(f"{TEXT[:at]}{outboard}", "outboard.toml")), math.radians(azimuth_deg)
+    moving = {"motion.u": 1.2, "motion.v": -0.4, "thrusters.stern.azimuth": a, "thrusters.stern.command": 50.0}
+    expected = 0.02216 * 50.0**2 - 0.05 * 50.0 * (1.2 * math.cos(a) - 0.4 * math.sin(a))
+    assert quantity(model, "thrusters.stern.thrust", moving) == pytest.approx(expected, rel=1e-9)
+
+
 def test_the_step_is_a_fifth_of_the_shortest_lag_and_a_two_hundredth_of_a_length() -> None:
     assert build(OTTER).step_s == pytest.approx(0.005)  # 2 m / 1.5 m/s / 200 = 0.0067, to 1, 2, 5 of a power of ten
     lag = ("max_radps = 103.930864", "max_radps = 103.930864\ntime_constant_s = 0.02")

@@ -57,6 +57,8 @@ def test_errors_of_what_is_lacking_are_its_scatter_and_its_times_the_middles() -
     found = missing_signal([motion(seed=seed, bias=5e-4, name=str(seed)) for seed in range(1, 9)])
     assert found is not None
     assert np.std(found.values) == pytest.approx(np.mean(found.errors), rel=0.3)
+    track = missing_signal([motion(seed=seed, current=0.3, name=str(seed)) for seed in range(1, 17)])
+    assert track is not None and np.std(track.values) == pytest.approx(np.mean(track.errors), rel=0.12)
     assert (found.time_s.min(), found.time_s.max()) == (21.0, TIME[-1] - 21.0)
     assert set(found.states) == {"heading", "yaw rate", "speed", "drift"}
     assert np.mean(found.states["drift"]) == pytest.approx(np.arctan2(0.8, 5.0), abs=1e-3)

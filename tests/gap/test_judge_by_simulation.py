@@ -97,6 +97,8 @@ def test_an_effect_that_scores_nearly_as_well_as_none_is_named_if_simulations_ar
     assert decision.best.hypothesis.effects == ((NAMES[0],) if named else ())
     assert decision.verdict == (MISSING if named else NO_EFFECT_MISSING)
     assert found_more.proof.misfit == pytest.approx(closer if named else reached)
+    judged = judge.judge(found, none)
+    assert judged.decision.best.hypothesis.effects == ((NAMES[0],) if named else ()) and judged.withheld == ()
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,14 @@ def test_the_spread_is_of_the_means_over_a_minute() -> None:
     assert found is not None and found.spread_mps < 0.01
 
 
+@pytest.mark.parametrize("half", ["v_north", "v_east", "sog", "cog"])
+def test_half_of_a_velocity_over_the_ground_gives_way_to_the_positions(half: str) -> None:
+    voyage = sailed(TURNING, ground="position")
+    voyage.series[half] = SimpleNamespace(time_s=TIME, values=np.full_like(TIME, 9.0))
+    found = drift_current(voyage, 100.0, 800.0)
+    assert found is not None and found.speed_mps == pytest.approx(SPEED, abs=0.02)
+
+
 def test_what_does_not_determine_a_current_gives_none() -> None:
     for voyage in (sailed(TURNING, ground="none"), sailed(TURNING, heading=True), sailed(TURNING, u_water=True)):
         assert drift_current(voyage, 0.0, 900.0) is None

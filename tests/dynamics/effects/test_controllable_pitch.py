@@ -151,6 +151,21 @@ def test_on_an_mmg_card_the_thrust_and_the_race_on_the_rudder_change() -> None:
         build(parse_card(text + added.replace("}", ", advance_share = 0.6}"), "ship.toml"))
 
 
+@pytest.mark.parametrize("share", [0.01, 0.03, -0.5])
+def test_on_an_mmg_card_J_is_held_below_two_percent_of_the_revolutions(share: float) -> None:
+    text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
+    added = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
+    model, bare = (build(parse_card(one, "ship.toml")) for one in (text + added, text))
+    nominal, D, u = 11.8516, 0.216, 0.03
+    at = {"motion.u": u, "propeller.speed": 2 * math.pi * share * nominal}
+    found = values(model, ["propeller.thrust"], {**at, "propeller.pitch_actual": 1.0})
+    without = values(bare, ["propeller.thrust"], at)
+    J = 0.6 * u / (max(share, 0.02) * nominal * D)
+    assert J < 1.6
+    change = 1000.0 * (max(share, 0.0) * nominal) ** 2 * D**4 * (at_pitch(J, 1.0) - at_pitch(J, 0.72))
+    assert found[0] - without[0] == pytest.approx(change, rel=1e-4, abs=1e-9)
+
+
 def test_torque_and_thrust_of_the_series_have_the_efficiency_of_good_propellers() -> None:
     """One of P/D = 1 has its best in open water near 0.7."""
     efficiency = [

@@ -80,3 +80,11 @@ def test_a_card_beyond_the_range_is_refused_and_at_its_end_taken(name: str) -> N
         build(card_with({name: {**TYPICAL[name], key: end}}))
         with pytest.raises(InputError, match=key.partition("_")[0]):
             build(card_with({name: {**TYPICAL[name], key: end + out * 1e-3 * abs(end)}}))
+
+
+def test_what_is_ordered_or_known_from_outside_is_not_sought_on_trials() -> None:
+    known = {
+        "waves", "bank", "bow_tunnel_thruster", "stern_tunnel_thruster", "tugs", "other_ship", "engine_telegraph",
+        "astern_thrust", "propeller_astern", "controllable_pitch",
+    }  # fmt: skip
+    assert {name for name in RANGES if not EFFECTS[name].sought} == known

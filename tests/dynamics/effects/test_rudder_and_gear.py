@@ -230,6 +230,16 @@ def test_the_loaded_rudder_stays_finite_at_rest_and_astern() -> None:
         assert np.isfinite(values(model, ["rudder.X", "rudder.Y", "rudder.N"], state)).all()
 
 
+@pytest.mark.parametrize("turns", [0.0, -1.0])
+def test_the_loaded_rudder_at_rest_has_a_twentieth_of_the_speed_as_its_flow(turns: float) -> None:
+    """Nothing flows over it, or the propeller draws it astern: 1/2 rho L^2 (u0/20)^2 sin(delta) cos(delta) Y_d."""
+    model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.0, "lever": -0.8}})
+    at = {"motion.u": 0.0, "motion.v": 0.0, "motion.r": 0.0, "rudder.angle": 0.3, "propeller.speed": turns * N0}
+    (Y,) = values(model, ["rudder.Y"], at)
+    least = 0.5 * RHO * L**2 * (U0 / 20) ** 2
+    assert pytest.approx(-278e-5 * least * np.sin(0.3) * np.cos(0.3), rel=1e-6) == Y
+
+
 def test_the_slipstream_is_the_loaded_rudder_for_small_losses_of_speed_without_cross_flow() -> None:
     """So one includes the other, and they are not sought together."""
     assert EFFECTS["loaded_rudder"].includes == ("rudder_slipstream",)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -147,6 +148,26 @@ def test_means_of_trials_have_the_errors_of_their_scatter_if_that_is_larger() ->
     assert _mean([(1.0, 0.1)]) == (1.0, pytest.approx(0.1))
 
 
+@pytest.mark.parametrize(("ratio", "far"), [(2.6, False), (2.8, True), (0.3, False), (0.2, True), (-0.5, True)])
+def test_an_estimate_is_far_from_a_card_whose_rudder_is_two_and_a_half_times_as_strong_by_two_errors(
+    ratio, far
+) -> None:
+    """Errors of 8 % of the card's moment: 0.16 either way of 2.5 and 0.4."""
+    known = problem([trial(zigzag(20), name="own")])
+    place, sizes = known.free.index("derivatives.Nd"), np.abs(known.prior_mean)
+    known = replace(known, prior_error=0.05 * sizes)
+    values = known.prior_mean.copy()
+    values[place] *= ratio
+    found = SimpleNamespace(prior_scale={"Y": 1.0, "N": 1.0}, values=values, standard_errors=0.08 * sizes)
+    assert bool(far_from_card(known, found)) == far
+
+
+def test_where_the_cards_own_part_does_not_show_its_derivative_takes_its_place() -> None:
+    at_rest = RudderEffect(3.0, 0.2, np.array([[0.04, 0.01], [0.01, 0.09]])).of_card_at_rest
+    assert (at_rest.measured, at_rest.modelled) == (3.0, 1.0)
+    np.testing.assert_array_equal(at_rest.covariance, [[0.04, 0.0], [0.0, 0.0]])
+
+
 @pytest.mark.parametrize(("times", "far"), [(19.0, False), (21.0, True)])
 @pytest.mark.parametrize("letter", ["Y", "N"])
 def test_an_estimate_is_far_from_a_card_at_a_difference_of_twice_its_coefficients(letter, times, far) -> None:
@@ -155,5 +176,5 @@ def test_an_estimate_is_far_from_a_card_at_a_difference_of_twice_its_coefficient
     shares = [0.1 if name.startswith(f"derivatives.{letter}") else 0.01 for name in known.free]
     known = replace(known, prior_error=np.array(shares) * np.abs(known.prior_mean))
     other = {"Y": "N", "N": "Y"}[letter]
-    found = replace(equation_error(known), prior_scale={letter: times, other: 1.0})
+    found = SimpleNamespace(prior_scale={letter: times, other: 1.0}, values=known.prior_mean, standard_errors=shares)
     assert bool(far_from_card(known, found)) == far
