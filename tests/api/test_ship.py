@@ -139,6 +139,13 @@ def test_a_state_that_comes_to_no_rest_is_not_left_out() -> None:
     assert refusal.value.place == "motion.flap" and "motion.r" in refusal.value.remedy
 
 
+@pytest.mark.parametrize("argument", ["inputs", "outputs"])
+def test_an_unknown_variable_of_a_state_space_is_refused_with_its_argument(ship, argument: str) -> None:
+    with pytest.raises(t2s.InputError) as refusal:
+        ship.state_space(**{argument: ["motion.yaw_rte"]})
+    assert (refusal.value.source, refusal.value.place) == (argument, "motion.yaw_rte")
+
+
 def test_the_criteria_of_imo_are_a_table(ship) -> None:
     imo = ship.stability(spirals=False).imo
     row = imo.loc["tactical diameter"]

@@ -428,11 +428,11 @@ class Ship:
         model = self.model
         point = straight_course(model, speed_mps)
         kept, given, shown = (None if names is None else list(names) for names in (states, inputs, outputs))
-        for argument, names in (("states", kept), ("inputs", given), ("outputs", shown)):
+        known = (*model.state_names, *model.input_names, *model.outputs)
+        for argument, names in (("inputs", given), ("outputs", shown)):
             for name in names or ():
                 if name not in model:
-                    known = (*model.state_names, *model.input_names, *model.outputs)
-                    raise InputError(argument, "", f"{name!r} is not a variable of the model", close_name(name, known))
+                    raise InputError(argument, name, "is not a variable of the model", close_name(name, known))
         settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
