@@ -45,7 +45,7 @@ def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
     turns = round(-ahead_s / _ROLLOVER_S)
     rest = ahead_s + turns * _ROLLOVER_S
     if turns and abs(rest) < _DAY_S:
-        text = f"the receiver's date is {1024 * abs(turns)} weeks off that of the recorder, which is taken"
+        text = f"the receiver's date is {1024 * abs(turns)} weeks off the date of the recorder, which is taken"
         return turns * _ROLLOVER_S, [LogFinding("note", text, evidence={"weeks": 1024 * turns})]
     if abs(ahead_s) > _DAY_S:
         text = f"the recorder's clock is {abs(ahead_s) / _DAY_S:.4g} days off that of the receiver, which is taken"

@@ -162,9 +162,9 @@ class RudderEffect:
     Parameters
     ----------
     measured, modelled : float
-        Of the measured accelerations and of those of the card's model along the same motion.
+        Coefficients of the measured accelerations and of the accelerations of the card along the same motion.
     covariance : array (2, 2)
-        Of the two.
+        Covariance of the two coefficients.
     """
 
     measured: float
