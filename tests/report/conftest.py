@@ -3,7 +3,7 @@ import json
 import pytest
 from altair.utils.schemapi import SchemaBase
 
-from tank2sim.report.kit import charts as kit_charts
+from tank2sim.answer.charts import picture as kit_charts
 from tests.report.example import every_chart, example_page
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tank2sim.report.kit.charts import (
+from tank2sim.answer.charts.picture import (
     FrequencyResponse,
     History,
     OutputError,
@@ -19,7 +19,8 @@ from tank2sim.report.kit.charts import (
     tow_chart,
     track_chart,
 )
-from tank2sim.report.kit.page import Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 
 TIME = np.arange(0.0, 600.0, 0.1)
 HEADING = 0.01 * TIME
@@ -60,13 +61,13 @@ def example_page(title: str = "Mariner class") -> Page:
             KeyFigure(label="Tactical diameter", value=561.24, unit="m", verdict=Verdict.PASSED, note="3.5 lengths")
         ],
         sections=[
-            PageSection(
+            Section(
                 heading="Turning circle",
                 text="First paragraph.\n\nSecond paragraph.",
                 notes=["Outside the valid speeds."],
-                tables=[PageTable(caption="Figures of the circle.", columns=columns, rows=rows)],
+                tables=[Table(caption="Figures of the circle.", columns=columns, rows=rows)],
             ),
-            PageSection(
+            Section(
                 heading="Charts",
                 charts=[
                     Illustration(chart=chart, caption=f"Caption of {name}.") for name, chart in every_chart().items()

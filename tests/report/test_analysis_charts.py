@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.report.kit.charts import (
+from tank2sim.answer.charts.picture import (
     FrequencyResponse,
     OutputError,
     PolesZeros,

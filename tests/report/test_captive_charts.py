@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tank2sim.answer.charts.picture import chart_png, chart_specification
 from tank2sim.report.captive.charts import (
     Across,
     ForceLoop,
@@ -12,7 +13,6 @@ from tank2sim.report.captive.charts import (
     loop_chart,
     residual_chart,
 )
-from tank2sim.report.kit.charts import chart_png, chart_specification
 
 DRIFT = Across(title="drift angle", unit="rad")
 

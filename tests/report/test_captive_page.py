@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tank2sim as t2s
-from tank2sim.report.kit.page import render_page
+from tank2sim.answer.page import render_page
 
 
 @pytest.mark.slow

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tank2sim.report.kit.charts import VEGALITE_VERSION, TrackData, chart_png, chart_specification, track_chart
-from tank2sim.report.kit.theme import DARK_TONE, LIGHT_PALETTE, LIGHT_TONE
+from tank2sim.answer.charts.picture import VEGALITE_VERSION, TrackData, chart_png, chart_specification, track_chart
+from tank2sim.answer.charts.theme import DARK_TONE, LIGHT_PALETTE, LIGHT_TONE
 from tests.report.example import every_chart
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 from tank2sim.analysis.validation.comparison import compare_cards
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.page import render_page
 from tank2sim.files import json_text, plain_json
 from tank2sim.report.comparison.page import compare_page
-from tank2sim.report.kit.charts import chart_specification
-from tank2sim.report.kit.page import render_page
 from tank2sim.report.results.page import result_page
 
 

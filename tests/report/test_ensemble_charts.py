@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from tank2sim.analysis.ensemble.steering import FROM_PORT, FROM_STARBOARD, MAGNITUDE, PHASE, STEP, Grid, SteeringBands
+from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.files import plain_json
 from tank2sim.report.ensemble.charts import curve_charts, turns_chart
-from tank2sim.report.kit.charts import chart_specification
 from tank2sim.simulation.bands import Band, BandOverTime
 
 X = np.linspace(-0.6, 0.6, 13)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.glide.study import GlideQuestion, study
+from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.files import plain_json
 from tank2sim.report.glide.charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
 from tank2sim.report.glide.page import glide_page
-from tank2sim.report.kit.charts import chart_specification
 from tank2sim.simulation.glide_programme import read_programme
 
 PROBE = read_card("kulikovsky-velikanov")

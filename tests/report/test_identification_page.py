@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.page import render_page
+from tank2sim.answer.parts import Verdict
 from tank2sim.api.identification import IdentificationResult
 from tank2sim.cards import parse_card
 from tank2sim.cli.identify import command
@@ -25,8 +28,6 @@ from tank2sim.records.trials import Trial
 from tank2sim.report.identification import page as identification_page_module
 from tank2sim.report.identification.charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
 from tank2sim.report.identification.page import MOST_TRIALS, identification_charts, identification_page
-from tank2sim.report.kit.charts import chart_specification
-from tank2sim.report.kit.page import Verdict, render_page
 from tank2sim.report.results.page import result_page
 from tests.identification.trials import made_up_ship
 

@@ -8,11 +8,11 @@ from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import Means
 from tank2sim.analysis.tuning.targets import parse_target
 from tank2sim.analysis.tuning.tune import tune
+from tank2sim.answer.page import render_page
 from tank2sim.cards import read_card
 from tank2sim.files import plain_json
 from tank2sim.report.influence.charts import InfluenceData, influence_charts, most_influential
 from tank2sim.report.influence.page import influence_page
-from tank2sim.report.kit.page import render_page
 
 TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degpmin@20", "K_per_s", "T_prime")
 

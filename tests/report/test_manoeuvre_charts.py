@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.files import json_text
-from tank2sim.report.kit.charts import SpiralData, chart_specification, spiral_chart
-from tank2sim.report.kit.manoeuvre_charts import (
+from tank2sim.answer.charts.manoeuvre import (
     hull_rows,
     motion_of,
     overshoot_marks,
@@ -19,7 +17,10 @@ from tank2sim.report.kit.manoeuvre_charts import (
     turn_dimensions,
     zigzag_chart,
 )
-from tank2sim.report.kit.page import Verdict, render_page
+from tank2sim.answer.charts.picture import SpiralData, chart_specification, spiral_chart
+from tank2sim.answer.page import render_page
+from tank2sim.answer.parts import Verdict
+from tank2sim.files import json_text
 from tank2sim.report.results.page import result_page
 
 RADIUS, LENGTH, BEAM = 300.0, 100.0, 15.0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tank2sim.report.kit.charts import (
+from tank2sim.answer.charts.picture import (
     History,
     Signal,
     SpiralData,

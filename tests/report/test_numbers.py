@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.report.kit.numbers import format_column, format_number, is_number_text, without_exponents
+from tank2sim.answer.numbers import format_column, format_number, is_number_text, without_exponents
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.report.kit.charts import TrackData, track_chart
-from tank2sim.report.kit.page import Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict, render_page
+from tank2sim.answer.charts.picture import TrackData, track_chart
+from tank2sim.answer.page import Page, render_page
+from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 from tests.report.example import example_page
 
 NASTY = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\" ' & <!-- {{ 7*7 }}"
@@ -78,7 +79,7 @@ def test_the_page_is_the_same_in_every_process(html):
     code = (
         "import hashlib\n"
         "from tests.report.example import example_page\n"
-        "from tank2sim.report.kit.page import render_page\n"
+        "from tank2sim.answer.parts import render_page\n"
         "print(hashlib.sha256(render_page(example_page()).encode()).hexdigest())"
     )
     command, root = [sys.executable, "-c", code], Path(__file__).parents[2]
@@ -146,11 +147,11 @@ def test_nothing_a_card_says_becomes_markup():
         subtitle=NASTY,
         figures=[KeyFigure(label=NASTY, value=NASTY, unit=NASTY, note=NASTY)],
         sections=[
-            PageSection(
+            Section(
                 heading=NASTY,
                 text=NASTY,
                 notes=[NASTY],
-                tables=[PageTable(caption=NASTY, columns=[Column(title=NASTY, unit=NASTY)], rows=[[NASTY]])],
+                tables=[Table(caption=NASTY, columns=[Column(title=NASTY, unit=NASTY)], rows=[[NASTY]])],
                 charts=[Illustration(chart=chart, caption=NASTY)],
             )
         ]
@@ -168,28 +169,26 @@ def test_nothing_a_card_says_becomes_markup():
 
 
 def test_the_page_stays_below_6_mb_with_twenty_charts_of_long_runs(charts):
-    section = PageSection(
+    section = Section(
         heading="Many", charts=[Illustration(chart=charts["track"]), Illustration(chart=charts["history"])] * 10
     )
     assert len(render_page(Page(title="Long", sections=[section])).encode()) < 6e6
 
 
 def test_a_page_without_charts_carries_no_library():
-    html = render_page(Page(title="Tables alone", sections=[PageSection(heading="One", text="Text.")]))
+    html = render_page(Page(title="Tables alone", sections=[Section(heading="One", text="Text.")]))
     assert len(html) < 30_000
     assert "<script" not in html
 
 
 def test_a_row_that_does_not_fit_its_table_is_refused():
     with pytest.raises(ValueError, match="1 cells in a row of 2 columns"):
-        PageTable(caption="Figures", columns=[Column(title="a"), Column(title="b")], rows=[[1.0]])
+        Table(caption="Figures", columns=[Column(title="a"), Column(title="b")], rows=[[1.0]])
 
 
 def test_truth_values_and_missing_ones_are_words():
-    table = PageTable(
-        caption="Checks", columns=[Column(title="valid"), Column(title="n")], rows=[[True, 1], [False, None]]
-    )
-    reader = Reader(render_page(Page(title="t", sections=[PageSection(heading="s", tables=[table])])))
+    table = Table(caption="Checks", columns=[Column(title="valid"), Column(title="n")], rows=[[True, 1], [False, None]])
+    reader = Reader(render_page(Page(title="t", sections=[Section(heading="s", tables=[table])])))
     assert reader.words("tbody").split() == ["yes", "1", "no", "–"]
 
 
@@ -204,12 +203,12 @@ def test_cards_leave_few_gaps_in_their_last_row(count, across):
 
 
 def one_section(**content):
-    return Reader(render_page(Page(title="T", sections=[PageSection(heading="H", **content)])))
+    return Reader(render_page(Page(title="T", sections=[Section(heading="H", **content)])))
 
 
 @pytest.mark.parametrize(("rows", "folded", "details"), [(10, None, 0), (11, None, 1), (11, False, 0), (1, True, 1)])
 def test_a_long_table_is_folded_unless_it_says_otherwise(rows, folded, details):
-    table = PageTable(caption="Long", columns=[Column(title="a")], rows=[[1.0]] * rows, folded=folded)
+    table = Table(caption="Long", columns=[Column(title="a")], rows=[[1.0]] * rows, folded=folded)
     reader = one_section(tables=[table])
     assert len(reader.all("details")) == details
     assert "Long" in reader.words("summary" if details else "caption")

@@ -7,9 +7,10 @@ from html import escape, unescape
 import altair as alt
 import pytest
 
-from tank2sim.report.kit.chart_parts import STACKS
-from tank2sim.report.kit.charts import TrackData, track_chart
-from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
+from tank2sim.answer.charts.parts import STACKS
+from tank2sim.answer.charts.picture import TrackData, track_chart
+from tank2sim.answer.page import Page, render_page
+from tank2sim.answer.parts import Illustration, Section
 from tests.report.opened_page import CHROMIUM, opened
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
@@ -59,7 +60,7 @@ def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path
 
 def wheel_over(chart, folder, *flags):
     """What a chart shows at first, after the wheel alone, and after the wheel with Ctrl."""
-    html = render_page(Page(title="Wheel", sections=[PageSection(heading="Chart", charts=[Illustration(chart=chart)])]))
+    html = render_page(Page(title="Wheel", sections=[Section(heading="Chart", charts=[Illustration(chart=chart)])]))
     place = html.rindex('<script>\n"use strict"')
     html = html[:place] + KEEP_VIEWS + html[place:].replace("</body>", TURN_WHEEL + "</body>")
     seen, console = opened(html, folder, *flags)
@@ -93,7 +94,7 @@ def test_a_name_that_is_a_script_is_not_run(tmp_path):
         [TrackData(label=name, x_m=[0, 1], y_m=[0, 1]), TrackData(label="b", x_m=[0, 1], y_m=[0, 1])], title=name
     )
     page = Page(
-        title=name, sections=[PageSection(heading=name, text=name, charts=[Illustration(chart=chart, caption=name)])]
+        title=name, sections=[Section(heading=name, text=name, charts=[Illustration(chart=chart, caption=name)])]
     )
     seen, console = opened(render_page(page), tmp_path)
     assert console == []
@@ -117,7 +118,7 @@ measure();
 @pytest.mark.slow
 def test_charts_fit_a_window_of_400_px_at_the_size_of_their_letters(charts, tmp_path):
     shown = [Illustration(chart=charts[name]) for name in ("track", "history", "bode")]
-    inner = render_page(Page(title="Narrow", sections=[PageSection(heading="Charts", charts=shown)]))
+    inner = render_page(Page(title="Narrow", sections=[Section(heading="Charts", charts=shown)]))
     html = f'<body><iframe width="400" height="800" srcdoc="{escape(inner)}"></iframe>{MEASURE}</body>'
     seen, _ = opened(html, tmp_path)
     found = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
@@ -160,8 +161,8 @@ def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_
         alt.vconcat(kinds.properties(width=300).facet(column="k:N"), usermeta=STACKS),
     ]
     sections = [
-        PageSection(heading="First", charts=[half, half, *(Illustration(chart=grid) for grid in grids)]),
-        PageSection(heading="Folded", charts=[Illustration(chart=charts["history"])], folded=True),
+        Section(heading="First", charts=[half, half, *(Illustration(chart=grid) for grid in grids)]),
+        Section(heading="Folded", charts=[Illustration(chart=charts["history"])], folded=True),
     ]
     inner = escape(render_page(Page(title="Places", verdict="It fits.", sections=sections)))
     frames = (f'<iframe width="{width}" height="800" srcdoc="{inner}"></iframe>' for width in (1300, 400))

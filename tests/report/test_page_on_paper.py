@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.report.kit.page import Column, Page, PageSection, PageTable, render_page
+from tank2sim.answer.page import Page, render_page
+from tank2sim.answer.parts import Column, Section, Table
 from tests.report.opened_page import CHROMIUM
 
 PRINT = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --no-pdf-header-footer".split()
 
 
-def printed(sections: list[PageSection], folder: Path, *how: str) -> str:
+def printed(sections: list[Section], folder: Path, *how: str) -> str:
     """The text of the sheets on which a page of sections is printed, as pdftotext reads it."""
     (folder / "page.html").write_text(render_page(Page(title="Print", sections=sections)), encoding="utf-8")
     out = folder / "page.pdf"
@@ -31,8 +32,8 @@ def printed(sections: list[PageSection], folder: Path, *how: str) -> str:
 def test_no_column_of_a_wide_table_falls_off_the_sheet(count: int, tmp_path: Path) -> None:
     columns = [Column(title=f"standard error of the quantity{place}x", unit="kg m²") for place in range(count)]
     rows = [[1000.0 + 13 * row + place for place in range(count)] for row in range(6)]
-    table = PageTable(caption="wide", columns=columns, rows=rows)
-    boxes = printed([PageSection(heading="Part", tables=[table])], tmp_path, "-bbox")
+    table = Table(caption="wide", columns=columns, rows=rows)
+    boxes = printed([Section(heading="Part", tables=[table])], tmp_path, "-bbox")
     sheet = float(re.search(r'<page width="([\d.]+)"', boxes)[1])
     words = re.findall(r'xMin="([\d.]+)" yMin="[\d.]+" xMax="([\d.]+)" yMax="[\d.]+">([^<]*)<', boxes)
     assert max(float(right) for _, right, _ in words) < sheet - 40  # the margin of 15 mm is 42.5 points
@@ -46,16 +47,14 @@ def test_no_column_of_a_wide_table_falls_off_the_sheet(count: int, tmp_path: Pat
 def test_no_table_leaves_its_head_behind_at_the_foot_of_a_sheet(tmp_path) -> None:
     """Tables as far apart as lets the foot of some sheet fall upon each part of one."""
     tables = [
-        PageTable(
+        Table(
             caption=f"caption{place}x",
             columns=[Column(title=f"head{place}x")],
             rows=[[f"row{place}x{row}x"] for row in range(4 if place % 2 else 16)],
         )
         for place in range(24)
     ]
-    sections = [
-        PageSection(heading=f"Part {n}", text="word " * 30 * (n % 5 + 1), tables=[t]) for n, t in enumerate(tables)
-    ]
+    sections = [Section(heading=f"Part {n}", text="word " * 30 * (n % 5 + 1), tables=[t]) for n, t in enumerate(tables)]
     sheets = printed(sections, tmp_path, "-layout")
     for sheet in sheets.split("\f"):
         for place in re.findall(r"caption(\d+)x", sheet):

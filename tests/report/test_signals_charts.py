@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.files import plain_json
 from tank2sim.records.signals.analysis import SignalSettings, analyse
 from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
@@ -8,7 +9,6 @@ from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.correlation import autocorrelation, cross_correlation
 from tank2sim.records.signals.filtering import FilterType, butterworth
 from tank2sim.records.signals.spectra import spectrum, transfer_function
-from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.signals.charts import (
     autocorrelation_chart,
     cross_correlation_chart,

@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.api.signals import FilteredSignal, SignalsResult
 from tank2sim.records.signals.analysis import SignalSettings, analyse
 from tank2sim.records.signals.filtering import savitzky_golay
 from tank2sim.records.signals.requests import parse_filter
 from tank2sim.records.signals.sampling import even_series
-from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.signals.page import signals_charts, signals_page, trial_labels
 from tests.records.signals.made import first_order, nomoto, trial
 

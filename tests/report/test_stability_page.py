@@ -9,11 +9,11 @@ import pytest
 
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
 from tank2sim.analysis.turning.spirals import SpiralPoints
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.page import render_page
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.files import plain_json
-from tank2sim.report.kit.charts import chart_specification
-from tank2sim.report.kit.page import render_page
 from tank2sim.report.stability.charts import (
     DIRECT,
     STABLE,

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare_steering_models
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.parts import Verdict
 from tank2sim.cards.steering_card import SteeringCard, read_steering_card
 from tank2sim.files import plain_json
-from tank2sim.report.kit.charts import chart_specification
-from tank2sim.report.kit.page import Verdict
 from tank2sim.report.steering_card.page import influence_bars, steering_catalogue_page, steering_diagram_chart
 
 

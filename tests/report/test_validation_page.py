@@ -10,9 +10,10 @@ import pytest
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.page import render_page
+from tank2sim.answer.parts import Verdict
 from tank2sim.files import plain_json
-from tank2sim.report.kit.charts import chart_specification
-from tank2sim.report.kit.page import Verdict, render_page
 from tank2sim.report.validation.page import validation_page
 from tests.report.browser import measured_in_browser
 

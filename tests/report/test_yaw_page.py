@@ -2,10 +2,10 @@
 
 import pytest
 
+from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.files import plain_json
 from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
 from tank2sim.records.yaw import read_yaw_record
-from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.yaw.charts import balance_chart, energy_residual_chart, estimates_chart, record_chart
 from tank2sim.report.yaw.page import yaw_page
 from tests.yaw_truth import Truth, record, written

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, ResultTable, section_charts
+from tank2sim.api.result import Result, screen_table, section_charts
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.records import audit as records_audit
 from tank2sim.records.audit import Finding, record_noise
@@ -90,9 +91,9 @@ class AuditResult(Result):
         return (f"{trials}: {' and '.join(counts)} found",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Findings, if there are any, and the trials with their columns and noise."""
-        trials = ResultTable(
+        trials = screen_table(
             "Trials",
             ("trial", "duration (s)", "rows", "step (s)", "findings"),
             [
@@ -111,7 +112,7 @@ class AuditResult(Result):
         rows = [[each.source.stem, each.kind, each.column, each.what, each.likely_truth] for each in self._all_findings]
         if len(self.trials) == 1:
             columns, rows = columns[1:], [row[1:] for row in rows]
-        return ResultTable("Findings", columns, rows), trials
+        return screen_table("Findings", columns, rows), trials
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Track and histories of each record with the places of its findings; records with findings first."""

@@ -14,7 +14,8 @@ import numpy as np
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.study import HELD_DEG, AutopilotStudy, StudySettings, check_settings, study_autopilot
 from tank2sim.analysis.heading.track_keeping import check_waypoints, read_waypoints
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard
@@ -51,11 +52,11 @@ class AutopilotFmu:
         return f"{self.path}: FMI {self.exported.fmi}, {len(self.exported.content) / 1000:.0f} kB"
 
     @property
-    def table(self) -> ResultTable | None:
+    def table(self) -> Table | None:
         """The differences of the co-simulation, if there was one."""
         if self.difference is None:
             return None
-        return ResultTable(
+        return screen_table(
             f"Ship and autopilot co-simulated, against one model: order {self.difference.order:.2f}",
             ("communication step (s)", "largest difference of heading (deg)"),
             [[step, error] for step, error in sorted(self.difference.error_deg.items())],
@@ -232,12 +233,12 @@ class AutopilotResult(ResultWithAutopilot):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Gains, margins, course changes, tracks, and co-simulation with the ship."""
         study = self.study
         tables = [
-            ResultTable("Controller", ("figure", "value"), list(study.design.gains.items())),
-            ResultTable(
+            screen_table("Controller", ("figure", "value"), list(study.design.gains.items())),
+            screen_table(
                 "Margins with the steering gear, the first at the speed of the design",
                 ("speed (m/s)", "gain up", "gain down to", "phase (deg)", "delay (s)", "Ms", "-3 dB (rad/s)", "stable"),
                 [
@@ -256,7 +257,7 @@ class AutopilotResult(ResultWithAutopilot):
                     for margins in study.margins
                 ],
             ),
-            ResultTable(
+            screen_table(
                 "Course changes",
                 (
                     "run",
@@ -273,7 +274,7 @@ class AutopilotResult(ResultWithAutopilot):
         if study.tracks:
             columns = ("guidance", "length (m)", "time (s)", "finished", "largest (m)", "rms (m)", "on legs (m)")
             tracks = [[name, *vars(track.figures).values()] for name, track in study.tracks.items()]
-            tables.append(ResultTable("Cross-track error", (*columns, "stays (m)"), tracks))
+            tables.append(screen_table("Cross-track error", (*columns, "stays (m)"), tracks))
         if self.fmu and (compared := self.fmu.table):
             tables.append(compared)
         return tuple(tables)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, Bridge, bridge_of
 from tank2sim.analysis.validation.comparison import differences_of_size
-from tank2sim.api.result import Result, ResultTable, charts_of
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import Result, charts_of
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.errors import InputError
@@ -85,7 +86,7 @@ class BridgeResult(Result):
         return (f"{self.bridge.card.ship.name}: {self.blanks} blanks are to be filled in by hand{outside}",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """None: the sheet has them."""
         return ()
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import Result, screen_table
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import Card, read_card
 
@@ -59,11 +60,11 @@ class ShipsResult(Result):
         return ()
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Names, kinds and lengths, with the sources as notes."""
         rows = [[name, card.ship.name, card.model.kind, card.ship.length_m] for name, card in self.cards.items()]
         sources = tuple(f"{name}: {card.ship.source}" for name, card in self.cards.items())
-        return (ResultTable("Bundled ships", ("CARD", "ship", "model", "length (m)"), rows, sources),)
+        return (screen_table("Bundled ships", ("CARD", "ship", "model", "length (m)"), rows, sources),)
 
 
 def list_ships() -> ShipsResult:

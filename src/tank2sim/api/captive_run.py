@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import AngleArgument, SpeedArgument, checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import write_together
 from tank2sim.identification.captive.single_runs import (
@@ -176,7 +177,7 @@ class CaptiveRunResult(Result):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Coefficients of the forces to the third order, derivatives of the run, repeats."""
         water = self.campaign is not None
         shown = {f"{force}_water" for force in FORCE_COLUMNS} if water else set(FORCE_COLUMNS)
@@ -188,7 +189,7 @@ class CaptiveRunResult(Result):
         ]
         text = "of the water, inertia removed" if water else "as recorded"
         title = f"Fourier coefficients of the forces {text}, about the leading velocity"
-        tables = [ResultTable(title, ("run", "force", "order", "cos", "sin", "phase (deg)"), rows, wide=True)]
+        tables = [screen_table(title, ("run", "force", "order", "cos", "sin", "phase (deg)"), rows, wide=True)]
         derivatives: list[list[object]] = [
             [run.reduced.run.name, name, f"{value:.5g} ± {run.derivatives.standard_errors[name]:.2g}"]
             for run in self.runs
@@ -196,7 +197,7 @@ class CaptiveRunResult(Result):
             for name, value in run.derivatives.values.items()
         ]
         if derivatives:
-            tables.append(ResultTable("Derivatives of the run alone (prime)", ("run", "", "value"), derivatives))
+            tables.append(screen_table("Derivatives of the run alone (prime)", ("run", "", "value"), derivatives))
         if self.repeats:
             repeats: list[list[object]] = [
                 [row.signal, row.part, row.order, row.mean, row.deviation, row.expected, row.chance]
@@ -204,7 +205,7 @@ class CaptiveRunResult(Result):
                 if row.order <= 1
             ]
             heads = ("force", "", "order", "mean", "deviation", "by noise", "chance")
-            tables.append(ResultTable(f"{len(self.runs)} runs compared", heads, repeats))
+            tables.append(screen_table(f"{len(self.runs)} runs compared", heads, repeats))
         return tuple(tables)
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
 from tank2sim.analysis.validation.comparison import CardComparison, compare_cards
 from tank2sim.analysis.validation.standard_trials import MEMBERS
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import SmallEnsemble, checked
-from tank2sim.api.result import Result, ResultTable, section_charts
+from tank2sim.api.result import Result, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard, SteeredCard
 from tank2sim.units import in_words
@@ -122,10 +123,10 @@ class ComparisonResult(Result):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Of each card the coefficients farthest from the reference, and the main figures of all."""
         shown = _SHOWN_OF_CRAFT if isinstance(self.ships[0].card, CraftCard) else _SHOWN
-        figures = ResultTable(
+        figures = screen_table(
             "Figures (standard deviation)",
             ("trial", "figure", *self.labels),
             [
@@ -148,7 +149,7 @@ class ComparisonResult(Result):
     def _others(self) -> list[tuple[int, str]]:
         return list(enumerate(self.labels))[1:]
 
-    def _farthest(self, place: int, label: str) -> ResultTable:
+    def _farthest(self, place: int, label: str) -> Table:
         every = [(row, row.differences[place - 1]) for row in self.comparison.rows]
         known = [(abs(found.standard_errors), row, found) for row, found in every if found.standard_errors is not None]
         # Without any standard error (two languages) by their share.
@@ -159,7 +160,7 @@ class ComparisonResult(Result):
             [row.name, row.cards[0].value, row.cards[place].value, difference.percent, difference.standard_errors]
             for _, row, difference in rows[:_MOST]
         ]
-        return ResultTable(f"Farthest apart: {label}", columns, cells)
+        return screen_table(f"Farthest apart: {label}", columns, cells)
 
 
 @checked

@@ -18,8 +18,9 @@ from tank2sim.analysis.conversion.readings import (
     with_diameter,
     with_probabilities,
 )
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.coefficient_table import CoefficientTable, read_coefficients
@@ -159,7 +160,7 @@ class ConventionResult(Result):
         return math.fsum(entry.probability for entry in self.readings if getattr(entry.reading, key) == first)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Readings with probability and figures, and what speaks against each."""
         shown = [
             (number, entry)
@@ -185,9 +186,9 @@ class ConventionResult(Result):
             "P: heading by rudder after one length (Norrbin); DT: tactical diameter at 35 deg; 10/10: first overshoot",
         )
         against = [[number, "; ".join(entry.against)] for number, entry in shown if entry.against]
-        found = [ResultTable("Readings", columns, rows, notes)]
+        found = [screen_table("Readings", columns, rows, notes)]
         if against:
-            found.append(ResultTable("What speaks against them", ("", "unlike a ship of these dimensions"), against))
+            found.append(screen_table("What speaks against them", ("", "unlike a ship of these dimensions"), against))
         return tuple(found)
 
     def _notices(self) -> tuple[str, ...]:

@@ -28,8 +28,9 @@ from tank2sim.analysis.conversion.robotics import (
     vrx_model,
     vrx_text,
 )
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import NumberArgument, Scatter, checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
@@ -151,7 +152,7 @@ class ConversionResult(Result):
         return line, f"fitted over {envelope} at nominal revolutions; residuals of the forces: {residuals}"
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Figures of standard manoeuvres before and after."""
         if not self.made.changes:
             return ()
@@ -159,7 +160,7 @@ class ConversionResult(Result):
             [change.manoeuvre, change.figure, change.before, change.after, _percent(change)]
             for change in self.made.changes
         ]
-        return (ResultTable("Standard manoeuvres", ("manoeuvre", "figure", "card", self.language, "error (%)"), rows),)
+        return (screen_table("Standard manoeuvres", ("manoeuvre", "figure", "card", self.language, "error (%)"), rows),)
 
 
 def _percent(change: FigureChange) -> float | None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.heading.craft import CraftAutopilot, study_craft_autopilot
 from tank2sim.analysis.heading.study import check_course_change
+from tank2sim.answer.parts import Table
 from tank2sim.api.autopilot import AutopilotFmu, ResultWithAutopilot
-from tank2sim.api.result import ResultTable
+from tank2sim.api.result import screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard
 from tank2sim.dynamics.model import Model
@@ -78,7 +79,7 @@ class CraftAutopilotResult(ResultWithAutopilot):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Gains, and figures of the changes of course and speed."""
         study, limits = self.study, self.study.at_limit_share
         changes = (("course", study.course, math.degrees(1.0)), ("speed", study.speed, 1.0))
@@ -95,8 +96,8 @@ class CraftAutopilotResult(ResultWithAutopilot):
         ]
         columns = ("change", "ordered", "rise (s)", "overshoot", "settled (s)", "a thruster at its limit (%)")
         tables = [
-            ResultTable("Controller", ("gain", "value"), list(self.gains.items())),
-            ResultTable("Changes of course (deg) and of speed (m/s)", columns, rows),
+            screen_table("Controller", ("gain", "value"), list(self.gains.items())),
+            screen_table("Changes of course (deg) and of speed (m/s)", columns, rows),
         ]
         if self.fmu and (compared := self.fmu.table):
             tables.append(compared)

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard
 from tank2sim.cards.examination import doubts
@@ -198,17 +199,17 @@ class CraftIdentificationResult(Result):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Coefficients with their verdict, and the next trials."""
         heads = ("SI", "value", "standard error", "card", "its error", "verdict", "mostly by")
-        found = [ResultTable("Coefficients", heads, self._rows())]
+        found = [screen_table("Coefficients", heads, self._rows())]
         if self.responses:
             heads = ("thruster", "lag (s)", "its error", "dead band (rpm)", "its error", "rested at", "turned at")
             responses = [[name, *_response_row(response)] for name, response in self.responses.items()]
-            found.append(ResultTable("Response to orders", heads, responses))
+            found.append(screen_table("Response to orders", heads, responses))
         rows = [[entry.words, ", ".join(entry.determines) or None] for entry in self.next_trials]
         if rows:
-            found.append(ResultTable("Next five minutes", ("orders", "would determine"), rows))
+            found.append(screen_table("Next five minutes", ("orders", "would determine"), rows))
         return tuple(found)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.stability.craft import CraftAtSpeed, CraftStability, SteadyCraftTurn, craft_stability
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.stability import four_digits
 from tank2sim.cards import CraftCard
 from tank2sim.units import from_si
@@ -108,20 +109,20 @@ class CraftStabilityResult(Result):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Eigenvalues, Nomoto's model and surge by speed, and steady turns by difference."""
         study, run = self.study, self.study.run
-        eigenvalues = ResultTable(
+        eigenvalues = screen_table(
             "Eigenvalues of surge, sway and yaw",
             ("real (1/s)", "imaginary (1/s)", "time constant (s)"),
             four_digits([value.real, value.imag, -1 / value.real if value.real else None] for value in run.eigenvalues),
         )
-        by_speed = ResultTable(
+        by_speed = screen_table(
             "By speed; K: deg/s by 100 rpm of port less starboard, times in s",
             ("m/s", "rpm", "stable", "surge", "K", "T", "T1", "T2", "T3"),
             four_digits(_row(one) for one in sorted((run, *study.speeds), key=lambda one: one.speed_mps)),
         )
-        turns = ResultTable(
+        turns = screen_table(
             f"Steady turns about {from_si('n_rpm', run.revolutions_radps):.4g} rpm",
             ("difference (rpm)", "yaw rate (deg/s)", "speed (m/s)", "drift (deg)", "diameter (m)"),
             four_digits(

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.craft_identification import CraftTrialPaths, craft_trial_files
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard
 from tank2sim.cards.examination import doubts
@@ -103,10 +104,10 @@ class CraftValidationResult(Result):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Root mean square errors of each trial."""
         heads = ("trial", "predictions", "u (m/s)", "v (m/s)", "r (deg/s)", "place (m)", "heading (deg)")
-        return (ResultTable("Rms errors: of the motion, and at the end of each prediction", heads, self._rows()),)
+        return (screen_table("Rms errors: of the motion, and at the end of each prediction", heads, self._rows()),)
 
 
 def _at_ends(predictions: Sequence[FreePrediction]) -> tuple[float | None, float | None]:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result
 from tank2sim.demo import PAGE
 from tank2sim.files import writable_folder
 from tank2sim.native.compiler import require_compiler
@@ -49,7 +50,7 @@ class DemoResult(Result):
         return (f"{self.path}: the page that shows it all, next to {len(self.files) - 1} files",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """None: the page has them."""
         return ()
 

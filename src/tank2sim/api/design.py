@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.influence.figures import InfluenceFigure
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import DrawsArgument, NumberArgument, PositiveArgument, Seed, checked
 from tank2sim.api.conversion import convert
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
@@ -152,7 +153,7 @@ class CampaignDesignResult(PagedResult):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Figures, kinds of runs, and the coefficients that matter."""
         figures: list[list[object]] = [
             [name, row["value"], row["design"], row["usual"], row["design"] / row["usual"]]
@@ -186,17 +187,17 @@ class CampaignDesignResult(PagedResult):
             for name, row in largest[:_TABLE_ROWS]
         ]
         return (
-            ResultTable(
+            screen_table(
                 "Figures and their standard errors from the campaign alone",
                 ("figure", "value", "design", "usual", "ratio"),
                 figures,
             ),
-            ResultTable(
+            screen_table(
                 "Runs (v' or r': amplitude of v/U or r L/U)",
                 ("runs", "type", "drift (deg)", "rudder (deg)", "rad/s", "v' or r'", "cycles", "record (s)", ""),
                 tests,
             ),
-            ResultTable(
+            screen_table(
                 "Coefficients that matter (prime)",
                 ("", "value", "design", "usual", "largest share of a variance (%)"),
                 coefficients,
@@ -400,11 +401,11 @@ class TrialDesignResult(PagedResult):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Figures, manoeuvres, and the coefficients that become known."""
         largest = sorted(self.design.coefficients.items(), key=lambda item: item[1]["design"])
         return (
-            ResultTable(
+            screen_table(
                 "Figures and their standard errors: before, by the plan, by the usual set",
                 ("figure", "value", "before", "design", "usual", "ratio"),
                 [
@@ -412,12 +413,12 @@ class TrialDesignResult(PagedResult):
                     for name, row in self._figures().items()
                 ],
             ),
-            ResultTable(
+            screen_table(
                 "Manoeuvres",
                 ("manoeuvre", "repeats", "length (s)", "with approach (min)", "orders"),
                 [list(row.values()) for row in self._rows()],
             ),
-            ResultTable(
+            screen_table(
                 "Coefficients: standard error over that before",
                 ("", "before (prime)", "design", "usual"),
                 [[name, *row.values()] for name, row in largest[:_TABLE_ROWS]],

@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import ENSEMBLE
-from tank2sim.api.result import ResultTable
+from tank2sim.api.result import screen_table
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.memory import refuse_beyond_memory
@@ -75,7 +76,7 @@ class EnsembleOptions:
             yield found
 
 
-def band_table(bands: Mapping[str, Band], members: Members) -> ResultTable:
+def band_table(bands: Mapping[str, Band], members: Members) -> Table:
     """Quantiles (5, 50, 95 %) of figures over the members of an ensemble."""
     rows: list[list[object]] = []
     for name, band in bands.items():
@@ -83,4 +84,4 @@ def band_table(bands: Mapping[str, Band], members: Members) -> ResultTable:
         words, unit = in_words(kind)
         rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
     title = f"Ensemble of {members.members}, seed {members.seed}: 90 % of the members lie between 5 and 95 %"
-    return ResultTable(title, ("figure", "unit", "5 %", "50 %", "95 %", "shown by"), rows)
+    return screen_table(title, ("figure", "unit", "5 %", "50 %", "95 %", "shown by"), rows)

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
@@ -72,7 +73,7 @@ class ExportResult(Result):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """None."""
         return ()
 
@@ -128,7 +129,7 @@ class CheckResult(Result):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Largest error of each output, relative to its range."""
         report = self.report
         if not report.errors:
@@ -138,7 +139,7 @@ class CheckResult(Result):
         ]
         rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
         title = f"{report.path}: largest errors in {report.duration_s:g} s, relative to each output's range"
-        return (ResultTable(title, ("output", *report.errors), rows),)
+        return (screen_table(title, ("output", *report.errors), rows),)
 
 
 def make_fmu_file(

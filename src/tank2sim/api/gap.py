@@ -12,9 +12,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import Count, Effects, NumberArgument, checked
 from tank2sim.api.gap_files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
@@ -190,7 +191,7 @@ class GapResult(Result):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Parameters of what was found and of other candidates, and the misfit before and after."""
         from tank2sim.report.gap.text import sizes_of_candidates
 
@@ -199,12 +200,12 @@ class GapResult(Result):
         found = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
         candidates = sizes_of_candidates(self._results)
         tables = [
-            ResultTable(title, columns, rows, wide=True)
+            screen_table(title, columns, rows, wide=True)
             for title, effects in ((found, self._results["effects"]), ("What the others would be", candidates))
             if (rows := [row for effect in effects for row in _parameter_rows(effect)])
         ]
         tables += [
-            ResultTable(
+            screen_table(
                 f"{effect['name'].replace('_', ' ').capitalize()} of each trial",
                 ("trial", "set", "speed", "standard error", "direction", "standard error "),
                 [_by_trial_row(row) for row in effect["by_trial"]],
@@ -215,7 +216,7 @@ class GapResult(Result):
         ]
         heads = ("trial", "set", "before", "after")
         title = "Misfit in units of the noise (1 is noise)"
-        return (*tables, ResultTable(title, heads, self._misfit_rows(), wide=True))
+        return (*tables, screen_table(title, heads, self._misfit_rows(), wide=True))
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Tracks before and after, misfits, the missing force and rivals, by name."""

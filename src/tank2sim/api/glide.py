@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.glide.path import GlidePath
 from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, force_residual
 from tank2sim.analysis.glide.study import GlideQuestion, GlideStudy, study
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import GliderCard
 
@@ -110,7 +111,7 @@ class GlideResult(PagedResult):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Steady glides, paths and ranges."""
         found = self.found
         tables = [_glide_table(found)] if found.glides else []
@@ -123,7 +124,7 @@ class GlideResult(PagedResult):
         if found.ranges:
             first = found.ranges[0]
             tables.append(
-                ResultTable(
+                screen_table(
                     f"Range on {first.budget_kg:g} kg of ballast pushed out at {first.depth_m:g} m",
                     ("path (deg)", "buoyancy (kg)", "cycles", "range (km)", "days", "energy (kJ)"),
                     [
@@ -151,7 +152,7 @@ def glide_with(ship: Ship, question: GlideQuestion) -> GlideResult:
     return GlideResult(study(card, question))
 
 
-def _glide_table(found: GlideStudy) -> ResultTable:
+def _glide_table(found: GlideStudy) -> Table:
     first = found.glides[0]
     title = f"Steady glides, net buoyancy {abs(first.buoyancy_kg):g} kg, roll {math.degrees(first.roll_rad):g} deg"
     columns, rows = list(_COLUMNS), [_row(glide) for glide in found.glides]
@@ -164,10 +165,10 @@ def _glide_table(found: GlideStudy) -> ResultTable:
         columns.append("ballast (kg)")
         ballast = [ballast_kg(found.card, glide.buoyancy_kg) for glide in found.glides]
         rows = [[*row, None if kg is None else f"{kg:.4g}"] for row, kg in zip(rows, ballast, strict=True)]
-    return ResultTable(title, tuple(columns), rows, notes)
+    return screen_table(title, tuple(columns), rows, notes)
 
 
-def _printed_table(found: GlideStudy) -> ResultTable:
+def _printed_table(found: GlideStudy) -> Table:
     """The glides by the paper's own equations, with what is wrong with them."""
     ratios = [a.speed_mps / b.speed_mps for a, b in zip(found.printed, found.glides, strict=True)]
     factors = ", ".join(f"{ratio:.3g}" for ratio in ratios)
@@ -177,7 +178,7 @@ def _printed_table(found: GlideStudy) -> ResultTable:
         "not that of (7)",
         f"By lift and drag of (6) and (7) the printed glides are off balance by {printed}, those above by {right}",
     )
-    return ResultTable(
+    return screen_table(
         "The same by the equations as published", _COLUMNS, [_row(glide) for glide in found.printed], notes
     )
 
@@ -200,10 +201,10 @@ def _radius_text(radius_m: float) -> str:
     return f"{radius_m:.3f}" if math.isfinite(radius_m) else "-"
 
 
-def _path_table(title: str, path: GlidePath) -> ResultTable:
+def _path_table(title: str, path: GlidePath) -> Table:
     columns = ("t (s)", "x (m)", "y (m)", "height (m)", "heading (deg)")
     rows = [
         [place.time_s, place.north_m, place.east_m, place.height_m, math.degrees(place.heading_rad)]
         for place in path.places
     ]
-    return ResultTable(title, columns, rows)
+    return screen_table(title, columns, rows)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, POSTER_MANOEUVRES
 from tank2sim.analysis.guess.prior import ShipDimensions
 from tank2sim.analysis.guess.study import Guess, figure_unit, guess_ship, parse_figures
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import GuessedShips, PositiveArgument, Seed, checked
 from tank2sim.api.ensemble import DEFAULT_MEMBERS
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
@@ -72,7 +73,7 @@ class GuessResult(PagedResult):
         return (f"{self.card.ship.name}: {words}",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Figures given and predicted; numbers of the card before and after; what would help most."""
         rows: list[list[object]] = []
         for key, entry in self._figures().items():
@@ -86,9 +87,11 @@ class GuessResult(PagedResult):
         ]
         helpful: list[list[object]] = [[key, 100 * share] for key, share in self.guess.next_figures.items()]
         return (
-            ResultTable("Figures: nine of ten such ships lie between 5 and 95 %", columns, rows),
-            ResultTable("Numbers of the card", ("number", "by dimensions", "with the figures", ""), numbers, wide=True),
-            ResultTable("Which further figure would help most", ("figure", "variance gone (%)"), helpful),
+            screen_table("Figures: nine of ten such ships lie between 5 and 95 %", columns, rows),
+            screen_table(
+                "Numbers of the card", ("number", "by dimensions", "with the figures", ""), numbers, wide=True
+            ),
+            screen_table("Which further figure would help most", ("figure", "variance gone (%)"), helpful),
         )
 
     def _figures(self) -> dict[str, dict[str, dict[str, float]]]:

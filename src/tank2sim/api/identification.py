@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tank2sim.analysis.ensemble.draws import by_file_name
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
@@ -145,31 +146,31 @@ class IdentificationResult(Result):
         return None if samples is None else pd.DataFrame(samples.flat, columns=list(samples.free))
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Estimates, errors of the yaw rate, figures; bootstrap and cross-validation where asked for."""
         found = self.identification
         estimate = found.estimate
         count = len({run.name.partition(" at ")[0] for run in found.problem.runs})
         trials = f"{count} trial{'s' * (count > 1)}"
         title = f"{found.card.ship.name}: {len(estimate.free)} coefficients from {trials}"
-        tables = [ResultTable(title, ("", "found", "before", "from trials"), estimate_rows(self._found))]
+        tables = [screen_table(title, ("", "found", "before", "from trials"), estimate_rows(self._found))]
         if found.posterior is not None:
             heads = ("", "95 %", "R-hat", "effective size")
             tables.append(
-                ResultTable(f"Posterior, {len(found.posterior.flat)} draws", heads, posterior_rows(self._found))
+                screen_table(f"Posterior, {len(found.posterior.flat)} draws", heads, posterior_rows(self._found))
             )
         if found.bootstrap is not None:
             scatter = found.bootstrap.std(axis=0, ddof=1)
             triples = zip(estimate.free, estimate.standard_errors, scatter, strict=True)
             tables.append(
-                ResultTable(
+                screen_table(
                     f"Standard errors, and scatter over {len(found.bootstrap)} sets of trials simulated again",
                     ("", "standard error", "bootstrap"),
                     [[name, float(error), float(deviation)] for name, error, deviation in triples],
                 )
             )
         tables.append(
-            ResultTable(
+            screen_table(
                 "Yaw rate: error over windows of 5 ship lengths, of its root mean square",
                 ("trial", "", "before", "now"),
                 following_rows(self._found),
@@ -177,10 +178,10 @@ class IdentificationResult(Result):
         )
         if rows := structure_rows(self._found):
             columns = ("structure", "one at a time, mean", "those of largest amplitude")
-            tables.append(ResultTable("Yaw-rate error of trials left out of the fit, %", columns, rows))
+            tables.append(screen_table("Yaw-rate error of trials left out of the fit, %", columns, rows))
         if rows := figure_rows(self._found):
             tables.append(
-                ResultTable(
+                screen_table(
                     "Figures, simulated in closed loop from the measured start, with the rudder rate and lag of each "
                     "trial",
                     ("trial", "", "figure", "measured", "before", "now", "error", "95 %"),

@@ -17,8 +17,9 @@ from tank2sim.analysis.tuning.result import Means, Tuned, tuned_text
 from tank2sim.analysis.tuning.targets import TARGET_OPTION, Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.analysis.validation.standard_trials import craft_trials
+from tank2sim.answer.parts import Table
 from tank2sim.api.ensemble import FEW_IN_LANES, EnsembleOptions, band_table
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, CraftCard
 from tank2sim.cards.derived import derived_card
@@ -125,7 +126,7 @@ class InfluenceResult(PagedResult):
         return (f"{self.ship.name}: {len(self.found.parameters)} parameters",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Figures, coefficients, joint variation; bands of an ensemble."""
         bands = (band_table(self.bands.figures, self.bands.asked),) if self.bands else ()
         return *_influence_tables(self.found), *bands
@@ -233,7 +234,7 @@ class TuningResult(InfluenceResult):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Targets and moves, then those of :class:`InfluenceResult`."""
         tuned = self.tuned
         targets = zip(tuned.targets, tuned.before.tolist(), tuned.after.tolist(), strict=True)
@@ -246,12 +247,12 @@ class TuningResult(InfluenceResult):
             for move in tuned.moves
         ]
         return (
-            ResultTable(
+            screen_table(
                 "Tuning" if self.reached else "Nearest that can be reached",
                 ("target", "before", "after"),
                 [[target.text, before, after] for target, before, after in targets],
             ),
-            ResultTable(
+            screen_table(
                 f"Parameters changed ({tuned.means.by}): {len(moves)}",
                 ("", "before", "after", "standard errors"),
                 moves[:ROWS],
@@ -350,8 +351,8 @@ def _move_cells(factor: float, before: float, after: float) -> tuple[float, floa
     return before * factor, after * factor
 
 
-def _influence_tables(found: CardInfluence) -> list[ResultTable]:
-    figures = ResultTable(
+def _influence_tables(found: CardInfluence) -> list[Table]:
+    figures = screen_table(
         "Figures",
         ("figure", "value", "standard error", "most of it from"),
         [
@@ -364,7 +365,7 @@ def _influence_tables(found: CardInfluence) -> list[ResultTable]:
     if joint := found.agreed:
         columns = zip(joint.predicted, joint.predicted_by_difference, joint.direct, strict=True)
         tables.append(
-            ResultTable(
+            screen_table(
                 "Joint variation, change in %",
                 ("figure", "sum of Kc K, exact", "by differences", "direct"),
                 [[figure.text, *row] for figure, row in zip(found.figures, columns, strict=True)],
@@ -373,7 +374,7 @@ def _influence_tables(found: CardInfluence) -> list[ResultTable]:
     return tables
 
 
-def _coefficient_tables(found: CardInfluence) -> list[ResultTable]:
+def _coefficient_tables(found: CardInfluence) -> list[Table]:
     """Coefficients of the most influential parameters, a few figures in each table."""
     exact, difference = found.exact, found.difference
     largest = np.nan_to_num(np.abs(exact)).max(axis=0)
@@ -381,7 +382,7 @@ def _coefficient_tables(found: CardInfluence) -> list[ResultTable]:
     count = len(found.figures)
     each = -(-count // -(-count // TABLE_FIGURES))  # as even as it goes
     return [
-        ResultTable(
+        screen_table(
             "K %: change for 10 % more, by exact slopes | by the 10 % difference",
             ("", *(figure.text.replace("@", "\n@") for figure in found.figures[first : first + each])),
             [

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialRecord
 from tank2sim.cards import CraftCard
@@ -215,13 +216,13 @@ class LogResult(PagedResult):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Channels and stretches."""
         heads = ("quantity", "stream", "unit", "sign", "confidence", "used")
         unsure = [channel for channel in self.voyage.channels.channels if not channel.use and channel.confidence < 0.7]
         rows = [row[:6] for row in channel_rows(self.voyage) if row[5]]
         notes = tuple(f"not used: {channel.quantity}: {channel.stream}: {channel.why}" for channel in unsure)
-        channels = ResultTable("Channels", heads, rows, notes)
+        channels = screen_table("Channels", heads, rows, notes)
         stretches = [
             [
                 entry["kind"],
@@ -235,7 +236,7 @@ class LogResult(PagedResult):
         ]
         columns = ("stretch", "begins (s)", "lasts (s)", "steering", "heading change (deg)", "file")
         verdicts = self.identified.tables if self.identified else ()
-        return channels, ResultTable("Stretches", columns, stretches, wide=True), *verdicts
+        return channels, screen_table("Stretches", columns, stretches, wide=True), *verdicts
 
     def _cut_of(self, stretch: Stretch) -> TrialCut | None:
         return next((cut for cut in self.cuts if cut.stretch is stretch), None)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.dynamics.external_forces import external_inputs, with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -138,13 +139,13 @@ class ManoeuvreResult(PagedResult):
         return ()
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """The figures, marked where they were settled outside the card's range; bands of an ensemble."""
         rows = [[*in_words(name), value, self._beyond(name, value)] for name, value in self.run.figures.items()]
         columns: tuple[str, ...] = ("figure", "unit", "value", "card")
         if not self.run.reading.message:
             rows, columns = [row[:3] for row in rows], columns[:3]
-        figures = ResultTable(self._title, columns, rows)
+        figures = screen_table(self._title, columns, rows)
         if self.bands is None:
             return (figures,)
         from tank2sim.api.ensemble import band_table

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
 from tank2sim.cards.card import PROPELLER_COEFFICIENTS
@@ -255,7 +256,7 @@ class MmgReductionResult(PagedResult):
         return (f"{text}.",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Coefficients, and how well the readings are computed."""
         rows = [
             (name, f"{found.value:.4g} ± {found.standard_error:.2g}", found.origin)
@@ -273,8 +274,8 @@ class MmgReductionResult(PagedResult):
             for (name, share), deviation in zip(self.fit.curves_unexplained.items(), deviations, strict=True)
         ]
         return (
-            ResultTable("Coefficients (hull: prime II, by 1/2 rho L d U²)", ("", "value", ""), rows),
-            ResultTable("What is left of the readings", ("", "unit", "standard deviation", "% of the rms"), left),
+            screen_table("Coefficients (hull: prime II, by 1/2 rho L d U²)", ("", "value", ""), rows),
+            screen_table("What is left of the readings", ("", "unit", "standard deviation", "% of the rms"), left),
         )
 
     def _notices(self) -> tuple[str, ...]:

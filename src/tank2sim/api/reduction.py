@@ -8,8 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.errors import InputError
@@ -125,7 +126,7 @@ class ReductionResult(Result):
         return (f"The card is of the model, {size}.",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Derivatives, terms left out, and errors of runs predicted from the others."""
         rows: list[list[object]] = []
         for row in derivative_rows(self.reduction, self.contents):
@@ -134,17 +135,17 @@ class ReductionResult(Result):
             rows.append([row.name, value, stepwise, row.origin])
         name, count = self.reduction.campaign.model.name, len(self.reduction.runs)
         tables = [
-            ResultTable(
+            screen_table(
                 f"{name}: derivatives from {count} runs (prime, rudder to starboard)",
                 ("", "whole campaign", "test by test", ""),
                 rows,
             )
         ]
         if left_out := [[choice.name, choice.reason, choice.explanation] for choice in terms_left_out(self.reduction)]:
-            tables.append(ResultTable("Terms that the runs excite and that were left out", ("", "", "why"), left_out))
+            tables.append(screen_table("Terms that the runs excite and that were left out", ("", "", "why"), left_out))
         errors_by_type = prediction_rows(prediction_errors(self.reduction))
         tables.append(
-            ResultTable(
+            screen_table(
                 "Leave-one-out: root mean square error of each run predicted from the others, % of the range",
                 ("runs of type", *FORCE_COLUMNS),
                 [

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import PagedResult, Result, ResultTable
+from tank2sim.api.result import PagedResult, Result
 from tank2sim.files import parsed_json, plain_json, read_text, refuse_deep, write_together
 from tank2sim.marks import marked
 
 if TYPE_CHECKING:
-    from tank2sim.report.kit.page import Page
+    from tank2sim.answer.page import Page
 
 _REMEDY = "give what a command wrote with --json"
 
@@ -70,7 +71,7 @@ class ReportResult(PagedResult):
         return (f"{self.title}: {charts} charts and {tables} tables",)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """None: the page has them."""
         return ()
 

@@ -7,78 +7,31 @@ import html
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from tank2sim.answer.parts import Table, table
 from tank2sim.api.bounds import checked
 from tank2sim.files import json_text, plain_json, schema_name, write_together
 from tank2sim.marks import marked
 
 if TYPE_CHECKING:
     import altair as alt
-    import pandas as pd
 
-    from tank2sim.report.kit.page import Page, PageSection
-
-REPR_ROWS = 20
-"""Rows of a table in ``repr``: with its heading it fits a screen of 24 lines. Project choice."""
+    from tank2sim.answer.page import Page
+    from tank2sim.answer.parts import Section
 
 
-@dataclass(frozen=True)
-class ResultTable:
-    """A table of a result.
-
-    Parameters
-    ----------
-    title : str
-    columns : tuple of str
-        Heads, units in brackets.
-    rows : sequence of sequences
-        Cells: numbers, text, truth values, lists of numbers, or None where there is no value.
-    notes : tuple of str
-        Sentences under the table.
-    wide : bool
-        Names in it are never broken on the screen, however wide it becomes.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: Sequence[Sequence[object]]
-    notes: tuple[str, ...] = ()
-    wide: bool = False
-
-    @property
-    def df(self) -> pd.DataFrame:
-        """The table as a data frame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.rows, columns=list(self.columns))
-
-    @property
-    def text(self) -> str:
-        """The table as text, at most :data:`REPR_ROWS` rows; numbers with five digits."""
-        import pandas as pd
-
-        cells = [[cell_text(cell) for cell in row] for row in self.rows[:REPR_ROWS]]
-        lines = [self.title, pd.DataFrame(cells, columns=list(self.columns)).to_string(index=False)]
-        omitted = len(self.rows) - REPR_ROWS
-        return "\n".join(lines + ([f"... {omitted} more rows in .tables"] if omitted > 0 else []))
-
-
-def cell_text(value: object) -> str:
-    """A value as tables show it: numbers with five digits, ``-`` for None."""
-    match value:
-        case None:
-            return "-"
-        case bool():
-            return "yes" if value else "no"
-        case float():
-            return f"{value:.5g}"
-        case list():
-            return ", ".join(cell_text(item) for item in value)
-        case _:
-            return str(value)
+def screen_table(
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[Any]],
+    notes: Sequence[str] = (),
+    wide: bool = False,
+) -> Table:
+    """A table of a result that is not yet declared by sections."""
+    return replace(table(title, columns, rows, *notes), wide=wide)
 
 
 class Result(ABC):
@@ -101,7 +54,7 @@ class Result(ABC):
 
     @property
     @abstractmethod
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Tables that the command line prints."""
 
     @property
@@ -161,7 +114,7 @@ class Result(ABC):
 
     def picture(self, name: str | None = None, *, ending: str = ".png") -> bytes:
         """One chart of the result as PNG, or as SVG or PDF if that is the `ending` of its file's name."""
-        from tank2sim.report.kit.charts import chart_picture
+        from tank2sim.answer.charts.picture import chart_picture
 
         return chart_picture(self.plot(name=name), ending)
 
@@ -179,7 +132,7 @@ class Result(ABC):
 
     def page(self) -> str:
         """Return the page of the result: self-contained HTML. Raises as :meth:`layout`."""
-        from tank2sim.report.kit.page import render_page
+        from tank2sim.answer.page import render_page
 
         return render_page(self.layout())
 
@@ -202,7 +155,7 @@ class Result(ABC):
             picture = base64.b64encode(self.picture()).decode("ascii")
             parts.append(f'<img alt="{html.escape(" ".join(self.headline))}" src="data:image/png;base64,{picture}">')
         parts += [
-            f"<p>{html.escape(table.title)}</p>{table.df.to_html(index=False, na_rep='')}" for table in self.tables
+            f"<p>{html.escape(table.caption)}</p>{table.df.to_html(index=False, na_rep='')}" for table in self.tables
         ]
         return "\n".join(parts)
 
@@ -215,7 +168,7 @@ class PagedResult(Result):
         return charts_of(self.layout().sections)
 
 
-def charts_of(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:
+def charts_of(sections: Iterable[Section]) -> dict[str, alt.TopLevelMixin]:
     """Return the charts of the sections of a page by their titles; those without a title by the headings."""
     charts: dict[str, alt.TopLevelMixin] = {}
     for section in sections:
@@ -225,7 +178,7 @@ def charts_of(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:
     return charts
 
 
-def section_charts(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:
+def section_charts(sections: Iterable[Section]) -> dict[str, alt.TopLevelMixin]:
     """Charts of sections of a page by the words of their heading, numbered from the second on: ``speeds_2``."""
     charts: dict[str, alt.TopLevelMixin] = {}
     for section in sections:

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.audit import MEASURED_SAMPLES
 from tank2sim.api.bounds import PositiveArgument, checked
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.errors import InputError
 from tank2sim.records.signals.analysis import ColumnAnalysis, SignalSettings, Steering, TrialAnalysis, analyse
@@ -151,7 +152,7 @@ class SignalsResult(Result):
         return (self.filtering.sentence,) if self.filtering else ()
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Statistics, one table a trial."""
         return tuple(_table(analysis) for analysis in self.analyses)
 
@@ -248,7 +249,7 @@ def _history(series: Series) -> dict[str, list[float]]:
     return drawn_columns({"t_s": series.time_s, name.file: name.factor * series.values}, peaks=True)
 
 
-def _table(analysis: TrialAnalysis) -> ResultTable:
+def _table(analysis: TrialAnalysis) -> Table:
     notes = [_CORRELATION_NOTE]
     if any(column.series.name in DIRECTION_COLUMNS for column in analysis.columns):
         notes.insert(0, "mean and std of directions: on the circle, 0 to 360 deg.")
@@ -257,7 +258,7 @@ def _table(analysis: TrialAnalysis) -> ResultTable:
     if analysis.steering:
         notes.append(_steering_text(analysis.steering))
     columns = ("", "mean", "std", "corr. (s)", "stationarity", "normal", "peak (Hz)")
-    return ResultTable(analysis.trial.name, columns, [_row(column) for column in analysis.columns], tuple(notes))
+    return screen_table(analysis.trial.name, columns, [_row(column) for column in analysis.columns], tuple(notes))
 
 
 def _row(column: ColumnAnalysis) -> list[object]:

@@ -10,8 +10,9 @@ from tank2sim.analysis.ensemble.results import EnsembleRequest, StabilityBands, 
 from tank2sim.analysis.ensemble.steering import Grid
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
+from tank2sim.answer.parts import Table
 from tank2sim.api.ensemble import EnsembleOptions, band_table
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 
@@ -106,22 +107,22 @@ class StabilityResult(PagedResult):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Eigenvalues, Nomoto's models, what moves C' most, IMO criteria; bands of an ensemble."""
         found, margin = self.study.stability, self.study.margin
-        eigenvalues = ResultTable(
+        eigenvalues = screen_table(
             f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in found.effect_states)}",
             ("real (1/s)", "imaginary (1/s)", "time constant (s)"),
             four_digits(
                 [value.real, value.imag, -1 / value.real if value.real else None] for value in found.eigenvalues
             ),
         )
-        nomoto = ResultTable(
+        nomoto = screen_table(
             f"Nomoto{' (slow motions)' if found.effect_states else ''}",
             ("", "K", "T", "T1", "T2", "T3"),
             four_digits([["1/s and s", *vars(found.nomoto).values()], ["prime", *vars(found.nomoto_prime).values()]]),
         )
-        influences = ResultTable(
+        influences = screen_table(
             "Largest influences on C'",
             ("coefficient", "C' for 10 % more (%)", "change to neutral (%)"),
             four_digits(
@@ -150,7 +151,7 @@ def judge_stability(
     return StabilityResult(ship, study, bands)
 
 
-def _chances(found: StabilityBands) -> ResultTable:
+def _chances(found: StabilityBands) -> Table:
     """Probability of each IMO criterion, with the 95 % interval that the number of members leaves."""
     rows: list[list[object]] = []
     for chance in found.chances:
@@ -170,10 +171,10 @@ def _chances(found: StabilityBands) -> ResultTable:
         name = f"the {len(together.names)} within the card's range together"
         rows.append([name, None, None, None, f"{together.met:.3g}", interval])
     columns = ("criterion", "5 %", "95 %", "allowed", "P(met)", "interval of P")
-    return ResultTable("IMO MSC.137(76), worse side, over the ensemble", columns, rows)
+    return screen_table("IMO MSC.137(76), worse side, over the ensemble", columns, rows)
 
 
-def _tails(found: StabilityBands) -> ResultTable:
+def _tails(found: StabilityBands) -> Table:
     """Small probabilities of not meeting a criterion, by importance sampling."""
     named = [(one.criterion.name, one.tail) for one in found.chances if one.tail]
     if found.all_met and found.all_met.tail:
@@ -186,7 +187,7 @@ def _tails(found: StabilityBands) -> ResultTable:
         rows.append([name + number, *found_texts, f"{tail.effective_size:.0f}", f"{tail.distance:.3g}"])
     columns = ("criterion", "P(not met)", "standard error", "effective size", "distance (sd)")
     notes = tuple(f"({number}) {text}" for number, text in enumerate(remarks, 1))
-    return ResultTable("Too rare for the ensemble: by importance sampling", columns, rows, notes)
+    return screen_table("Too rare for the ensemble: by importance sampling", columns, rows, notes)
 
 
 def _stable_text(found: StabilityBands | None) -> list[str]:
@@ -209,7 +210,7 @@ def _together_text(found: StabilityBands | None) -> list[str]:
     return [text]
 
 
-def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:
+def _criteria(criteria: Sequence[ImoCriterion]) -> Table:
     remarks = list(dict.fromkeys(criterion.remark for criterion in criteria if criterion.remark))
     rows: list[list[object]] = []
     for criterion in criteria:
@@ -220,7 +221,7 @@ def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:
         rows.append([criterion.name + number, criterion.found, criterion.allowed, criterion.unit, met, margin])
     columns = ("criterion", "found", "allowed", "unit", "met", "margin (%)")
     notes = tuple(f"({number}) {text}" for number, text in enumerate(remarks, 1))
-    return ResultTable("IMO MSC.137(76), worse side", columns, four_digits(rows), notes)
+    return screen_table("IMO MSC.137(76), worse side", columns, four_digits(rows), notes)
 
 
 def four_digits(rows: Iterable[Sequence[object]]) -> list[list[object]]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare_steering_models
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import AngleArgument, checked
-from tank2sim.api.result import PagedResult, ResultTable
+from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.turn_tuning import stability_change, turn_table
 from tank2sim.cards.steering_card import SteeringCard, read_steering_card
 
@@ -72,12 +73,12 @@ class SteeringModelsResult(PagedResult):
         return tuple(lines)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Steady turns, coefficients, joint variation, manoeuvres, tuning."""
         found = self.found
         keys = ("rudder_deg", "radius_m", "yaw_rate_degpmin", "drift_deg")
         tables = [
-            ResultTable(
+            screen_table(
                 f"Steady turns, {turns.title}",
                 ("rudder (deg)", "radius (m)", "rate (deg/min)", "drift (deg)"),
                 [[turn.as_json()[key] for key in keys] for turn in turns.turns],
@@ -87,7 +88,7 @@ class SteeringModelsResult(PagedResult):
         ]
         names = list(dict.fromkeys(name for each in found.influence for name in each.K_percent))
         tables.append(
-            ResultTable(
+            screen_table(
                 f"K %: change of the radius at {found.rudder_deg:g} deg for 10 % more",
                 ("", *(self.card.models[each.model].title for each in found.influence)),
                 [[name, *(each.K_percent.get(name) for each in found.influence)] for name in names],
@@ -95,7 +96,7 @@ class SteeringModelsResult(PagedResult):
         )
         if found.predictions:
             columns = ("by", "to", "change (%)", "radius (m)")
-            tables.append(ResultTable("Joint variation of all coefficients", columns, self._prediction_rows()))
+            tables.append(screen_table("Joint variation of all coefficients", columns, self._prediction_rows()))
         tables.append(self._manoeuvre_table())
         if isinstance(found.tuning, TwoPointTuning):
             tables.append(turn_table(found.tuning))
@@ -117,7 +118,7 @@ class SteeringModelsResult(PagedResult):
             ]
         return rows
 
-    def _manoeuvre_table(self) -> ResultTable:
+    def _manoeuvre_table(self) -> Table:
         keys = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
         rows = []
         for name, runs in self.found.runs.items():
@@ -127,7 +128,7 @@ class SteeringModelsResult(PagedResult):
             rows.append([self.card.models[name].title, *figures, [float(value) for value in first]])
         heads = (f"{key.removesuffix('_m').replace('_', ' ')} (m)" for key in keys)
         title = f"Turning circle at {self.found.rudder_deg:g} deg, zigzag"
-        return ResultTable(title, ("model", *heads, "10/10 overshoots (deg)"), rows)
+        return screen_table(title, ("model", *heads, "10/10 overshoots (deg)"), rows)
 
 
 @checked

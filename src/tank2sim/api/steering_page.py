@@ -7,7 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import Result
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.errors import InputError
@@ -84,7 +85,7 @@ class SteeringPageResult(Result):
         return (size, f"{len(self.members)} ships from the covariance of the card" if self.members else NO_COVARIANCE)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """None."""
         return ()
 

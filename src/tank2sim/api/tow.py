@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from numpy.polynomial import Polynomial
 
+from tank2sim.answer.parts import Table, cell_text
 from tank2sim.api.bounds import NumberArgument, checked
-from tank2sim.api.result import Result, ResultTable, cell_text, section_charts
+from tank2sim.api.result import Result, screen_table, section_charts
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import InputError
@@ -108,7 +109,7 @@ class TowResult(Result):
         return ()
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Estimates by method, models of other size, drag coefficients and mass by theory."""
         tables = [self._estimates(), self._models()]
         study = self.study
@@ -117,17 +118,17 @@ class TowResult(Result):
                 [name, *(f"{value:.5g}" for value in drag.as_json().values())] for name, drag in study.drags.items()
             ]
             title = f"C by L^2, (1.3); by V^(2/3) {study.body.area_ratio:.4g} times it"
-            tables.append(ResultTable(title, ("method", "A1 (s2/m2)", "A2 (s/m)", "A3"), rows))
+            tables.append(screen_table(title, ("method", "A1 (s2/m2)", "A2 (s/m)", "A3"), rows))
         if study.theory:
             rows = [[mass.basis, f"{mass.k11:.4f}", f"{mass.near_surface_kg:.0f}"] for mass in study.theory]
-            tables.append(ResultTable("Mass by theory (2.5)", ("k11 of", "k11", "M_s (kg)"), rows))
+            tables.append(screen_table("Mass by theory (2.5)", ("k11 of", "k11", "M_s (kg)"), rows))
         return tuple(tables)
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Charts of the page: speeds, models of different size, joint regions, drag."""
         return section_charts(self.layout().sections)
 
-    def _estimates(self) -> ResultTable:
+    def _estimates(self) -> Table:
         result = self.study.result
         fits = result.fits.values()
         names = dict.fromkeys(name for fit in fits for name in fit.estimates)
@@ -136,9 +137,9 @@ class TowResult(Result):
         rows.append(["condition number, scaled", *(f"{fit.condition_scaled:.3g}" for fit in fits)])
         rows.append(["largest speed error, m/s", *(cell_text(fit.largest_speed_error_mps) for fit in fits)])
         title = f"{result.tows.path.name}: {force_words(result.force)}, m = {result.mass_kg:g} kg"
-        return ResultTable(title, ("", *result.fits), rows)
+        return screen_table(title, ("", *result.fits), rows)
 
-    def _models(self) -> ResultTable:
+    def _models(self) -> Table:
         rows = []
         for model in self.study.models:
             fit = model.fit
@@ -151,7 +152,7 @@ class TowResult(Result):
             half = f"± {subset.half_widths[0]:.0f} kg (95 %)"
             notes.append(f"M of each tow alone, {subset.label}: {alone} kg; by leaving one out in turn {half}")
         columns = ("model", "M ± 95 % (kg)", "s (m/s)", "AIC", "cond.", "drag")
-        return ResultTable("Output error, models of different size", columns, rows, tuple(notes))
+        return screen_table("Output error, models of different size", columns, rows, tuple(notes))
 
 
 @checked

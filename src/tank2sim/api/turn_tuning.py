@@ -9,7 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_ship, tune_to_two_points
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.answer.parts import Table
+from tank2sim.api.result import Result, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
 from tank2sim.cards.card import MmgCard
@@ -90,7 +91,7 @@ class TurnTuningResult(Result):
         return self.ship.name, *stability_change(self.tuning)
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Both turns before and after."""
         return (turn_table(self.tuning),)
 
@@ -164,11 +165,11 @@ def turn_rows(tuning: TwoPointTuning) -> list[list[float]]:
     ]
 
 
-def turn_table(tuning: TwoPointTuning) -> ResultTable:
+def turn_table(tuning: TwoPointTuning) -> Table:
     """The factors, and both turns before and after."""
     title = f"Two points met (+ to starboard): hull factor {tuning.hull:.4g}, rudder factor {tuning.rudder:.4g}"
     columns = ("rudder (deg)", "rate before (deg/min)", "rate after", "radius before (m)", "radius after")
-    return ResultTable(title, columns, turn_rows(tuning))
+    return screen_table(title, columns, turn_rows(tuning))
 
 
 def stability_change(tuning: TwoPointTuning) -> tuple[str, ...]:

@@ -15,9 +15,10 @@ from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
 from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, Verified, verify
 from tank2sim.analysis.validation.study import validate_card as validate_figures
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import PositiveArgument, SmallEnsemble, checked
 from tank2sim.api.craft_validation import CraftValidationResult, validate_craft
-from tank2sim.api.result import Result, ResultTable, section_charts
+from tank2sim.api.result import Result, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, trial_files, trials_of
 from tank2sim.arrays import Array
@@ -137,7 +138,7 @@ class ValidationResult(Result):
         )
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Figure by figure; none without a turning circle or a zigzag among the trials."""
         rows: list[list[object]] = [
             [
@@ -151,7 +152,7 @@ class ValidationResult(Result):
         if not rows:
             return ()
         columns = ("trial", "figure", "measured", "simulated", "E", "U_val", "verdict")
-        return (ResultTable("E = simulated less measured, and the validation uncertainty", columns, rows),)
+        return (screen_table("E = simulated less measured, and the validation uncertainty", columns, rows),)
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Comparison errors, and track and histories of each replay."""

@@ -8,8 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument, checked
-from tank2sim.api.result import Result, ResultTable, section_charts
+from tank2sim.api.result import Result, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, YawRigCard, parse_card
 from tank2sim.dynamics.yaw_programme import Similarity, YawProgramme, programme_of
@@ -157,7 +158,7 @@ class YawResult(Result):
         return ()
 
     @property
-    def tables(self) -> tuple[ResultTable, ...]:
+    def tables(self) -> tuple[Table, ...]:
         """Estimates by method, friction and water, and the theory if it was asked for."""
         found = self.identification
         rows = [
@@ -176,8 +177,8 @@ class YawResult(Result):
         friction = next(iter(found.estimates.values())).friction
         terms = [[term.replace("_", " "), _with_error(*value)] for term, value in friction.items()]
         tables = [
-            ResultTable(title, columns, rows),
-            ResultTable("Friction and water, by energy least squares", ("", "1e-4 SI"), terms),
+            screen_table(title, columns, rows),
+            screen_table("Friction and water, by energy least squares", ("", "1e-4 SI"), terms),
         ]
         if self.theory:
             values: list[list[object]] = [
@@ -185,7 +186,7 @@ class YawResult(Result):
                 for each in self.theory
             ]
             columns = ("", "added inertia, 1e-4 kg m2", "published, Table 1", "remark")
-            tables.append(ResultTable("From the form, by (7), (8) and (9) of Alyshev (2019)", columns, values))
+            tables.append(screen_table("From the form, by (7), (8) and (9) of Alyshev (2019)", columns, values))
         return tuple(tables)
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:

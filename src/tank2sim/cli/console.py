@@ -12,7 +12,8 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
-from tank2sim.api.result import Result, cell_text
+from tank2sim.answer.parts import cell_text
+from tank2sim.api.result import Result
 from tank2sim.errors import InputError
 from tank2sim.escaping import file_name, one_line
 from tank2sim.files import JSON, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
@@ -82,7 +83,7 @@ def show_result(result: Result) -> None:
     for line in result.headline:
         screen.print(escape(one_line(line)), soft_wrap=True)
     for table in result.tables:
-        show_table(table.title, table.columns, table.rows, wide=table.wide)
+        show_table(table.caption, table.heads, table.rows, wide=table.wide)
         for note in table.notes:
             screen.print(escape(one_line(note)), soft_wrap=True)
     show_notices(others)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.answer.page import render_page
 from tank2sim.api.gap import GapResult, misfit_text
 from tank2sim.api.gap_files import folder_made, put, refuse_early
 from tank2sim.api.trial import fitted_and_held
@@ -34,7 +35,6 @@ from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.report.gap.fleet_page import fleet_page
-from tank2sim.report.kit.page import render_page
 
 JSON, PAGE = "fleet.json", "fleet.html"
 

@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.answer.charts.picture import OutputError
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import KeyFigure, Section
 from tank2sim.cards import Card
 from tank2sim.dynamics import Model
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
@@ -14,9 +17,6 @@ from tank2sim.files import write_whole
 from tank2sim.fmu.check import CheckReport, compare_with_model
 from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import write_fmu
-from tank2sim.report.kit.charts import OutputError
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import KeyFigure, PageSection
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class DemoOutcome:
     """What a half of the demo found: key figures and sections for the page, and the same as plain data."""
 
     figures: Sequence[KeyFigure]
-    sections: Sequence[PageSection]
+    sections: Sequence[Section]
     result: dict[str, object]
 
 

@@ -10,14 +10,7 @@ import numpy as np
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.straight_line import Stability, stability
-from tank2sim.arrays import Array
-from tank2sim.cards import linear_card, read_card
-from tank2sim.demo.fmu_helpers import DemoOutcome, Workshop, demo_output_errors, error_words, largest_error
-from tank2sim.dynamics import Model, build
-from tank2sim.fmu.check import CheckReport
-from tank2sim.fmu.manoeuvre import InputSequence
-from tank2sim.fmu.replay import replay
-from tank2sim.report.kit.charts import (
+from tank2sim.answer.charts.picture import (
     FrequencyResponse,
     History,
     TrackData,
@@ -27,9 +20,16 @@ from tank2sim.report.kit.charts import (
     history_chart,
     track_chart,
 )
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
-from tank2sim.report.kit.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
+from tank2sim.answer.charts.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.arrays import Array
+from tank2sim.cards import linear_card, read_card
+from tank2sim.demo.fmu_helpers import DemoOutcome, Workshop, demo_output_errors, error_words, largest_error
+from tank2sim.dynamics import Model, build
+from tank2sim.fmu.check import CheckReport
+from tank2sim.fmu.manoeuvre import InputSequence
+from tank2sim.fmu.replay import replay
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trial_file import trial_csv
@@ -78,9 +78,7 @@ def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Array]:
     return replay(path, InputSequence(motion.t, motion.u[:-1]), model)
 
 
-def _manoeuvre_section(
-    workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Array]
-) -> PageSection:
+def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Array]) -> Section:
     third, first = run[THIRD].trajectory, run[FIRST].trajectory
     tracks = track_chart(
         [
@@ -103,7 +101,7 @@ def _manoeuvre_section(
     workshop.write(f"mariner-{name}-track.png", chart_png(tracks))
     workshop.write(f"mariner-{name}-history.png", chart_png(histories))
     apart = np.hypot(fmu["motion.x"] - third["motion.x"], fmu["motion.y"] - third["motion.y"])
-    return PageSection(
+    return Section(
         heading=f"Mariner: {IN_WORDS[text]}",
         text=f"The FMU, given the same orders by FMPy, stays within {apart.max():.1e} m of the model.",
         tables=[_figure_table(run)],
@@ -119,7 +117,7 @@ def _manoeuvre_section(
     )
 
 
-def _figure_table(run: dict[str, Run]) -> PageTable:
+def _figure_table(run: dict[str, Run]) -> Table:
     rows: list[list[Cell]] = []
     for name, value in run[THIRD].figures.items():
         words, unit = in_words(name)
@@ -131,10 +129,10 @@ def _figure_table(run: dict[str, Run]) -> PageTable:
         else:
             rows.append([words, *(_cell(each) for each in both), unit])
     columns = [Column(title="figure"), *(Column(title=kind) for kind in run), Column(title="unit")]
-    return PageTable(caption="Manoeuvring figures", columns=columns, rows=rows)
+    return Table(caption="Manoeuvring figures", columns=columns, rows=rows)
 
 
-def _fmu_section(reports: list[CheckReport]) -> PageSection:
+def _fmu_section(reports: list[CheckReport]) -> Section:
     rows: list[list[Cell]] = [
         [
             report.path.rpartition("/")[2],
@@ -148,12 +146,12 @@ def _fmu_section(reports: list[CheckReport]) -> PageSection:
         for kind, errors in report.errors.items()
     ]
     heads = ("file", "standard", "kind", "largest error", "limit", "verdict")
-    table = PageTable(
+    table = Table(
         caption="Largest error of any output, relative to its range in the run",
         columns=[Column(title=head, digits=2) for head in heads],
         rows=rows,
     )
-    return PageSection(
+    return Section(
         heading="Four FMUs of the Mariner, checked",
         text=(
             "Each file was validated by FMPy and driven through steps of rudder and a failure of the steering gear. "
@@ -172,7 +170,7 @@ def _fmu_section(reports: list[CheckReport]) -> PageSection:
 
 def _stability_section(
     models: dict[str, Model], judged: dict[str, Stability], criteria: tuple[ImoCriterion, ...]
-) -> PageSection:
+) -> Section:
     point = straight_course(models[THIRD])
     channel = {"inputs": ["rudder.command"], "outputs": ["motion.r"]}
     system = state_space(models[THIRD], point, states=["motion.v", "motion.r", "rudder.angle"], **channel)
@@ -192,12 +190,12 @@ def _stability_section(
         [criterion.name, criterion.found, criterion.allowed, criterion.unit, verdicts[criterion.passed]]
         for criterion in criteria
     ]
-    imo = PageTable(
+    imo = Table(
         caption="IMO MSC.137(76), the worse of the two sides",
         columns=[Column(title=head) for head in ("criterion", "found", "allowed", "unit", "verdict")],
         rows=rows,
     )
-    return PageSection(
+    return Section(
         heading="Mariner: stability",
         text=f"C′ = {format_number(judged[THIRD].criterion, 3)}: {_verdict(judged[THIRD])} on a straight course.",
         tables=[_nomoto_table(judged), imo],
@@ -209,11 +207,11 @@ def _verdict(judged: Stability) -> str:
     return "stable" if judged.stable else "unstable"
 
 
-def _nomoto_table(judged: dict[str, Stability]) -> PageTable:
+def _nomoto_table(judged: dict[str, Stability]) -> Table:
     times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
     columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
     rows = [[kind, *vars(result.nomoto).values()] for kind, result in judged.items()]
-    return PageTable(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
+    return Table(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
 
 
 def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stability) -> list[KeyFigure]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from tank2sim.answer.page import Page, render_page
 from tank2sim.demo import PAGE
 from tank2sim.demo.fmu_helpers import Workshop
 from tank2sim.demo.mariner import mariner
 from tank2sim.demo.towed import towed_vehicle
-from tank2sim.report.kit.page import Page, render_page
 
 
 def write_demo(folder: Path, begin: Callable[[str], None]) -> dict[str, object]:

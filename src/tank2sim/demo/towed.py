@@ -7,6 +7,8 @@ from pathlib import Path
 import altair as alt
 import numpy as np
 
+from tank2sim.answer.charts.picture import Tow, chart_png, tow_chart
+from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.arrays import Array
 from tank2sim.bundled import bundled
 from tank2sim.cards import parse_card
@@ -18,8 +20,6 @@ from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.replay import replay
 from tank2sim.identification.tow.identify import TowIdentification, identify_tow, tow_card_text
 from tank2sim.records.tows import Tows, read_tows
-from tank2sim.report.kit.charts import Tow, chart_png, tow_chart
-from tank2sim.report.kit.page import Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
 
 WELL_POSED = ("B3",)
 """Drag terms that these tows determine (with M); the B1 and B2 of the paper in addition cannot be identified."""
@@ -80,8 +80,8 @@ def _chart(tows: Tows, times: Array, speed: Array) -> alt.LayerChart:
 
 def _section(
     paper: TowIdentification, chosen: TowIdentification, misses: list[dict[str, float]], chart: alt.LayerChart
-) -> PageSection:
-    return PageSection(
+) -> Section:
+    return Section(
         heading="A towed vehicle: from five tows to an FMU",
         text=(
             "An underwater vehicle was towed from rest by a known force (Wilinski and Zellman 1984, Table 1). Its mass "
@@ -138,8 +138,8 @@ def _misses(tows: Tows, times: Array, speed: Array) -> list[dict[str, float]]:
     ]
 
 
-def _miss_table(misses: list[dict[str, float]]) -> PageTable:
-    return PageTable(
+def _miss_table(misses: list[dict[str, float]]) -> Table:
+    return Table(
         caption="The FMU next to each tow",
         columns=[
             Column(title="tow", digits=1),
@@ -151,7 +151,7 @@ def _miss_table(misses: list[dict[str, float]]) -> PageTable:
     )
 
 
-def _estimates(result: TowIdentification, caption: str) -> PageTable:
+def _estimates(result: TowIdentification, caption: str) -> Table:
     units = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m"}
     unknowns = next(iter(result.fits.values())).unknowns
     rows = []
@@ -162,4 +162,4 @@ def _estimates(result: TowIdentification, caption: str) -> PageTable:
     columns = [Column(title="method")]
     for name in unknowns:
         columns += [Column(title=name, unit=units[name]), Column(title="±", unit=units[name], digits=2)]
-    return PageTable(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows, folded=True)
+    return Table(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows, folded=True)

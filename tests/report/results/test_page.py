@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tank2sim.answer.page import render_page
+from tank2sim.answer.parts import Verdict
 from tank2sim.errors import InputError
-from tank2sim.report.kit.json_values import alike, quantities, rows_of, titled, words
-from tank2sim.report.kit.page import Verdict, render_page
+from tank2sim.report.json_values import alike, quantities, rows_of, titled, words
 from tank2sim.report.results.page import result_page
 from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
 from tank2sim.report.results.subjects import needs_of

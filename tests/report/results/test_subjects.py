@@ -11,6 +11,9 @@ import pytest
 
 from tank2sim.analysis.glide.study import GlideQuestion
 from tank2sim.analysis.glide.study import study as glide_study
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.page import Page, render_page
+from tank2sim.answer.parts import Illustration, Section
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.files import json_text
@@ -19,8 +22,6 @@ from tank2sim.identification.tow.study import study_tows, towed_body
 from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
 from tank2sim.records.tows import read_tows
 from tank2sim.records.yaw import read_yaw_record
-from tank2sim.report.kit.charts import chart_specification
-from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
 from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
 from tests.report.opened_page import CHROMIUM, opened
@@ -335,7 +336,7 @@ def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
     results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, tow, yaw, glide, PILOTED]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
-        PageSection(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])
+        Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])
         for page in pages
     ]
     html = render_page(Page(title="All", sections=sections))

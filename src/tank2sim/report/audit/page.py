@@ -5,19 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import TimeMark
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
+from tank2sim.answer.charts.motion import TimeMark
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
+from tank2sim.report.json_values import Json
 from tank2sim.report.results.motions import is_columns, motions, stem_of
 
 _MOST_RECORDS = 12
@@ -38,7 +29,7 @@ def audit_page(found: Json) -> Page:
         KeyFigure(label="Repaired when the trials are read", value=f"{repaired} of {len(findings)}"),
         KeyFigure(label="Trials without a finding", value=f"{clean} of {len(trials)}"),
     ]
-    first = [PageSection(heading="Findings", tables=[_findings(findings)])] if findings else []
+    first = [Section(heading="Findings", tables=[_findings(findings)])] if findings else []
     return Page(
         title="Audit of trials" if len(trials) > 1 else f"Audit of {_file_name(trials[0])}",
         subtitle=f"{len(trials)} trials" if len(trials) > 1 else "One trial",
@@ -47,13 +38,13 @@ def audit_page(found: Json) -> Page:
         sections=[
             *first,
             *record_sections(found),
-            PageSection(heading="Trials", tables=[_trials(trials), _noise(trials)], folded=True),
+            Section(heading="Trials", tables=[_trials(trials), _noise(trials)], folded=True),
             *notices_section([notice for trial in trials for notice in trial.get("notices") or ()]),
         ],
     )
 
 
-def record_sections(found: Json) -> list[PageSection]:
+def record_sections(found: Json) -> list[Section]:
     """Return what each trial measured with the places of its findings, trials with findings first.
 
     All but the first are folded.
@@ -62,13 +53,13 @@ def record_sections(found: Json) -> list[PageSection]:
     findings = found["findings"]
     faulty = {entry["file"] for entry in findings}
     trials = [entry for entry in found["trials"] if is_columns(entry.get("histories"))]
-    sections: list[PageSection] = []
+    sections: list[Section] = []
     for trial in sorted(trials, key=lambda entry: entry["file"] not in faulty)[:_MOST_RECORDS]:
         mine = [entry for entry in findings if entry["file"] == trial["file"]]
         name, marks = _file_name(trial), _marks(mine, trial)
         charts = motions(name, {"measured": trial["histories"]}, marks=marks)
         sections.append(
-            PageSection(
+            Section(
                 heading=f"Record {name}",
                 text=_RED if marks else "" if mine else "Nothing is found wrong.",
                 charts=[_beside(chart) for chart in charts] if len(charts) > 1 else charts,
@@ -97,7 +88,7 @@ def _verdict(faults: Sequence[Mapping[str, Json]], findings: Sequence[Mapping[st
     return f"{first['column']} of {_file_name(first)} is wrong: {first['likely_truth']} ({repaired}).{more}"
 
 
-def _findings(findings: Sequence[Mapping[str, Json]]) -> PageTable:
+def _findings(findings: Sequence[Mapping[str, Json]]) -> Table:
     """Faults first; columns of a file of which the same is said are in one row."""
     heads = ("column", "what", "likely truth", "", "repaired", "file")
     columns: dict[tuple[Cell, ...], list[str]] = {}
@@ -106,10 +97,10 @@ def _findings(findings: Sequence[Mapping[str, Json]]) -> PageTable:
         said = entry["what"], entry["likely_truth"], kind, entry["repaired"], _file_name(entry)
         columns.setdefault(said, []).append(entry["column"])
     rows: list[list[Cell]] = [[", ".join(names), *said] for said, names in columns.items()]
-    return PageTable(caption="Findings", columns=[Column(title=head) for head in heads], rows=rows, folded=False)
+    return Table(caption="Findings", columns=[Column(title=head) for head in heads], rows=rows, folded=False)
 
 
-def _trials(trials: Sequence[Mapping[str, Json]]) -> PageTable:
+def _trials(trials: Sequence[Mapping[str, Json]]) -> Table:
     rows: list[list[Cell]] = [
         [
             _file_name(trial),
@@ -122,17 +113,17 @@ def _trials(trials: Sequence[Mapping[str, Json]]) -> PageTable:
     ]
     heads = [Column(title="file"), Column(title="duration", unit="s"), Column(title="step", unit="s", digits=3)]
     heads += [Column(title="rows", digits=6), Column(title="columns")]
-    return PageTable(caption="Trials", columns=heads, rows=rows, folded=False)
+    return Table(caption="Trials", columns=heads, rows=rows, folded=False)
 
 
-def _noise(trials: Sequence[Mapping[str, Json]]) -> PageTable:
+def _noise(trials: Sequence[Mapping[str, Json]]) -> Table:
     rows: list[list[Cell]] = [
         [_file_name(trial), name, f"{noise['sigma']:.2g}", noise["from"]]
         for trial in trials
         for name, noise in (trial.get("noise") or {}).items()
     ]
     heads = ("file", "signal", "standard deviation", "from")
-    return PageTable(caption="Noise, SI", columns=[Column(title=head) for head in heads], rows=rows)
+    return Table(caption="Noise, SI", columns=[Column(title=head) for head in heads], rows=rows)
 
 
 def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> list[TimeMark]:

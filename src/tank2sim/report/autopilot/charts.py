@@ -10,9 +10,8 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.records.thinning import thin_line
-from tank2sim.report.kit.analysis_charts import FrequencyResponse
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.analysis import FrequencyResponse
+from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     Chart,
@@ -23,7 +22,8 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     vector,
 )
-from tank2sim.report.kit.theme import CROSS
+from tank2sim.answer.charts.theme import CROSS
+from tank2sim.records.thinning import thin_line
 
 _HALF = 2.5
 """Half of the height of a Nyquist chart: what lies farther from the critical point endangers nothing (project

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from tank2sim.answer.charts.analysis import PolesZeros, pole_zero_chart
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table
 from tank2sim.report.autopilot.page import exported_section, gains_table
-from tank2sim.report.kit.analysis_charts import PolesZeros, pole_zero_chart
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import History, Signal, history_chart
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+from tank2sim.report.json_values import Json
 from tank2sim.units import to_si
 
 _HEADING = Signal(name="psi_deg", title="heading", unit="rad")
@@ -21,7 +22,7 @@ def craft_autopilot_page(found: Json) -> Page:
     if exported := found.get("export"):
         sections.append(exported_section(exported))
     if found["notices"]:
-        sections.append(PageSection(heading="Notes", notes=found["notices"]))
+        sections.append(Section(heading="Notes", notes=found["notices"]))
     return Page(
         title=f"{found['ship']}: autopilot of heading and speed",
         subtitle=found["source"],
@@ -64,7 +65,7 @@ def _figures(found: Json) -> list[KeyFigure]:
     ]
 
 
-def _runs(found: Json) -> PageSection:
+def _runs(found: Json) -> Section:
     thrusters = sorted(key for key in found["histories"]["course"] if key.startswith("n_"))
     turning = [
         Signal(name=key, title=key.removeprefix("n_").removesuffix("_rpm").replace("_", " "), unit="rad/s",
@@ -96,11 +97,11 @@ def _runs(found: Json) -> PageSection:
         Column(title="settling time", unit="s", digits=3),
         Column(title="a thruster at its limit", unit="%", digits=2),
     ]
-    return PageSection(
+    return Section(
         heading="Changes of course and speed",
         text="On the nonlinear craft in calm water, from a steady course; revolutions are those of the thrusters.",
         charts=charts,
-        tables=[PageTable(caption="Figures of the changes", columns=columns, rows=rows)],
+        tables=[Table(caption="Figures of the changes", columns=columns, rows=rows)],
     )
 
 
@@ -112,7 +113,7 @@ def _history(name: str, columns: Json) -> History:
     return History(label=name, time_s=columns["t_s"], values=values)
 
 
-def _controller(found: Json) -> PageSection:
+def _controller(found: Json) -> Section:
     low, high = found["largest_moment_Nm"]
     text = (
         f"A yaw moment of {-low:.3g} N m to port and {high:.3g} N m to starboard is ordered at most; the surge force "
@@ -121,7 +122,7 @@ def _controller(found: Json) -> PageSection:
     )
     poles = [complex(*pole) for pole in found["poles"]]
     drawn = [PolesZeros(label=f"{found['speed_mps']:.3g} m/s", poles=poles)]
-    return PageSection(
+    return Section(
         heading="Controller",
         text=text,
         tables=[gains_table(found["gains"])],

@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
+from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
+from tank2sim.answer.charts.motion import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.arrays import Array
 from tank2sim.report.autopilot.charts import (
     CrossTrack,
@@ -16,10 +20,7 @@ from tank2sim.report.autopilot.charts import (
     nyquist_chart,
     sensitivity_chart,
 )
-from tank2sim.report.kit.analysis_charts import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
-from tank2sim.report.kit.json_values import Json, quantities
-from tank2sim.report.kit.motion_charts import History, Signal, TrackData, history_chart, track_chart
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json, quantities
 
 HIGHEST_PEAK = 2.0
 """Ms above which a loop is thought to be weak: Astrom & Hagglund (2006), Advanced PID Control, take 1.2 to 2."""
@@ -53,7 +54,7 @@ def autopilot_page(found: Json) -> Page:
     if exported := found.get("export"):
         sections.append(exported_section(exported))
     if found["notices"]:
-        sections.append(PageSection(heading="Notes", notes=found["notices"]))
+        sections.append(Section(heading="Notes", notes=found["notices"]))
     return Page(
         title=f"{found['ship']}: heading autopilot",
         subtitle=found["source"],
@@ -111,7 +112,7 @@ def _figures(found: Json) -> list[KeyFigure]:
     ]
 
 
-def _controller(found: Json) -> PageSection:
+def _controller(found: Json) -> Section:
     alone, limits = found["ship_alone"], found["limits"]
     text = (
         f"The ship at {alone['speed_mps']:.4g} m/s: K = {alone['K_per_s']:.4g} 1/s, T = {alone['T_s']:.4g} s, "
@@ -125,7 +126,7 @@ def _controller(found: Json) -> PageSection:
             f"rudder is at its limit the integral is emptied, with a time constant of "
             f"{limits['anti_windup_time_s']:.3g} s."
         )
-    return PageSection(
+    return Section(
         heading="Controller",
         text=text,
         tables=[gains_table(found["gains"])],
@@ -133,16 +134,16 @@ def _controller(found: Json) -> PageSection:
     )
 
 
-def gains_table(gains: Mapping[str, float]) -> PageTable:
+def gains_table(gains: Mapping[str, float]) -> Table:
     """The gains of a controller by the names that the JSON has, units apart."""
     rows: list[list[Cell]] = []
     for name, value in gains.items():
         suffix = next((suffix for suffix in _UNITS if name.endswith(suffix)), "")
         rows.append([name.removesuffix(suffix).replace("_", " "), value, _UNITS.get(suffix, "")])
-    return PageTable(caption="Gains", columns=[Column(title=title) for title in ("gain", "value", "unit")], rows=rows)
+    return Table(caption="Gains", columns=[Column(title=title) for title in ("gain", "value", "unit")], rows=rows)
 
 
-def _loop(found: Json) -> PageSection:
+def _loop(found: Json) -> Section:
     margins = found["margins"]["at_speeds"]
     charts = loop_charts(found["responses"], margins[0])
     poles = [complex(*pole) for pole in margins[0]["poles"]]
@@ -160,7 +161,7 @@ def _loop(found: Json) -> PageSection:
     steps = [f"{loop[key]:.3g} deg ({name})" for name, key in limits.items() if loop[key] is not None]
     linear = f" Changes of course stay linear up to {' and '.join(steps)}." if steps else ""
     text = f"The ship with its steering gear, linearised at each speed, and the gains of the design.{linear}"
-    return PageSection(heading="Loop", text=text, tables=[_margins(margins)], charts=charts)
+    return Section(heading="Loop", text=text, tables=[_margins(margins)], charts=charts)
 
 
 def loop_charts(responses: Sequence[Mapping[str, Json]], first: Mapping[str, Json]) -> list[Illustration]:
@@ -208,7 +209,7 @@ def _from_the_near_end(label: str, omega: Array, value: NDArray[np.complex128]) 
     return FrequencyResponse(label=label, omega_radps=omega[last::-1], response=value[last::-1])
 
 
-def _margins(margins: Sequence[Mapping[str, Json]]) -> PageTable:
+def _margins(margins: Sequence[Mapping[str, Json]]) -> Table:
     columns = [
         Column(title="speed", unit="m/s"),
         Column(title="gain may grow by", digits=3),
@@ -228,7 +229,7 @@ def _margins(margins: Sequence[Mapping[str, Json]]) -> PageTable:
         ]
         for margin in margins
     ]
-    return PageTable(caption="Margins, the first at the speed of the design", columns=columns, rows=rows)
+    return Table(caption="Margins, the first at the speed of the design", columns=columns, rows=rows)
 
 
 def _history(label: str, columns: Mapping[str, Json], until_s: float = math.inf) -> History:
@@ -244,7 +245,7 @@ def _shown_until(*changes: Mapping[str, Json]) -> float:
     return math.inf if None in settled else 2 * max(settled)
 
 
-def _calm(found: Json) -> PageSection:
+def _calm(found: Json) -> Section:
     changes = found["closed_loop"]["course_changes"]
     columns = [
         Column(title="run"),
@@ -275,15 +276,15 @@ def _calm(found: Json) -> PageSection:
         "On the nonlinear model with the limits of the gear, in calm water, from a course that the autopilot has kept: "
         f"it holds the {found['ship_alone']['rudder_deg']:.3g} deg of rudder that the ship needs for it."
     )
-    return PageSection(
+    return Section(
         heading="Course changes",
         text=text,
-        tables=[PageTable(caption="Figures of course changes", columns=columns, rows=rows)],
+        tables=[Table(caption="Figures of course changes", columns=columns, rows=rows)],
         charts=charts,
     )
 
 
-def _weather(found: Json) -> PageSection:
+def _weather(found: Json) -> Section:
     weather, kept = found["weather"], found["closed_loop"]["course_keeping"]
     text = (
         f"Steering north in a current of {weather['current_mps']:.3g} m/s towards "
@@ -303,11 +304,11 @@ def _weather(found: Json) -> PageSection:
     ]
     history = _history("course keeping", found["histories"]["keeping"])
     chart = history_chart([history], _SIGNALS, title="Course keeping, the last waves")
-    table = PageTable(caption=f"Over the last {kept['duration_s']:.0f} s", columns=columns, rows=rows)
-    return PageSection(heading="Course keeping", text=text, tables=[table], charts=[Illustration(chart=chart)])
+    table = Table(caption=f"Over the last {kept['duration_s']:.0f} s", columns=columns, rows=rows)
+    return Section(heading="Course keeping", text=text, tables=[table], charts=[Illustration(chart=chart)])
 
 
-def _track(found: Json) -> PageSection:
+def _track(found: Json) -> Section:
     columns = [
         Column(title="guidance"),
         Column(title="length", unit="m"),
@@ -331,10 +332,10 @@ def _track(found: Json) -> PageSection:
         "Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap where a leg "
         "ends, for the next one counts from there; those on legs are of the second half of each."
     )
-    return PageSection(
+    return Section(
         heading="Track keeping",
         text=text,
-        tables=[PageTable(caption="Cross-track errors, positive to starboard", columns=columns, rows=rows)],
+        tables=[Table(caption="Cross-track errors, positive to starboard", columns=columns, rows=rows)],
         charts=[
             Illustration(chart=track_chart([*sailed, *wanted], title="Track and its legs")),
             Illustration(chart=cross_track_chart(errors, title="Cross-track error")),
@@ -342,7 +343,7 @@ def _track(found: Json) -> PageSection:
     )
 
 
-def exported_section(exported: Mapping[str, Json]) -> PageSection:
+def exported_section(exported: Mapping[str, Json]) -> Section:
     """The section on the FMU of an autopilot."""
     values = {key: value for key, value in exported.items() if not isinstance(value, list | dict)}
-    return PageSection(heading="FMU", tables=[quantities("The controller as an FMU", values)])
+    return Section(heading="FMU", tables=[quantities("The controller as an FMU", values)])

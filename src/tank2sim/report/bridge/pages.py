@@ -11,10 +11,10 @@ from markupsafe import Markup
 from tank2sim import __version__
 from tank2sim.analysis.validation.bridge_data import SHALLOW, Bridge
 from tank2sim.analysis.validation.ship_track import ShipTrack
+from tank2sim.answer.page import resource_text
 from tank2sim.report.bridge import boxes
 from tank2sim.report.bridge.boxes import Box, Row
 from tank2sim.report.bridge.drawings import Drawing, circles_drawing, stops_drawing
-from tank2sim.report.kit.page import resource_text
 
 PANEL_MM = (88.0, 62.0)
 STOPS_MM = (113.0, 48.0)
@@ -187,7 +187,7 @@ def _rendered(template: str, bridge: Bridge, **content: object) -> str:
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template(template).render(
         version=__version__,
-        style=Markup(resource_text("bridge/sheet.css")),
+        style=Markup(resource_text("report/bridge/sheet.css")),
         name=_cut(bridge.card.ship.name, _NAME),
         source=_cut(bridge.card.ship.source, _SOURCE),
         warning=WARNING,

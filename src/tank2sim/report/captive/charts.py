@@ -9,8 +9,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.records.thinning import thin_line, thin_points
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     POINT_SAMPLES,
@@ -30,8 +29,9 @@ from tank2sim.report.kit.chart_parts import (
     vector,
     with_unit,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.theme import BAND_OPACITY
+from tank2sim.answer.charts.theme import BAND_OPACITY
+from tank2sim.records.thinning import thin_line, thin_points
+from tank2sim.report.json_values import Json
 
 _CROWDED = 40
 _USUAL_LIMIT = 2.0

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import altair as alt
 
+from tank2sim.answer.charts.parts import NUMBER, Chart, data
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.report.captive.charts import derivative_certainty_chart
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, data
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 
 _CHANNELS = {
     "X": "surge force",
@@ -48,7 +49,7 @@ def mmg_reduction_page(found: Json) -> Page:
         ]
         for name, entry in coefficients.items()
     ]
-    budget = PageTable(
+    budget = Table(
         caption="Shares of the variance",
         columns=[
             *(Column(title=""), Column(title="scatter", unit="%", digits=3)),
@@ -80,27 +81,25 @@ def mmg_reduction_page(found: Json) -> Page:
             ),
         ],
         sections=[
-            PageSection(
+            Section(
                 heading="Computed against measured",
                 text="Each point is a condition; on the line the method gives what the gauge showed.",
                 charts=[
                     Illustration(chart=computed_chart(name, readings), half=True)
                     for name, readings in found["readings"].items()
                 ],
-                tables=[
-                    PageTable(caption="What is left", columns=[Column(title=head) for head in left_heads], rows=left)
-                ],
+                tables=[Table(caption="What is left", columns=[Column(title=head) for head in left_heads], rows=left)],
                 notes=found["notices"],
             ),
-            PageSection(
+            Section(
                 heading="Coefficients",
                 text="One weighted regression of all readings. The hull is in prime II, by 1/2 rho L d U².",
                 charts=[Illustration(chart=derivative_certainty_chart(known, title="Certainty of the coefficients"))]
                 if known
                 else [],
-                tables=[PageTable(caption="Coefficients", columns=[Column(title=head) for head in heads], rows=rows)],
+                tables=[Table(caption="Coefficients", columns=[Column(title=head) for head in heads], rows=rows)],
             ),
-            PageSection(
+            Section(
                 heading="Uncertainty budget",
                 text="After ITTC 7.5-02-06-04: the scatter of the tests, and errors common to all of them as "
                 "[uncertainty] of the campaign states them.",

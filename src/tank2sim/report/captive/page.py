@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 import altair as alt
 
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.identification.captive.tables import LEFT_OUT, prediction_rows
 from tank2sim.report.captive.charts import (
     Across,
@@ -19,8 +21,7 @@ from tank2sim.report.captive.charts import (
     loop_chart,
     residual_chart,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 
 _FORCES = {"X": "surge force", "Y": "sway force", "N": "yaw moment"}
 
@@ -59,7 +60,7 @@ def reduction_page(found: Json) -> Page:
     residuals = charts.pop("residuals")
     every = derivatives | found.get("heel_derivatives", {})
     sections = [
-        PageSection(
+        Section(
             heading="Derivatives",
             text="One weighted regression over the whole campaign; in the table, next to it the tests one after the "
             "other.",
@@ -68,7 +69,7 @@ def reduction_page(found: Json) -> Page:
             notes=found["warnings"],
         ),
         *_chart_sections(charts),
-        PageSection(
+        Section(
             heading="Each run predicted from the others",
             text="Root mean square error, % of the force's range.",
             tables=[_predictions(found["prediction_errors"])],
@@ -151,7 +152,7 @@ def _plot_chart(plot: Json) -> alt.TopLevelMixin:
 _LOOPS = {"Y": "Y of the water (N)", "N": "N of the water (N m)"}
 
 
-def _derivatives(derivatives: Json) -> PageTable:
+def _derivatives(derivatives: Json) -> Table:
     rows: list[list[Cell]] = []
     for name, derivative in derivatives.items():
         stepwise: list[Cell] = [None, None, ""]
@@ -161,10 +162,10 @@ def _derivatives(derivatives: Json) -> PageTable:
         rows.append([name, *regression, *stepwise, derivative["origin"]])
     heads = ("", "regression", "±", "test by test", "±", "from tests", "origin")
     columns = [Column(title=head) for head in heads]
-    return PageTable(caption="Derivatives, prime system, times 10⁵", columns=columns, rows=rows)
+    return Table(caption="Derivatives, prime system, times 10⁵", columns=columns, rows=rows)
 
 
-def _budget(budget: Json) -> list[PageSection]:
+def _budget(budget: Json) -> list[Section]:
     """The uncertainty budget; nothing for a result of an older version."""
     if not budget:
         return []
@@ -186,10 +187,8 @@ def _budget(budget: Json) -> list[PageSection]:
     ]
     meanings: list[list[Cell]] = [[source, words] for source, words in sources.items()]
     tables = [
-        PageTable(
-            caption="Shares of the variance; values and uncertainties prime, times 10⁵", columns=columns, rows=rows
-        ),
-        PageTable(caption="Sources", columns=[Column(title=""), Column(title="")], rows=meanings),
+        Table(caption="Shares of the variance; values and uncertainties prime, times 10⁵", columns=columns, rows=rows),
+        Table(caption="Sources", columns=[Column(title=""), Column(title="")], rows=meanings),
     ]
     notes = []
     if budget["not_stated"]:
@@ -198,10 +197,10 @@ def _budget(budget: Json) -> list[PageSection]:
         percent = 100 * budget["blockage_speed_relative"]
         notes.append(f"By Schuster's formula the walls raise the speed past the model by {percent:.2g} %.")
     text = "After ITTC 7.5-02-06-04: the combined uncertainty is the standard error of the result."
-    return [PageSection(heading="Uncertainty budget", text=text, tables=tables, notes=notes, folded=True)]
+    return [Section(heading="Uncertainty budget", text=text, tables=tables, notes=notes, folded=True)]
 
 
-def _left_out(selection: Json) -> list[PageSection]:
+def _left_out(selection: Json) -> list[Section]:
     rows: list[list[Cell]] = [
         [choice["name"], choice["reason"], choice["explanation"]]
         for choices in selection.values()
@@ -212,23 +211,23 @@ def _left_out(selection: Json) -> list[PageSection]:
         return []
     columns = [Column(title=head) for head in ("term", "reason", "why")]
     text = "Terms that the runs excite and that are not in the card."
-    table = PageTable(caption="Left out", columns=columns, rows=rows)
-    return [PageSection(heading="Which terms, and why", text=text, tables=[table], folded=True)]
+    table = Table(caption="Left out", columns=columns, rows=rows)
+    return [Section(heading="Which terms, and why", text=text, tables=[table], folded=True)]
 
 
-def _predictions(errors: Json) -> PageTable:
+def _predictions(errors: Json) -> Table:
     rows: list[list[Cell]] = [
         [kind.replace("_", " "), *(percent.get(force) for force in _FORCES)]
         for kind, percent in prediction_rows(errors).items()
     ]
     columns = [Column(title="runs of type"), *(Column(title=force, unit="%", digits=2) for force in _FORCES)]
-    return PageTable(caption="Prediction errors", columns=columns, rows=rows)
+    return Table(caption="Prediction errors", columns=columns, rows=rows)
 
 
 _AGAINST_MOTION = "Points: measured, bars: their 95 % intervals. Lines: the fit; shaded: its 95 % band."
 
 
-def _chart_sections(charts: Mapping[str, alt.TopLevelMixin]) -> list[PageSection]:
+def _chart_sections(charts: Mapping[str, alt.TopLevelMixin]) -> list[Section]:
     """A section for each force and its angles and amplitudes, one for what concerns all."""
     groups: dict[str, list[Illustration]] = {}
     for stem, chart in charts.items():
@@ -237,7 +236,7 @@ def _chart_sections(charts: Mapping[str, alt.TopLevelMixin]) -> list[PageSection
         illustration = Illustration(chart=chart, half=bool(words) and not stem.startswith("harmonics"))
         groups.setdefault(heading, []).append(illustration)
     return [
-        PageSection(
+        Section(
             heading=heading,
             text="" if heading == _LOOPS_HEADING else _AGAINST_MOTION,
             charts=illustrations,

@@ -10,7 +10,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     NUMBER,
     Chart,
     axis_above,
@@ -20,21 +20,12 @@ from tank2sim.report.kit.chart_parts import (
     stacked,
     vector,
 )
-from tank2sim.report.kit.charts import History, Signal, history_chart
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
-from tank2sim.report.kit.theme import BAND_OPACITY
+from tank2sim.answer.charts.picture import History, Signal, history_chart
+from tank2sim.answer.charts.theme import BAND_OPACITY
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
+from tank2sim.report.json_values import Json
 
 _FORCES = {"X": "X (N)", "Y": "Y (N)", "N": "N (N m)"}
 _KEYS = {"X": "N", "Y": "N", "N": "Nm"}
@@ -64,7 +55,7 @@ def run_page(found: Json) -> Page:
     if found["repeats"]:
         verdict = Verdict.CAUTION if odd else Verdict.PASSED
         figures.append(KeyFigure(label="Coefficients in which repeats differ", value=len(odd), verdict=verdict))
-    sections: list[PageSection] = []
+    sections: list[Section] = []
     charts = run_charts(found)
     for heading, stem, caption in (
         ("Averaged cycle", "cycle", "Points: mean by phase; shaded: ± one standard deviation; line: harmonics."),
@@ -73,19 +64,19 @@ def run_page(found: Json) -> Page:
     ):
         shown = [Illustration(chart=chart, caption=caption) for key, chart in charts.items() if key.startswith(stem)]
         if shown:
-            sections.append(PageSection(heading=heading, charts=shown))
+            sections.append(Section(heading=heading, charts=shown))
     text = (
         "F = mean + cos_n cos(n omega t) + sin_n sin(n omega t), t from a moment of the greatest leading velocity (v "
         "in pure sway, else r). X, Y, N as recorded in the hydrodynamic sense; X_water, Y_water, N_water without the "
         "inertia of the model. Errors include coloured noise within the run."
     )
     tables = [_coefficients(run) for run in runs]
-    sections.insert(len(sections) - 2, PageSection(heading="Fourier coefficients", text=text, tables=tables))
+    sections.insert(len(sections) - 2, Section(heading="Fourier coefficients", text=text, tables=tables))
     if derivatives := [run for run in runs if run["derivatives"]]:
         heading = "Derivatives of the run alone"
-        sections.insert(1, PageSection(heading=heading, tables=[_derivatives(derivatives)]))
+        sections.insert(1, Section(heading=heading, tables=[_derivatives(derivatives)]))
     if found["repeats"]:
-        sections.insert(1, PageSection(heading="Repeats", tables=[_repeats(found["repeats"])]))
+        sections.insert(1, Section(heading="Repeats", tables=[_repeats(found["repeats"])]))
     sections += notices_section(found["notices"])
     title = ", ".join(str(run["name"]).rpartition("/")[2] for run in runs)
     return Page(
@@ -235,7 +226,7 @@ def _words(kind: str) -> str:
     return kind.replace("_", " ")
 
 
-def _coefficients(run: Json) -> PageTable:
+def _coefficients(run: Json) -> Table:
     heads = ("signal", "unit", "order", "cos", "±", "sin", "±", "amplitude", "±")
     columns = [
         *(Column(title=head) for head in heads),
@@ -251,20 +242,20 @@ def _coefficients(run: Json) -> PageTable:
         ]
         for each in run["coefficients"]
     ]
-    return PageTable(caption=f"Fourier coefficients: {run['name']}", columns=columns, rows=rows)
+    return Table(caption=f"Fourier coefficients: {run['name']}", columns=columns, rows=rows)
 
 
-def _derivatives(runs: Sequence[Json]) -> PageTable:
+def _derivatives(runs: Sequence[Json]) -> Table:
     rows: list[list[Cell]] = [
         [run["name"], name, 1e5 * value, 1e5 * run["derivatives"]["standard_errors"][name]]
         for run in runs
         for name, value in run["derivatives"]["values"].items()
     ]
     columns = [Column(title=title) for title in ("run", "", "value", "±")]
-    return PageTable(caption="Prime system, times 10⁵; at this frequency and amplitude", columns=columns, rows=rows)
+    return Table(caption="Prime system, times 10⁵; at this frequency and amplitude", columns=columns, rows=rows)
 
 
-def _repeats(repeats: Sequence[Json]) -> PageTable:
+def _repeats(repeats: Sequence[Json]) -> Table:
     rows: list[list[Cell]] = [
         [
             *(row[key] for key in ("signal", "part", "order", "mean", "deviation", "expected", "chance")),
@@ -273,4 +264,4 @@ def _repeats(repeats: Sequence[Json]) -> PageTable:
         for row in repeats
     ]
     titles = ("force", "", "order", "mean", "deviation of a run", "explained by noise", "chance", "")
-    return PageTable(caption="Repeats", columns=[Column(title=title) for title in titles], rows=rows)
+    return Table(caption="Repeats", columns=[Column(title=title) for title in titles], rows=rows)

@@ -7,22 +7,13 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, SeriesLook, data, plain, series_look, stacked
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.marks import assumed_words
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, SeriesLook, data, plain, series_look, stacked
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import TrackData, track_chart
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 _COEFFICIENTS = (
@@ -111,18 +102,18 @@ def _figure(summary: Mapping[str, Json]) -> KeyFigure:
     return KeyFigure(label=label, value=f"{beyond} of {compared}", verdict=verdict, note=note)
 
 
-def _cards(cards: Sequence[Mapping[str, Json]]) -> PageSection:
+def _cards(cards: Sequence[Mapping[str, Json]]) -> Section:
     rows: list[list[Cell]] = [
         [card["label"] + (" (reference)" if place == 0 else ""), card["ship"], card["source"]]
         for place, card in enumerate(cards)
     ]
     columns = [Column(title="card"), Column(title="ship"), Column(title="source")]
-    return PageSection(heading="Cards", tables=[PageTable(caption="What is compared.", columns=columns, rows=rows)])
+    return Section(heading="Cards", tables=[Table(caption="What is compared.", columns=columns, rows=rows)])
 
 
 def _coefficients(
     coefficients: Sequence[Mapping[str, Json]], effects: Sequence[Mapping[str, Json]], labels: Sequence[str]
-) -> PageSection:
+) -> Section:
     tables, alike, alone = [], 0, []
     for caption, rows, factor in (
         ("Coefficients that differ (values and errors times 1000).", coefficients, 1000.0),
@@ -140,21 +131,19 @@ def _coefficients(
     if any(difference["standard_errors"] is not None for row in both for difference in row["differences"]):
         caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
         charts.append(Illustration(chart=_errors_chart(both, labels), caption=caption))
-    return PageSection(
+    return Section(
         heading="Coefficients", text="\n\n".join([_COEFFICIENTS, _ASSUMED, *omitted]), tables=tables, charts=charts
     )
 
 
-def _coefficient_table(
-    caption: str, rows: Sequence[Mapping[str, Json]], labels: Sequence[str], factor: float
-) -> PageTable:
+def _coefficient_table(caption: str, rows: Sequence[Mapping[str, Json]], labels: Sequence[str], factor: float) -> Table:
     columns = [Column(title="coefficient")]
     for label in labels:
         columns += [Column(title=label, digits=6), Column(title="s.e.", digits=3)]
     for label in labels[1:]:
         columns += [Column(title=f"{label}: difference", unit="%", digits=3), Column(title="z", digits=3)]
     columns.append(Column(title="remark"))
-    return PageTable(caption=caption, columns=columns, rows=[_coefficient_row(row, factor) for row in rows])
+    return Table(caption=caption, columns=columns, rows=[_coefficient_row(row, factor) for row in rows])
 
 
 def _coefficient_row(row: Mapping[str, Json], factor: float) -> list[Cell]:
@@ -206,7 +195,7 @@ def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[s
     return chart
 
 
-def _figure_differences(trials: Sequence[Mapping[str, Json]], labels: Sequence[str], assumed: str) -> list[PageSection]:
+def _figure_differences(trials: Sequence[Mapping[str, Json]], labels: Sequence[str], assumed: str) -> list[Section]:
     """Differences of the figures from those of the reference, all manoeuvres in one chart."""
     rows = [
         {"run": label, "name": name, "percent": plain(percent)}
@@ -217,7 +206,7 @@ def _figure_differences(trials: Sequence[Mapping[str, Json]], labels: Sequence[s
         return []
     chart = Illustration(chart=_percent_chart(rows, labels, assumed), caption=_PERCENT)
     tables = [_trial_table(trial, labels) for trial in trials]
-    return [PageSection(heading="Figures of manoeuvres", text=_TRIALS, charts=[chart], tables=tables)]
+    return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[chart], tables=tables)]
 
 
 _PERCENT = (
@@ -259,7 +248,7 @@ def _percent_panel(rows: Sequence[ChartRecord], trial: str, x: alt.X, look: Seri
     return chart
 
 
-def _tracks(trials: Sequence[Mapping[str, Json]]) -> list[PageSection]:
+def _tracks(trials: Sequence[Mapping[str, Json]]) -> list[Section]:
     charts = []
     for trial in trials:
         tracks = [
@@ -269,10 +258,10 @@ def _tracks(trials: Sequence[Mapping[str, Json]]) -> list[PageSection]:
         if tracks:
             name = trial["name"][:1].upper() + trial["name"][1:]
             charts.append(Illustration(chart=track_chart(tracks, title=name, height_px=400), half=True))
-    return [PageSection(heading="Tracks", charts=charts)] if charts else []
+    return [Section(heading="Tracks", charts=charts)] if charts else []
 
 
-def _trial_table(trial: Mapping[str, Json], labels: Sequence[str]) -> PageTable:
+def _trial_table(trial: Mapping[str, Json], labels: Sequence[str]) -> Table:
     columns = [Column(title="figure"), Column(title="unit")]
     columns += [Column(title=label) for label in labels]
     for label in labels[1:]:
@@ -286,7 +275,7 @@ def _trial_table(trial: Mapping[str, Json], labels: Sequence[str]) -> PageTable:
         for apart, z in zip(row["differences"], row["differences_standard_errors"], strict=True):
             cells += [None if apart is None else format_number(apart, 3), z]
         rows.append(cells)
-    return PageTable(caption=f"Figures of the {trial['name']}.", columns=columns, rows=rows, folded=True)
+    return Table(caption=f"Figures of the {trial['name']}.", columns=columns, rows=rows, folded=True)
 
 
 def _with_error(value: float | None, error: float | None) -> str | None:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
-from tank2sim.report.kit.json_values import Json
+from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, data, plain, series_look
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 _WIDTH = 320

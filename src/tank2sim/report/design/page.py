@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, notices_section
 from tank2sim.report.design.charts import certainty_charts, figure_words, run_planes
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    notices_section,
-)
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 _FIGURES = (
@@ -52,14 +44,14 @@ def campaign_design_page(found: Json) -> Page:
     )
     charts = [Illustration(chart=chart, half=True) for chart in certainty_charts(found, "hours", "h")]
     sections = [
-        PageSection(heading="Certainty of the figures", text=_FIGURES, charts=charts, tables=[figure_table(found)]),
-        PageSection(
+        Section(heading="Certainty of the figures", text=_FIGURES, charts=charts, tables=[figure_table(found)]),
+        Section(
             heading="Where the runs are",
             text=_RUNS,
             charts=[Illustration(chart=chart, half=True) for chart in run_planes(found)],
         ),
-        PageSection(heading="Coefficients that matter", text=_COEFFICIENTS, tables=[coefficient_table(found)]),
-        PageSection(heading="The plan", tables=[_runs(found)]),
+        Section(heading="Coefficients that matter", text=_COEFFICIENTS, tables=[coefficient_table(found)]),
+        Section(heading="The plan", tables=[_runs(found)]),
         *notices_section(found["notices"]),
     ]
     return Page(
@@ -87,7 +79,7 @@ def _verdict(needed: float | None, whole: float, unit: str, usual: str) -> str:
     )
 
 
-def figure_table(found: Json) -> PageTable:
+def figure_table(found: Json) -> Table:
     """Figures with their standard errors by the design and by the usual programme."""
     rows: list[list[Cell]] = [
         [
@@ -101,14 +93,14 @@ def figure_table(found: Json) -> PageTable:
         for name, row in found["figures"].items()
     ]
     heads = ("figure", "value", "design", "usual", "ratio", "ratio of variances")
-    return PageTable(
+    return Table(
         caption="Figures and their standard errors",
         columns=[Column(title=head, digits=4) for place, head in enumerate(heads)],
         rows=rows,
     )
 
 
-def coefficient_table(found: Json) -> PageTable:
+def coefficient_table(found: Json) -> Table:
     """Coefficients with their standard errors and shares, those with the largest share first."""
     names = list(found["figures"])
     order = sorted(
@@ -120,7 +112,7 @@ def coefficient_table(found: Json) -> PageTable:
             None if (share := row["share_of_variance"].get(figure)) is None else 100 * share for figure in names
         ]
         rows.append([name, row["value"], row["design"], row["usual"], *shares])
-    return PageTable(
+    return Table(
         caption="Coefficients",
         columns=[
             Column(title=""),
@@ -133,7 +125,7 @@ def coefficient_table(found: Json) -> PageTable:
     )
 
 
-def _runs(found: Json) -> PageTable:
+def _runs(found: Json) -> Table:
     heads = {
         "run": ("run", ""),
         "type": ("type", ""),
@@ -152,7 +144,7 @@ def _runs(found: Json) -> PageTable:
         [run[key].replace("_", " ") if key == "type" else run[key] for key in heads] for run in found["runs"]
     ]
     columns = [Column(title=title, unit=unit, digits=3) for title, unit in heads.values()]
-    return PageTable(caption="Runs in their order", columns=columns, rows=rows)
+    return Table(caption="Runs in their order", columns=columns, rows=rows)
 
 
 _TRIAL = (
@@ -189,22 +181,22 @@ def trial_design_page(found: Json) -> Page:
         [name, row["standard_error"], row["design"], row["usual"]] for name, row in found["coefficients"].items()
     ]
     sections = [
-        PageSection(
+        Section(
             heading="Certainty of the figures",
             text=_TRIAL,
             charts=[Illustration(chart=chart, half=True) for chart in certainty_charts(found, "minutes", "min")],
             tables=[
-                PageTable(
+                Table(
                     caption="Figures and their standard errors",
                     columns=[Column(title=head, digits=3) for head in heads],
                     rows=figures,
                 )
             ],
         ),
-        PageSection(
+        Section(
             heading="The plan",
             tables=[
-                PageTable(
+                Table(
                     caption="Manoeuvres",
                     columns=[
                         Column(title="manoeuvre"),
@@ -217,11 +209,11 @@ def trial_design_page(found: Json) -> Page:
                 )
             ],
         ),
-        PageSection(
+        Section(
             heading="Coefficients",
             text="Standard errors before the trial (prime), and after it over those before.",
             tables=[
-                PageTable(
+                Table(
                     caption="Coefficients",
                     columns=[Column(title=head, digits=3) for head in ("", "before", "design", "usual")],
                     rows=coefficients,

@@ -8,8 +8,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.arrays import Array
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     NUMBER,
     Chart,
     ChartRecord,
@@ -22,9 +21,10 @@ from tank2sim.report.kit.chart_parts import (
     stacked,
     vector,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Illustration
-from tank2sim.report.kit.theme import BAND_OPACITY
+from tank2sim.answer.charts.theme import BAND_OPACITY
+from tank2sim.answer.parts import Illustration
+from tank2sim.arrays import Array
+from tank2sim.report.json_values import Json
 
 _WIDTH = 680
 _APART = 1e-6

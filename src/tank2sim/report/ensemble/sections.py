@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from tank2sim.answer.parts import Cell, Column, Section, Table
 from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.charts import curve_charts
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
+from tank2sim.report.json_values import Json
 from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
 from tank2sim.units import in_words
 
@@ -34,7 +34,7 @@ _RARE = (
 )
 
 
-def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
+def _tail_table(rare: Sequence[tuple[str, Json]]) -> Table:
     """Small probabilities of not meeting a criterion, each with what it rests on."""
     rows: list[list[Cell]] = []
     for name, tail in rare:
@@ -44,7 +44,7 @@ def _tail_table(rare: Sequence[tuple[str, Json]]) -> PageTable:
     heads = ["criterion", "probability not met", "standard error", "effective size", "distance", "if linear"]
     heads += ["linear figure there", "figure there"]
     caption = "Too rare for the ensemble: by importance sampling."
-    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=rows)
+    return Table(caption=caption, columns=[Column(title=head) for head in heads], rows=rows)
 
 
 def _tail_notes(rare: Sequence[tuple[str, Json]]) -> list[str]:
@@ -64,7 +64,7 @@ def _tail_notes(rare: Sequence[tuple[str, Json]]) -> list[str]:
     return notes + [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
 
 
-def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> PageSection:
+def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Section:
     """Return the section of the page of stability: from ``ensemble`` and ``imo`` of the JSON."""
     beyond_card = {criterion["name"]: criterion["beyond_card"] for criterion in criteria}
     rows: list[list[Cell]] = []
@@ -91,7 +91,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
     if probability is not None:
         interval = f" (95 % interval {between[0]:.3f} to {between[1]:.3f})" if between else ""
         stable = f" It is stable on a straight course with probability {probability:.3g}{interval}."
-    criteria_table = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
+    criteria_table = Table(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
     together = found.get("imo_all")
     if together:
         low, high = together["interval_95"]
@@ -102,7 +102,7 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
     rare = [(chance["name"], chance["tail"]) for chance in found["imo"] if chance.get("tail")]
     if together and together["tail"]:
         rare.append(("any of these", together["tail"]))
-    return PageSection(
+    return Section(
         heading=f"Ensemble of {found['members']}{assumed_words(found['notices'])}",
         text=_TEXT + _CHANCES + stable + (_RARE if rare else ""),
         tables=[
@@ -115,9 +115,9 @@ def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> Pa
     )
 
 
-def figures_section(found: Json) -> PageSection:
+def figures_section(found: Json) -> Section:
     """Return the section of a page of influence coefficients, from ``ensemble`` of the JSON."""
-    return PageSection(
+    return Section(
         heading=f"Ensemble of {found['members']}{assumed_words(found['notices'])}",
         text=_TEXT,
         tables=[_table("Figures over the ensemble.", found["figures"])],
@@ -125,11 +125,11 @@ def figures_section(found: Json) -> PageSection:
     )
 
 
-def _table(caption: str, bands: Mapping[str, Json]) -> PageTable:
+def _table(caption: str, bands: Mapping[str, Json]) -> Table:
     columns = [Column(title=head) for head in ("figure", "unit", LOW, MIDDLE, HIGH, "shown by")]
     rows: list[list[Cell]] = []
     for name, band in bands.items():
         kind, at, argument = name.partition("@")
         words, unit = in_words(kind)
         rows.append([words + at + argument, unit, *(band[key] for key in ("p5", "p50", "p95", "shown_by"))])
-    return PageTable(caption=caption, columns=columns, rows=rows)
+    return Table(caption=caption, columns=columns, rows=rows)

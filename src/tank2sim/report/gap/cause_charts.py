@@ -9,13 +9,7 @@ from typing import NamedTuple
 import altair as alt
 import numpy as np
 
-from tank2sim.arrays import Array
-from tank2sim.gap.outcome.export import joined
-from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
-from tank2sim.identification.trials.as_json import as_number
-from tank2sim.report.gap.charts import SETS, small
-from tank2sim.report.gap.text import as_percent, or_nan, trial_name
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     NUMBER,
     STACKS,
     Chart,
@@ -26,8 +20,14 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     with_unit,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
+from tank2sim.answer.numbers import format_number
+from tank2sim.arrays import Array
+from tank2sim.gap.outcome.export import joined
+from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
+from tank2sim.identification.trials.as_json import as_number
+from tank2sim.report.gap.charts import SETS, small
+from tank2sim.report.gap.text import as_percent, or_nan, trial_name
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 MOST_RIVALS = 12

@@ -7,6 +7,20 @@ from collections.abc import Callable, Sequence
 import altair as alt
 import numpy as np
 
+from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps, switch
+from tank2sim.answer.charts.parts import (
+    NUMBER,
+    Chart,
+    ChartRecord,
+    SeriesLook,
+    axis_above,
+    data,
+    extent,
+    plain,
+    records,
+    series_look,
+    with_unit,
+)
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.as_json import as_number
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
@@ -23,21 +37,7 @@ from tank2sim.report.identification.charts import (
     history_grid,
     track_grid,
 )
-from tank2sim.report.kit.before_after import before_after_switch, misfit_maps, switch
-from tank2sim.report.kit.chart_parts import (
-    NUMBER,
-    Chart,
-    ChartRecord,
-    SeriesLook,
-    axis_above,
-    data,
-    extent,
-    plain,
-    records,
-    series_look,
-    with_unit,
-)
-from tank2sim.report.kit.json_values import Json
+from tank2sim.report.json_values import Json
 from tank2sim.units import to_si
 
 MOST_TRIALS_DRAWN = 12

@@ -9,12 +9,13 @@ from typing import Any
 
 import altair as alt
 
+from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict
 from tank2sim.gap.fleet.summary import REPORT_FILE, FleetSummary, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, data, series_look
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Link, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 
 _SHIPS = (
     "Misfit is the root mean square of simulated less measured, in standard deviations of the measurement noise: 1 is "
@@ -33,17 +34,15 @@ def fleet_page(fleet: FleetSummary) -> Page:
         chart = _misfit_chart(found)
         charts = [Illustration(chart=chart, caption=_CHART)]
         sections.append(
-            PageSection(
-                heading="Ships", text=_SHIPS, tables=[_ships(found)], charts=charts if chart is not None else []
-            )
+            Section(heading="Ships", text=_SHIPS, tables=[_ships(found)], charts=charts if chart is not None else [])
         )
     if fleet.faults:
         rows: list[list[Cell]] = [[fault.folder, fault.fault] for fault in fleet.faults]
         columns = [Column(title="ship"), Column(title="why")]
-        table = PageTable(caption="Ships that could not be judged", columns=columns, rows=rows)
-        sections.append(PageSection(heading="Without a result", tables=[table]))
+        table = Table(caption="Ships that could not be judged", columns=columns, rows=rows)
+        sections.append(Section(heading="Without a result", tables=[table]))
     if fleet.notices:
-        sections.append(PageSection(heading="Notices", notes=fleet.notices))
+        sections.append(Section(heading="Notices", notes=fleet.notices))
     return Page(
         title=f"Fleet: {fleet.name}",
         subtitle=f"What the models of {len(fleet.ships)} ships lack",
@@ -65,7 +64,7 @@ def _figures(fleet: FleetSummary) -> list[KeyFigure]:
     return figures
 
 
-def _ships(found: list[ShipSummary]) -> PageTable:
+def _ships(found: list[ShipSummary]) -> Table:
     rows: list[list[Cell]] = [
         [
             Link(text=ship.folder, path=f"{ship.folder}/{REPORT_FILE}"),
@@ -79,7 +78,7 @@ def _ships(found: list[ShipSummary]) -> PageTable:
     ]
     heads = ("ship", "name", "verdict", "what is missing", "misfit before", "misfit after", "of trials")
     # Misfits are rounded to hundredths: nothing more is cut off.
-    return PageTable(caption="What was found", columns=[Column(title=head, digits=7) for head in heads], rows=rows)
+    return Table(caption="What was found", columns=[Column(title=head, digits=7) for head in heads], rows=rows)
 
 
 def _effects(ship: ShipSummary) -> str:
@@ -160,13 +159,13 @@ def fleet_page_of_json(found: Json) -> Page:
     return replace(page, sections=[_without_links(section) for section in page.sections])
 
 
-def _without_links(section: PageSection) -> PageSection:
+def _without_links(section: Section) -> Section:
     tables = [_plain(table) for table in section.tables]
     linked = any(isinstance(cell, Link) for table in section.tables for row in table.rows for cell in row)
     text = f"{section.text} {_LINKS}".strip() if linked else section.text
     return replace(section, text=text, tables=tables)
 
 
-def _plain(table: PageTable) -> PageTable:
+def _plain(table: Table) -> Table:
     rows = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in table.rows]
     return replace(table, rows=rows)

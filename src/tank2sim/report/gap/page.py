@@ -7,6 +7,9 @@ from collections.abc import Sequence
 
 import altair as alt
 
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE, replaces
@@ -43,9 +46,7 @@ from tank2sim.report.gap.text import (
     verdict_in_words,
     with_error,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 _SURE = 0.9
@@ -87,12 +88,12 @@ def gap_page(found: Json) -> Page:
         return [Illustration(chart=charts[stem], caption=_CAPTIONS.get(stem, _RUN)) for stem in names]
 
     sections = [
-        PageSection(
+        Section(
             heading="What was found",
             tables=[*_parameters(found), *_by_trial(found)],
             charts=drawn("worst_tracks"),
         ),
-        PageSection(
+        Section(
             heading="How sure, and what else it could be",
             text="\n\n".join(verdict_context(found)),
             tables=[*_candidates(found), *_explanations(found)],
@@ -100,10 +101,10 @@ def gap_page(found: Json) -> Page:
         ),
     ]
     if hidden := _could_hide(found):
-        sections.append(PageSection(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
+        sections.append(Section(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
     sections += [
-        PageSection(heading="Next test", text=_next_test(found), charts=drawn("expected")),
-        PageSection(
+        Section(heading="Next test", text=_next_test(found), charts=drawn("expected")),
+        Section(
             heading="Before and after" if changes_simulation(found) else "How well the card follows",
             text=_BEFORE_AND_AFTER
             + ("" if changes_simulation(found) else _UNCHANGED)
@@ -111,23 +112,23 @@ def gap_page(found: Json) -> Page:
             tables=[_signals(found), _trials(found)],
             charts=drawn("misfit"),
         ),
-        PageSection(
+        Section(
             heading="Where the gap is",
             text="\n\n".join([_place_text(found), _acting_text(found)]),
             tables=[*_places(found), *_passages(found)],
             charts=drawn("when_signal", "signal", "when_force", "force", "places"),
         ),
-        PageSection(heading="Tracks and motions", text=_track_text(found), charts=drawn(*_RUNS)),
+        Section(heading="Tracks and motions", text=_track_text(found), charts=drawn(*_RUNS)),
     ]
     if figures := _figures(found):
-        sections.append(PageSection(heading="Figures of manoeuvres", text=_FIGURES, tables=figures))
+        sections.append(Section(heading="Figures of manoeuvres", text=_FIGURES, tables=figures))
     if coefficients := _coefficients(found):
-        sections.append(PageSection(heading="Coefficients", text=_COEFFICIENTS, tables=[coefficients]))
+        sections.append(Section(heading="Coefficients", text=_COEFFICIENTS, tables=[coefficients]))
     if "agreement" in charts:
-        sections.append(PageSection(heading="Do the trials agree", text=_AGREEMENT, charts=drawn("agreement")))
+        sections.append(Section(heading="Do the trials agree", text=_AGREEMENT, charts=drawn("agreement")))
     notices = found["notices"][len(found["cautions"]) :]
     noise = [_noise(found), *([_table("Notices", ("",), [[notice] for notice in notices])] if notices else [])]
-    sections.append(PageSection(heading="Noise and notices" if notices else "Noise", text=_NOISE, tables=noise))
+    sections.append(Section(heading="Noise and notices" if notices else "Noise", text=_NOISE, tables=noise))
     fitting = sum(not trial["held_out"] for trial in found["trials"])
     held_out = len(found["trials"]) - fitting
     subtitle = f"What the model lacks, from {_count(fitting, 'trial')} and {held_out or 'none'} held out"
@@ -141,7 +142,7 @@ def gap_page(found: Json) -> Page:
     )
 
 
-def _coefficients(found: Json) -> PageTable | None:
+def _coefficients(found: Json) -> Table | None:
     """Coefficients that were fitted together with the effects, those that moved most first."""
 
     def moved(entry: Json) -> float:
@@ -250,7 +251,7 @@ def _key_figures(found: Json) -> list[KeyFigure]:
     return figures
 
 
-def _parameters(found: Json) -> list[PageTable]:
+def _parameters(found: Json) -> list[Table]:
     rows: list[list[Cell]] = [
         [effect_in_words(effect["name"]), *parameter_cells(effect, name)]
         for effect in found["effects"]
@@ -261,7 +262,7 @@ def _parameters(found: Json) -> list[PageTable]:
     return [_table(f"{what}, ± one standard error", heads, rows)] if rows else []
 
 
-def _by_trial(found: Json) -> list[PageTable]:
+def _by_trial(found: Json) -> list[Table]:
     """Winds and currents that differ from trial to trial."""
     tables = []
     for effect in found["effects"]:
@@ -280,7 +281,7 @@ def _by_trial(found: Json) -> list[PageTable]:
     return tables
 
 
-def _candidates(found: Json) -> list[PageTable]:
+def _candidates(found: Json) -> list[Table]:
     """The sizes of the other effects that it could be."""
     rows: list[list[Cell]] = [
         [effect_in_words(candidate["name"]), *parameter_cells(candidate, name), as_percent(candidate["confidence"])]
@@ -291,7 +292,7 @@ def _candidates(found: Json) -> list[PageTable]:
     return [_table("What the others would be, ± one standard error", heads, rows)] if rows else []
 
 
-def _explanations(found: Json) -> list[PageTable]:
+def _explanations(found: Json) -> list[Table]:
     """The consequences of each effect that is only possible."""
     named = [effect["name"] for effect in found["effects"]] if found["verdict"] == AMBIGUOUS else []
     possible = dict.fromkeys([*named, *(name for text in found["alternatives"] for name in effects_of(text))])
@@ -305,7 +306,7 @@ def _black_box(found: Json) -> bool:
     return any("black_box" in trial["misfit"] for trial in found["trials"])
 
 
-def _trials(found: Json) -> PageTable:
+def _trials(found: Json) -> Table:
     models = _compared(found)
     rows: list[list[Cell]] = [
         [trial_name(trial["trial"]), word]
@@ -318,7 +319,7 @@ def _trials(found: Json) -> PageTable:
     return _table("Misfit of each trial, noise units", heads, rows, digits=_ALL)
 
 
-def _signals(found: Json) -> PageTable:
+def _signals(found: Json) -> Table:
     measured = {name for trial in found["trials"] for name in trial["signals"]}
     words = [word for word, held in SETS.items() if any(trial["held_out"] == held for trial in found["trials"])]
     columns = [(word, model) for word in words for model in _compared(found)]
@@ -369,7 +370,7 @@ def _acting_text(found: Json) -> str:
     return text + without
 
 
-def _passages(found: Json) -> list[PageTable]:
+def _passages(found: Json) -> list[Table]:
     rows: list[list[Cell]] = [
         [
             trial_name(passage["trial"]),
@@ -383,7 +384,7 @@ def _passages(found: Json) -> list[PageTable]:
         *(Column(title=head, unit="s", digits=3) for head in ("from", "to")),
         Column(title="size", unit="standard errors", digits=2),
     ]
-    return [PageTable(caption="When the cause acts", columns=columns, rows=rows)] if rows else []
+    return [Table(caption="When the cause acts", columns=columns, rows=rows)] if rows else []
 
 
 _MOST_PASSAGES = 12
@@ -395,7 +396,7 @@ _NO_FORCE = (
 )
 
 
-def _places(found: Json) -> list[PageTable]:
+def _places(found: Json) -> list[Table]:
     rows: list[list[Cell]] = [
         [
             trial_name(place["trial"]),
@@ -411,7 +412,7 @@ def _places(found: Json) -> list[PageTable]:
         *(Column(title=head, unit="s", digits=3) for head in ("from", "to")),
         Column(title="share of the misfit", unit="%", digits=2),
     ]
-    return [PageTable(caption="Where the misfit arises, beyond the noise", columns=columns, rows=rows)] if rows else []
+    return [Table(caption="Where the misfit arises, beyond the noise", columns=columns, rows=rows)] if rows else []
 
 
 def _track_text(found: Json) -> str:
@@ -424,7 +425,7 @@ def _track_text(found: Json) -> str:
     return f"Trials {'; '.join(many)}." if many else ""
 
 
-def _figures(found: Json) -> list[PageTable]:
+def _figures(found: Json) -> list[Table]:
     held = {trial["trial"]: trial["held_out"] for trial in found["trials"]}
     groups: dict[str, list[list[Cell]]] = {}
     for figure in sorted(found["figures"], key=lambda figure: not held.get(figure["trial"])):
@@ -439,7 +440,7 @@ def _figures(found: Json) -> list[PageTable]:
     ]
 
 
-def _could_hide(found: Json) -> PageTable | None:
+def _could_hide(found: Json) -> Table | None:
     rows: list[list[Cell]] = []
     for effect, sizes in found["could_hide"].items():
         for name, size in sizes.items():
@@ -462,7 +463,7 @@ def _next_test(found: Json) -> str:
     return f"{why}\n\nIts orders are in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
 
 
-def _noise(found: Json) -> PageTable:
+def _noise(found: Json) -> Table:
     rows: list[list[Cell]] = []
     for column, noise in found["misfit"]["noise"].items():
         name = signal_of(column)
@@ -471,8 +472,8 @@ def _noise(found: Json) -> PageTable:
     return _table("Measurement noise", heads, rows)
 
 
-def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[Cell]], *, digits: int = 4) -> PageTable:
-    return PageTable(caption=caption, columns=[Column(title=head, digits=digits) for head in heads], rows=rows)
+def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[Cell]], *, digits: int = 4) -> Table:
+    return Table(caption=caption, columns=[Column(title=head, digits=digits) for head in heads], rows=rows)
 
 
 def _rounded(value: float) -> float:

@@ -10,9 +10,8 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.arrays import Array
-from tank2sim.records.thinning import thin_line
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.charts.parts import (
     HOVER_SAMPLES,
     LINE_SAMPLES,
     NUMBER,
@@ -26,8 +25,9 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     vector,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import History, Signal, history_chart
+from tank2sim.arrays import Array
+from tank2sim.records.thinning import thin_line
+from tank2sim.report.json_values import Json
 from tank2sim.units import to_si
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table
 from tank2sim.report.glide.charts import (
     corners_of,
     elevation_chart,
@@ -16,8 +18,7 @@ from tank2sim.report.glide.charts import (
     space_path,
     swing_chart,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+from tank2sim.report.json_values import Json
 
 
 def glide_page(found: Json) -> Page:
@@ -31,7 +32,7 @@ def glide_page(found: Json) -> Page:
     if errors := found.get("quasi_steady_error"):
         sections.append(_quasi_steady(errors))
     sections.append(
-        PageSection(heading="What to know of this card", text=f"From {found['source']}.", notes=found["notices"])
+        Section(heading="What to know of this card", text=f"From {found['source']}.", notes=found["notices"])
     )
     return Page(
         title=found["glider"],
@@ -103,12 +104,12 @@ def _row(glide: Json) -> list[Cell]:
     return [glide[key] for key in _KEYS]
 
 
-def _design(found: Json) -> PageSection:
+def _design(found: Json) -> Section:
     design = found["design"]
     marked = {"best glide": design["best_glide"], "fastest over the ground": design["fastest_glide"]}
     # Straight glides have no turning radius.
     tables = [
-        PageTable(
+        Table(
             caption="Design glides",
             columns=[Column(title=""), *_HEADS[:-1]],
             rows=[[name, *_row(glide)[:-1]] for name, glide in marked.items()],
@@ -123,7 +124,7 @@ def _design(found: Json) -> PageSection:
     )
     caption = "From the best glide to almost straight down. Grey: the path of the best glide; no path is less steep."
     polar = Illustration(chart=polar_chart(found["polar"], marked, title="Glide polar"), caption=caption)
-    return PageSection(heading="What is best", text=text, tables=tables, charts=[polar])
+    return Section(heading="What is best", text=text, tables=tables, charts=[polar])
 
 
 def _paths(found: Json) -> list[Illustration]:
@@ -146,7 +147,7 @@ def _paths(found: Json) -> list[Illustration]:
     return charts
 
 
-def _ranges(ranges: Sequence[Json]) -> PageTable:
+def _ranges(ranges: Sequence[Json]) -> Table:
     columns = [
         Column(title="path angle", unit="deg"),
         Column(title="net buoyancy", unit="kg"),
@@ -158,44 +159,44 @@ def _ranges(ranges: Sequence[Json]) -> PageTable:
     units = {"path_angle_deg": 1, "buoyancy_kg": 1, "cycles": 1, "range_m": 1000, "duration_s": 86400, "energy_J": 1000}
     rows: list[list[Cell]] = [[row[key] / unit for key, unit in units.items()] for row in ranges]
     caption = f"Range on {ranges[0]['budget_kg']:g} kg of ballast pushed out at {ranges[0]['depth_m']:g} m"
-    return PageTable(caption=caption, columns=columns, rows=rows)
+    return Table(caption=caption, columns=columns, rows=rows)
 
 
-def _glides(glides: Sequence[Json], printed: Sequence[Json]) -> PageSection:
+def _glides(glides: Sequence[Json], printed: Sequence[Json]) -> Section:
     turning = any(glide["turning_radius_m"] is not None for glide in glides)
     heads, last = (_HEADS, len(_HEADS)) if turning else (_HEADS[:-1], -1)
     columns, rows = [*heads], [_row(glide)[:last] for glide in glides]
     if turning:
         columns.append(Column(title="with added mass", unit="m"))
         rows = [[*row, glide["turning_radius_with_added_mass_m"]] for row, glide in zip(rows, glides, strict=True)]
-    tables = [PageTable(caption="Steady glides at the angles asked for", columns=columns, rows=rows)]
+    tables = [Table(caption="Steady glides at the angles asked for", columns=columns, rows=rows)]
     if printed:
         columns = [*heads, Column(title="speed over that above", digits=3)]
         pairs = zip(printed, glides, strict=True)
         rows = [[*_row(row)[:last], row["speed_mps"] / glide["speed_mps"]] for row, glide in pairs]
         caption = "The same by the equations as printed"
-        tables.append(PageTable(caption=caption, columns=columns, rows=rows))
+        tables.append(Table(caption=caption, columns=columns, rows=rows))
     text = "Angles + up, incidence + when the flow comes from below"
     if turning:
         text += (
             ", roll + starboard side down: it turns a dive to starboard and a climb to port. The turning radius "
             "neglects the added mass, as published; the last column is that of the transient model, which has it"
         )
-    return PageSection(heading="Steady glides", text=f"{text}.", tables=tables)
+    return Section(heading="Steady glides", text=f"{text}.", tables=tables)
 
 
-def _path(found: Json) -> PageSection:
+def _path(found: Json) -> Section:
     heads = {"t_s": "t|s", "x_m": "x north|m", "y_m": "y east|m", "height_m": "height|m", "heading_deg": "heading|deg"}
     columns = [Column(title=head.split("|")[0], unit=head.split("|")[1]) for head in heads.values()]
     rows: list[list[Cell]] = [[place[key] for key in heads] for place in found["path"]]
-    table = PageTable(caption="Start and end of each step, steady glides", columns=columns, rows=rows)
-    return PageSection(heading="Path of the programme", tables=[table], charts=_paths(found))
+    table = Table(caption="Start and end of each step, steady glides", columns=columns, rows=rows)
+    return Section(heading="Path of the programme", tables=[table], charts=_paths(found))
 
 
-def _quasi_steady(errors: Json) -> PageSection:
+def _quasi_steady(errors: Json) -> Section:
     swings = swing_chart(errors["swings"], title="Error of the quasi-steady motion, swings")
     steps = quasi_steady_chart(errors["steps"], title="Error of the quasi-steady path, steps")
-    return PageSection(
+    return Section(
         heading="How slowly the controls must change",
         text="A path of steady glides holds where the controls change slowly. How slowly, "
         "the transient model shows: with mass and added mass, it flies swings and steps of the controls.",

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import Chart
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    notices_section,
-)
+from tank2sim.answer.charts.parts import Chart
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, notices_section
+from tank2sim.report.json_values import Json
 
 _FIGURES = (
     "Nine of ten ships lie in each interval: wide by the dimensions alone, narrow by the figures that were given, too. "
@@ -46,16 +38,16 @@ def guess_page(found: Json) -> Page:
         note = f"takes {100 * share:.0f} % of the variance of the others away"
         cards.append(KeyFigure(label="Would help most", value=_named(best), note=note))
     parts = [
-        PageSection(
+        Section(
             heading="Figures",
             text=_FIGURES,
             charts=[Illustration(chart=figures_chart(found))],
             tables=[_figure_table(found)],
         ),
-        PageSection(heading="What the figures settle", text=_NUMBERS, tables=[_number_table(found)]),
+        Section(heading="What the figures settle", text=_NUMBERS, tables=[_number_table(found)]),
     ]
     if found["next_figures"]:
-        parts.append(PageSection(heading="Which further figure would help most", text=_HELP, tables=[_help(found)]))
+        parts.append(Section(heading="Which further figure would help most", text=_HELP, tables=[_help(found)]))
     parts += notices_section(found["notices"])
     subtitle = f"{size}, block coefficient {dimensions['block']:g}, {dimensions['speed_kn']:g} kn"
     name = "A guessed ship" if found["ship"] == "guessed ship" else f"{found['ship']}: a guess"
@@ -132,7 +124,7 @@ def figures_chart(found: Json) -> alt.TopLevelMixin:
     return chart
 
 
-def _figure_table(found: Json) -> PageTable:
+def _figure_table(found: Json) -> Table:
     heads = ("figure", "unit", "given", "± standard error", "by dimensions, 5 %", "95 %", "found, 5 %", "50 %", "95 %")
     rows: list[list[Cell]] = []
     for key, entry in found["figures"].items():
@@ -141,12 +133,10 @@ def _figure_table(found: Json) -> PageTable:
         rows.append(
             [_named(key), entry["unit"], *given, before["p5"], before["p95"], *(after[q] for q in ("p5", "p50", "p95"))]
         )
-    return PageTable(
-        caption="Figures, m and deg", columns=[Column(title=head) for head in heads], rows=rows, folded=True
-    )
+    return Table(caption="Figures, m and deg", columns=[Column(title=head) for head in heads], rows=rows, folded=True)
 
 
-def _number_table(found: Json) -> PageTable:
+def _number_table(found: Json) -> Table:
     heads = ("number", "by dimensions", "± standard error", "with the figures", "± standard error", "")
     rows: list[list[Cell]] = [
         [
@@ -156,10 +146,10 @@ def _number_table(found: Json) -> PageTable:
         ]
         for name, row in found["parameters"].items()
     ]
-    return PageTable(caption="Numbers of the card, prime", columns=[Column(title=head) for head in heads], rows=rows)
+    return Table(caption="Numbers of the card, prime", columns=[Column(title=head) for head in heads], rows=rows)
 
 
-def _help(found: Json) -> PageTable:
+def _help(found: Json) -> Table:
     rows: list[list[Cell]] = [[_named(key), 100 * share] for key, share in found["next_figures"].items()]
     columns = [Column(title="figure"), Column(title="variance gone", unit="%", digits=2)]
-    return PageTable(caption="One more figure", columns=columns, rows=rows)
+    return Table(caption="One more figure", columns=columns, rows=rows)

@@ -8,11 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.arrays import Array
-from tank2sim.identification.trials.as_json import as_number, relative_error
-from tank2sim.records.thinning import Indices, thin_points
-from tank2sim.report.kit.before_after import before_after_switch, switch
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.before_after import before_after_switch, switch
+from tank2sim.answer.charts.parts import (
     NUMBER,
     STACKS,
     Chart,
@@ -27,7 +24,10 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     with_unit,
 )
-from tank2sim.report.kit.json_values import Json
+from tank2sim.arrays import Array
+from tank2sim.identification.trials.as_json import as_number, relative_error
+from tank2sim.records.thinning import Indices, thin_points
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 MEASURED, BEFORE, AFTER = "measured", "card before", "card found"

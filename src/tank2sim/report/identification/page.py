@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.identification.trials.as_json import (
     SET_KEYS,
     estimate_rows,
@@ -27,8 +29,7 @@ from tank2sim.report.identification.parameter_charts import (
     posterior_chart,
     singular_value_chart,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 
 FITTED, HELD_OUT = "fitted", "held out"
 
@@ -81,14 +82,14 @@ def identification_page(found: Json) -> Page:
             if stem.startswith(stems)
         ]
 
-    sections: list[PageSection] = []
+    sections: list[Section] = []
     for word in (HELD_OUT, FITTED):
         stem = word.replace(" ", "_")
         if charts_there := drawn(f"tracks_{stem}", f"histories_{stem}"):
             count = len(found["errors_over_windows"][SET_KEYS[word]])
             text = f"The {MOST_TRIALS} of {count} trials with the largest error of yaw rate."
             sections.append(
-                PageSection(
+                Section(
                     heading=f"Trials {word}",
                     text=text if count > MOST_TRIALS else "",
                     charts=charts_there,
@@ -96,11 +97,9 @@ def identification_page(found: Json) -> Page:
                 )
             )
     if tables := _figure_tables(found):
-        sections.append(
-            PageSection(heading="Figures of manoeuvres", text=_FIGURES, charts=drawn("figures"), tables=tables)
-        )
+        sections.append(Section(heading="Figures of manoeuvres", text=_FIGURES, charts=drawn("figures"), tables=tables))
     sections.append(
-        PageSection(
+        Section(
             heading="Error of each signal",
             text=_FOLLOWED,
             charts=drawn("windows"),
@@ -108,7 +107,7 @@ def identification_page(found: Json) -> Page:
         )
     )
     sections.append(
-        PageSection(
+        Section(
             heading="Parameters",
             text=_PARAMETERS + _widened(found["prior_scale"]),
             charts=drawn("parameters", "correlation", "singular_values"),
@@ -118,7 +117,7 @@ def identification_page(found: Json) -> Page:
     )
     if posterior := found["posterior"]:
         sections.append(
-            PageSection(
+            Section(
                 heading="Posterior",
                 text=_POSTERIOR.format(**posterior) + ("" if posterior["converged"] else _NOT_CONVERGED),
                 charts=drawn("posterior"),
@@ -127,11 +126,11 @@ def identification_page(found: Json) -> Page:
         )
     if structures := structure_rows(found):
         table = _table("Yaw-rate error over windows of trials left out of the fit, %", _STRUCTURE_HEADS, structures)
-        sections.append(PageSection(heading="Structure, by cross-validation", tables=[table]))
+        sections.append(Section(heading="Structure, by cross-validation", tables=[table]))
     if found["notices"]:
         rows: list[list[object]] = [[notice] for notice in found["notices"]]
         sections.append(
-            PageSection(
+            Section(
                 heading="What was repaired, scaled and assumed", tables=[_table("Notices", ("",), rows)], folded=True
             )
         )
@@ -257,7 +256,7 @@ def _widened(scale: Mapping[str, float]) -> str:
     return f" The card's standard errors were widened as the trials demanded: {text}."
 
 
-def _figure_tables(found: Json) -> list[PageTable]:
+def _figure_tables(found: Json) -> list[Table]:
     heads = ("trial", "figure", "measured", "before", "now", "error", "95 %")
     tables = []
     for word in (HELD_OUT, FITTED):
@@ -273,8 +272,8 @@ def _figure_tables(found: Json) -> list[PageTable]:
     return tables
 
 
-def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[object]]) -> PageTable:
+def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[object]]) -> Table:
     cells: list[list[Cell]] = [
         [value if isinstance(value, float | int | str) else None for value in row] for row in rows
     ]
-    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)
+    return Table(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)

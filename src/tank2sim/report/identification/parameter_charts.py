@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
+from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
 from tank2sim.identification.trials.as_json import as_number, value_with_error
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
-from tank2sim.report.kit.chart_parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
-from tank2sim.report.kit.json_values import Json
+from tank2sim.report.json_values import Json
 
 _NORMAL = 1.959964
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import altair as alt
 import numpy as np
 
+from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.arrays import Array
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, plain, series_look
-from tank2sim.report.kit.json_values import Json
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 EXACT, DIFFERENCE = "exact slope", "10 % difference"

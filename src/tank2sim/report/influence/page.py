@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.arrays import Array
 from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.sections import figures_section
@@ -18,9 +21,7 @@ from tank2sim.report.influence.charts import (
     short_name,
     variance_chart,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 _COEFFICIENTS = (
@@ -46,7 +47,7 @@ def influence_page(found: Json) -> Page:
     drawn = influence_charts(coefficients)
     charts = [Illustration(chart=chart, half=len(drawn) > 1) for chart in drawn]
     heading = "Influence coefficients"
-    sections.append(PageSection(heading=heading, text=_COEFFICIENTS, charts=charts, notes=found["notices"]))
+    sections.append(Section(heading=heading, text=_COEFFICIENTS, charts=charts, notes=found["notices"]))
     sections.append(_uncertainty(found, coefficients))
     if "agreed" in found:
         sections.append(_together(found["agreed"]))
@@ -110,7 +111,7 @@ _COLUMNS = 4
 """Figures in a table of coefficients: as many as a sheet of paper is wide."""
 
 
-def _all_coefficients(result: InfluenceData) -> PageSection:
+def _all_coefficients(result: InfluenceData) -> Section:
     count = len(result.figures)
     tables = []
     for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference)):
@@ -118,12 +119,12 @@ def _all_coefficients(result: InfluenceData) -> PageSection:
             rows = range(first, min(first + _COLUMNS, count))
             part = f", from {figure_label(result.figures[first])} on" if count > _COLUMNS else ""
             tables.append(_table(f"{caption}{part}", result, K, rows))
-    return PageSection(heading="Coefficients of all parameters", tables=tables)
+    return Section(heading="Coefficients of all parameters", tables=tables)
 
 
-def _table(caption: str, result: InfluenceData, K: Array, rows: Sequence[int]) -> PageTable:
+def _table(caption: str, result: InfluenceData, K: Array, rows: Sequence[int]) -> Table:
     labels = [figure_label(result.figures[row]) for row in rows]
-    return PageTable(
+    return Table(
         caption=caption,
         columns=[Column(title="parameter"), *(Column(title=label, unit="%", digits=3) for label in labels)],
         rows=[[name, *(_cell(K[row, place]) for row in rows)] for place, name in enumerate(result.names)],
@@ -134,7 +135,7 @@ def _cell(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else float(np.round(value, 3)) + 0.0
 
 
-def _uncertainty(found: Json, coefficients: InfluenceData) -> PageSection:
+def _uncertainty(found: Json, coefficients: InfluenceData) -> Section:
     figures: Mapping[str, Mapping[str, Json]] = found["figures"]
     text = _ERRORS.format(found.get("standard_errors", "from the card's standard errors"))
     rows: list[Sequence[Cell]] = []
@@ -151,11 +152,11 @@ def _uncertainty(found: Json, coefficients: InfluenceData) -> PageSection:
     known = any(figure["standard_error"] > 0 for figure in figures.values())
     charts = [Illustration(chart=variance_chart(coefficients))] if known else []
     assumed = assumed_words(found["notices"])
-    table = PageTable(caption="Figures and their standard errors", columns=columns, rows=rows)
-    return PageSection(heading=f"What is known of the figures{assumed}", text=text, charts=charts, tables=[table])
+    table = Table(caption="Figures and their standard errors", columns=columns, rows=rows)
+    return Section(heading=f"What is known of the figures{assumed}", text=text, charts=charts, tables=[table])
 
 
-def _together(agreed: Mapping[str, Json]) -> PageSection:
+def _together(agreed: Mapping[str, Json]) -> Section:
     changes: list[Sequence[Cell]] = [
         [key.removeprefix("derivatives."), value] for key, value in agreed["percent"].items()
     ]
@@ -168,22 +169,22 @@ def _together(agreed: Mapping[str, Json]) -> PageSection:
         [figure_label(text), *(_cell(figure[way]) for way in ways)] for text, figure in agreed["figures"].items()
     ]
     percent = [Column(title=title, unit="%") for title in ways.values()]
-    return PageSection(
+    return Section(
         heading="Agreed variation",
         text="All these change together. To first order a figure changes by the sum of Kc K / 10; next to it, what "
         "computing the changed ship gives.",
         tables=[
-            PageTable(
+            Table(
                 caption="Agreed changes",
                 columns=[Column(title="parameter"), Column(title="Kc", unit="%")],
                 rows=changes,
             ),
-            PageTable(caption="Change of the figures", columns=[Column(title="figure"), *percent], rows=figures),
+            Table(caption="Change of the figures", columns=[Column(title="figure"), *percent], rows=figures),
         ],
     )
 
 
-def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
+def _tuning(found: Json, tuned: Mapping[str, Json]) -> Section:
     targets = _targets_of(tuned)
     figures: list[Sequence[Cell]] = []
     for text, figure in found["figures"].items():
@@ -204,13 +205,13 @@ def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
     if tuned["agreed_times"] is not None:
         notes.append(f"The agreed variation was taken {tuned['agreed_times']:+.3g} times.")
     names = {key: short_name(key, figure) for key, figure in found["parameters"].items()}
-    return PageSection(
+    return Section(
         heading="Tuning",
         text=f"By the {'fewest' if tuned['by'] == 'fewest' else 'most uncertain'} parameters, each within "
         f"{tuned['within_standard_errors']:g} standard errors of the card.",
         charts=[Illustration(chart=moves_chart(tuned, names))] if tuned["parameters"] else [],
         tables=[
-            PageTable(
+            Table(
                 caption="Figures before and after",
                 columns=[Column(title=head, digits=5) for head in heads],
                 rows=figures,
@@ -220,7 +221,7 @@ def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
     )
 
 
-def _moves(parameters: Mapping[str, Mapping[str, Json]]) -> PageSection:
+def _moves(parameters: Mapping[str, Mapping[str, Json]]) -> Section:
     rows: list[Sequence[Cell]] = [
         [key, parameter["before"], parameter["after"], parameter["standard_errors"]]
         for key, parameter in parameters.items()
@@ -231,5 +232,5 @@ def _moves(parameters: Mapping[str, Mapping[str, Json]]) -> PageSection:
         Column(title="after", digits=6),
         Column(title="move", unit="standard errors", digits=3),
     ]
-    table = PageTable(caption="Parameters that changed, as the card's file has them", columns=columns, rows=rows)
-    return PageSection(heading="What tuning changed", tables=[table])
+    table = Table(caption="Parameters that changed, as the card's file has them", columns=columns, rows=rows)
+    return Section(heading="What tuning changed", tables=[table])

@@ -7,21 +7,12 @@ from pathlib import PurePath
 
 import numpy as np
 
+from tank2sim.answer.charts.parts import vector
+from tank2sim.answer.charts.picture import History, Signal, TimeMark, TrackData, history_chart, track_chart
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.arrays import Array
-from tank2sim.report.kit.chart_parts import vector
-from tank2sim.report.kit.charts import History, Signal, TimeMark, TrackData, history_chart, track_chart
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
+from tank2sim.report.json_values import Json
 
 _SIGNALS = (
     Signal(name="rudder_order", title="rudder order", unit="rad"),
@@ -60,11 +51,11 @@ def log_page(found: Json) -> Page:
         KeyFigure(label="Faults", value=faults, verdict=Verdict.CAUTION if faults else Verdict.PASSED),
     ]
     sections = [*_map(found), *_time_line(found)]
-    sections.append(PageSection(heading="Stretches", tables=[_stretch_table(stretches)]))
+    sections.append(Section(heading="Stretches", tables=[_stretch_table(stretches)]))
     sections += _verdicts(found.get("identified"))
     sections += notices_section(found["notices"])
     tables = [_channel_table(channels), _log_table(found["logs"])]
-    sections.append(PageSection(heading="Channels and logs", tables=tables, folded=True))
+    sections.append(Section(heading="Channels and logs", tables=tables, folded=True))
     names = ", ".join(PurePath(str(entry["file"])).name for entry in found["logs"])
     subtitle = f"Voyage from {found['begins_utc']}" if found["begins_utc"] else "Voyage without a date"
     return Page(
@@ -92,7 +83,7 @@ def _in_short(orders: Sequence[str]) -> str:
     return f"({len(orders)})" if len(orders) > 1 else ""
 
 
-def _map(found: Json) -> list[PageSection]:
+def _map(found: Json) -> list[Section]:
     if not found["track"]:
         return []
     time, x, y = (vector(found["track"][name]) for name in ("t_s", "x_m", "y_m"))
@@ -109,7 +100,7 @@ def _map(found: Json) -> list[PageSection]:
     if len(cut) > _MOST_TRACKS:
         caption += f" The longest {_MOST_TRACKS} of {len(cut)} trials are shown."
     chart = Illustration(chart=track_chart(tracks, title="Map"), caption=caption)
-    return [PageSection(heading="Map", charts=[chart])]
+    return [Section(heading="Map", charts=[chart])]
 
 
 def _inside(time: Array, stretch: Json) -> np.ndarray:
@@ -117,7 +108,7 @@ def _inside(time: Array, stretch: Json) -> np.ndarray:
     return np.asarray((time >= begin) & (time <= begin + float(stretch["duration_s"])))
 
 
-def _time_line(found: Json) -> list[PageSection]:
+def _time_line(found: Json) -> list[Section]:
     line = found["time_line"]
     shown = [signal for signal in _SIGNALS if signal.name in line]
     if not shown:
@@ -140,10 +131,10 @@ def _time_line(found: Json) -> list[PageSection]:
     chart = history_chart(
         [History(label="log", time_s=time, values=values)], shown, title="What was logged", height_px=70, marks=marks
     )
-    return [PageSection(heading="Time line", charts=[Illustration(chart=chart, caption=caption)])]
+    return [Section(heading="Time line", charts=[Illustration(chart=chart, caption=caption)])]
 
 
-def _stretch_table(stretches: Json) -> PageTable:
+def _stretch_table(stretches: Json) -> Table:
     heads = [
         Column(title="stretch"),
         Column(title="begins", unit="s", digits=6),
@@ -160,17 +151,17 @@ def _stretch_table(stretches: Json) -> PageTable:
         [*(stretch[key] for key in keys), stretch["yaw_rate_rms_degps"], stretch["file"] or "-"]
         for stretch in stretches
     ]
-    return PageTable(caption="Stretches", columns=heads, rows=rows)
+    return Table(caption="Stretches", columns=heads, rows=rows)
 
 
-def _channel_table(channels: Json) -> PageTable:
+def _channel_table(channels: Json) -> Table:
     heads = [Column(title=title) for title in ("quantity", "stream", "unit", "sign", "confidence", "used", "why")]
     keys = ("quantity", "stream", "unit", "sign", "confidence", "use", "why")
     rows: list[list[Cell]] = [[channel[key] for key in keys] for channel in channels]
-    return PageTable(caption="Channels, to be confirmed or corrected in channels.toml", columns=heads, rows=rows)
+    return Table(caption="Channels, to be confirmed or corrected in channels.toml", columns=heads, rows=rows)
 
 
-def _verdicts(identified: Json) -> list[PageSection]:
+def _verdicts(identified: Json) -> list[Section]:
     """What the trials say of each coefficient of a craft, and the five minutes that would say more."""
     if not identified:
         return []
@@ -185,21 +176,21 @@ def _verdicts(identified: Json) -> list[PageSection]:
         [name, entry["value"], entry["standard_error"], entry["verdict"], entry["by"] or "-"]
         for name, entry in identified["coefficients"].items()
     ]
-    tables = [PageTable(caption="Coefficients", columns=heads, rows=rows)]
+    tables = [Table(caption="Coefficients", columns=heads, rows=rows)]
     if identified["next_trials"]:
         further = [Column(title="five minutes of (port/starboard, % of full)"), Column(title="would determine")]
         orders: list[list[Cell]] = [
             [entry["words"], ", ".join(entry["determines"]) or "-"] for entry in identified["next_trials"]
         ]
-        tables.append(PageTable(caption="Next trial", columns=further, rows=orders))
+        tables.append(Table(caption="Next trial", columns=further, rows=orders))
     text = (
         "Identified: the standard error is at most a quarter of the value. Bounded: the trials have at least halved "
         "what was uncertain before. Not determined: the value is the card's."
     )
-    return [PageSection(heading="What the trials determine", text=text, tables=tables)]
+    return [Section(heading="What the trials determine", text=text, tables=tables)]
 
 
-def _log_table(logs: Json) -> PageTable:
+def _log_table(logs: Json) -> Table:
     heads = [Column(title=title) for title in ("file", "format", "streams", "read and lost")]
     rows: list[list[Cell]] = [
         [
@@ -210,4 +201,4 @@ def _log_table(logs: Json) -> PageTable:
         ]
         for entry in logs
     ]
-    return PageTable(caption="Logs", columns=heads, rows=rows)
+    return Table(caption="Logs", columns=heads, rows=rows)

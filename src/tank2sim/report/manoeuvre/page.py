@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tank2sim.marks import assumed_words
-from tank2sim.report.kit.json_values import Json, is_number_value, words
-from tank2sim.report.kit.manoeuvre_charts import (
+from tank2sim.answer.charts.manoeuvre import (
     Motion,
     Quantiles,
     along_course,
@@ -20,19 +18,12 @@ from tank2sim.report.kit.manoeuvre_charts import (
     way_chart,
     zigzag_chart,
 )
-from tank2sim.report.kit.motion_charts import SpiralData, spiral_chart
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
+from tank2sim.answer.charts.motion import SpiralData, spiral_chart
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
+from tank2sim.marks import assumed_words
+from tank2sim.report.json_values import Json, is_number_value, words
 from tank2sim.report.results.motions import varying_histories
 from tank2sim.simulation.card_range import entry_name, single_figures
 from tank2sim.simulation.figures import zero_rate_rudders
@@ -62,9 +53,9 @@ def manoeuvre_page(result: Json) -> Page:
     ensemble = result.get("ensemble") or {}
     names = _FIRST.get(_kind(result), tuple(figures)[:_OTHERS])
     sections = [
-        PageSection(heading="The manoeuvre", text=_explanation(result), charts=_charts(result, figures, ensemble)),
+        Section(heading="The manoeuvre", text=_explanation(result), charts=_charts(result, figures, ensemble)),
         *_history_section(result, ensemble),
-        PageSection(heading="Figures", tables=_tables(result, ensemble)),
+        Section(heading="Figures", tables=_tables(result, ensemble)),
         *notices_section([*result.get("notices", []), *ensemble.get("notices", [])]),
     ]
     tiles = [_key_figure(name, figures[name], result, ensemble) for name in names if name in figures]
@@ -276,12 +267,12 @@ def _heading_edges(result: Json, ensemble: Json) -> tuple[np.ndarray, np.ndarray
     return np.array(ensemble["t_s"], dtype=float), low, high
 
 
-def _history_section(result: Json, ensemble: Json) -> list[PageSection]:
+def _history_section(result: Json, ensemble: Json) -> list[Section]:
     drawn = varying_histories(result["histories"], ensemble)
-    return [PageSection(heading="Time histories", charts=[drawn])] if drawn else []
+    return [Section(heading="Time histories", charts=[drawn])] if drawn else []
 
 
-def _tables(result: Json, ensemble: Json) -> list[PageTable]:
+def _tables(result: Json, ensemble: Json) -> list[Table]:
     figures = {
         name: value
         for name, value in result["figures"].items()
@@ -296,7 +287,7 @@ def _tables(result: Json, ensemble: Json) -> list[PageTable]:
     return tables
 
 
-def _figure_table(result: Json, figures: Mapping[str, float]) -> PageTable:
+def _figure_table(result: Json, figures: Mapping[str, float]) -> Table:
     """One row a figure, its size in ship lengths and its limit next to it."""
     every, outside = single_figures(result["figures"]), result.get("outside_card_range") or ()
     rows: list[list[Cell]] = []
@@ -309,7 +300,7 @@ def _figure_table(result: Json, figures: Mapping[str, float]) -> PageTable:
     heads = [Column(title="figure"), Column(title="value"), Column(title="unit"), Column(title="ship lengths")]
     heads += [Column(title="IMO: at most"), Column(title="range of the card")]
     kept = [place for place in range(len(heads)) if any(row[place] not in (None, "") for row in rows)]
-    return PageTable(
+    return Table(
         caption="Figures of the manoeuvre.",
         columns=[heads[place] for place in kept],
         rows=[[row[place] for place in kept] for row in rows],
@@ -317,7 +308,7 @@ def _figure_table(result: Json, figures: Mapping[str, float]) -> PageTable:
     )
 
 
-def _list_table(result: Json, lists: Mapping[str, Sequence[float]]) -> PageTable:
+def _list_table(result: Json, lists: Mapping[str, Sequence[float]]) -> Table:
     """Figures that a manoeuvre has several of, such as overshoots, by number."""
     columns = [Column(title="no."), *(Column(title=words(name)[0], unit=words(name)[1]) for name in lists)]
     longest = max(len(values) for values in lists.values())
@@ -330,10 +321,10 @@ def _list_table(result: Json, lists: Mapping[str, Sequence[float]]) -> PageTable
     if any(beyond):
         columns.append(Column(title="range of the card"))
         rows = [[*row, "outside" if is_outside else ""] for row, is_outside in zip(rows, beyond, strict=True)]
-    return PageTable(caption="Figures by number.", columns=columns, rows=rows, folded=True)
+    return Table(caption="Figures by number.", columns=columns, rows=rows, folded=True)
 
 
-def _ensemble_table(ensemble: Json) -> PageTable:
+def _ensemble_table(ensemble: Json) -> Table:
     rows: list[list[Cell]] = [
         [*words(name), *(band.get(key) for key in ("p5", "p50", "p95", "shown_by"))]
         for name, band in ensemble["figures"].items()
@@ -342,4 +333,4 @@ def _ensemble_table(ensemble: Json) -> PageTable:
     rows = [[*row[:2], *(format_number(v) if is_number_value(v) else v for v in row[2:5]), row[5]] for row in rows]
     heads = ("figure", "unit", "5 %", "50 %", "95 %", "shown by")
     caption = f"Quantiles over {_members(ensemble)}."
-    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=rows, folded=True)
+    return Table(caption=caption, columns=[Column(title=head) for head in heads], rows=rows, folded=True)

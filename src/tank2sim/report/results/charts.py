@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.report.kit.analysis_charts import (
+from tank2sim.answer.charts.analysis import (
     FrequencyResponse,
     OutputError,
     PolesZeros,
@@ -16,8 +16,8 @@ from tank2sim.report.kit.analysis_charts import (
     error_chart,
     pole_zero_chart,
 )
-from tank2sim.report.kit.before_after import misfit_maps
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.before_after import misfit_maps
+from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     Chart,
@@ -29,8 +29,8 @@ from tank2sim.report.kit.chart_parts import (
     stacked,
     with_unit,
 )
-from tank2sim.report.kit.json_values import Json, is_matrix, is_number_value, rises, words
-from tank2sim.report.kit.page import Illustration
+from tank2sim.answer.parts import Illustration
+from tank2sim.report.json_values import Json, is_matrix, is_number_value, rises, words
 
 ACROSS = (
     "time_s",

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import KeyFigure, Verdict
 from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
-from tank2sim.report.kit.json_values import VERDICT_TEXTS, Json, cell, is_number_value, is_scalar, words
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import KeyFigure, Verdict
+from tank2sim.report.json_values import VERDICT_TEXTS, Json, cell, is_number_value, is_scalar, words
 from tank2sim.report.results.result_types import ResultType
 from tank2sim.simulation.card_range import entry_name
 

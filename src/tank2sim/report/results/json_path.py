@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from tank2sim.errors import InputError
-from tank2sim.report.kit.json_values import Json
+from tank2sim.report.json_values import Json
 
 _T = TypeVar("_T")
 _FAULTS = (AttributeError, IndexError, KeyError, TypeError, ValueError, ArithmeticError)

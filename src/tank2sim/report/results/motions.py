@@ -10,10 +10,7 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.arrays import Array
-from tank2sim.report.kit.chart_parts import shown_unit
-from tank2sim.report.kit.json_values import Json, titled, words
-from tank2sim.report.kit.motion_charts import (
+from tank2sim.answer.charts.motion import (
     History,
     HistoryBand,
     Signal,
@@ -22,8 +19,11 @@ from tank2sim.report.kit.motion_charts import (
     history_chart,
     track_chart,
 )
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Illustration, PageSection
+from tank2sim.answer.charts.parts import shown_unit
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Illustration, Section
+from tank2sim.arrays import Array
+from tank2sim.report.json_values import Json, titled, words
 from tank2sim.units import to_si
 
 _Columns = Mapping[str, Sequence[float | None]]
@@ -150,14 +150,14 @@ _WAYS = {
 }
 
 
-def from_the_bridge(result: Json) -> list[PageSection]:
+def from_the_bridge(result: Json) -> list[Section]:
     """Turning circles and stops of a poster or a pilot card: the way ahead is up, starboard is right."""
     charts = []
     for key, title in _WAYS.items():
         tracks = [TrackData(label=path["name"], x_m=path["ahead_m"], y_m=path["starboard_m"]) for path in result[key]]
         if tracks:
             charts.append(Illustration(chart=track_chart(tracks, title=title), caption="The ship heads up the page."))
-    return [PageSection(heading="Ways", charts=charts)] if charts else []
+    return [Section(heading="Ways", charts=charts)] if charts else []
 
 
 def _in_si(columns: _Columns) -> dict[str, Array]:

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Illustration, Section, Table
 from tank2sim.files import schema_command
-from tank2sim.report.kit.json_values import (
+from tank2sim.report.json_values import (
     LONGEST_LIST,
     Json,
     alike,
@@ -25,7 +27,6 @@ from tank2sim.report.kit.json_values import (
     titled,
     words,
 )
-from tank2sim.report.kit.page import Illustration, Page, PageSection, PageTable
 from tank2sim.report.results import charts
 from tank2sim.report.results.headlines import headlines
 from tank2sim.report.results.json_path import drawn_from, not_as_written
@@ -43,7 +44,7 @@ _BODE = {"omega_radps", "magnitude_dB", "phase_deg"}
 class _Parts:
     """What a section is filled with, in the order of the JSON."""
 
-    tables: list[PageTable] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
     charts: list[Illustration] = field(default_factory=list)
     left_out: int = 0
 
@@ -86,9 +87,7 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     overview = {key: value for key, value in scalars(result).items() if key not in (*_NOTES, "kind", "schema")}
     table = [quantities("The result", overview)] if overview else []
     first = [
-        PageSection(
-            heading="Overview", text=kind.note, tables=table, charts=[checked] if checked else [], notes=notices
-        )
+        Section(heading="Overview", text=kind.note, tables=table, charts=[checked] if checked else [], notes=notices)
     ]
     return Page(
         title=f"{kind.title}: {Path(name).name}" if name else kind.title,
@@ -108,14 +107,14 @@ def _origin(result: Mapping[str, Json], source: str) -> str:
     return f"tank2sim {command}" if command else source
 
 
-def _section(key: str, value: Json) -> PageSection:
+def _section(key: str, value: Json) -> Section:
     parts = _Parts()
     title = words(key)[0]
     heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
     _fill(parts, heading, key, value, 0)
     notes = [f"{parts.left_out} longer or deeper parts are in the JSON only."] if parts.left_out else []
     tables = [table for table in parts.tables if table.rows and [column.title for column in table.columns] != ["name"]]
-    return PageSection(heading=heading, tables=tables, charts=parts.charts, notes=notes)
+    return Section(heading=heading, tables=tables, charts=parts.charts, notes=notes)
 
 
 def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> None:

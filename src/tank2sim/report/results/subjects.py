@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Section
 from tank2sim.report.audit.page import audit_page
 from tank2sim.report.autopilot.craft_page import craft_autopilot_page
 from tank2sim.report.autopilot.page import autopilot_page
@@ -19,8 +21,7 @@ from tank2sim.report.glide.page import glide_page
 from tank2sim.report.guess.page import guess_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Page, PageSection
+from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
 from tank2sim.report.manoeuvre.page import manoeuvre_page
 from tank2sim.report.results.motions import from_the_bridge
@@ -37,7 +38,7 @@ class _Sections:
     """Sections of a page; the keys that they `need` with the type of each (older versions wrote none of them); and the
     paths of what is `taken` by them (with dots between keys; * is any), which is not repeated in tables."""
 
-    sections: Callable[[Json], list[PageSection]]
+    sections: Callable[[Json], list[Section]]
     needs: Mapping[str, type]
     taken: tuple[str, ...] = ()
 
@@ -176,7 +177,7 @@ def whole_page(kind: str, result: Json) -> Page | None:
     return page.make(result) if page and all(key in result for key in page.needs) else None
 
 
-def render_charts(kind: str, result: Mapping[str, Json]) -> tuple[list[PageSection], Json]:
+def render_charts(kind: str, result: Mapping[str, Json]) -> tuple[list[Section], Json]:
     """Return the sections with the charts of a result, and its remaining parts for tables.
 
     `kind` is one of :data:`tank2sim.report.results.result_types.RESULT_TYPES`.

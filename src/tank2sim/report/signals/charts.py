@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.thinning import thin_line, thin_points
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     POINT_SAMPLES,
@@ -26,8 +24,10 @@ from tank2sim.report.kit.chart_parts import (
     vector,
     with_unit,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.theme import BAND_OPACITY
+from tank2sim.answer.charts.theme import BAND_OPACITY
+from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.thinning import thin_line, thin_points
+from tank2sim.report.json_values import Json
 
 _SIZE_PX = (720, 300)
 _LEAST_DECIBEL = -120.0

@@ -8,12 +8,13 @@ from pathlib import PurePath
 
 import altair as alt
 
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.charts.parts import vector
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.statistics import Stationary
-from tank2sim.report.kit.chart_parts import vector
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import History, Signal, history_chart
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
+from tank2sim.report.json_values import Json
 from tank2sim.report.results.motions import measured_histories
 from tank2sim.report.signals.charts import (
     autocorrelation_chart,
@@ -46,14 +47,14 @@ _HOW = (
 def signals_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim signals``."""
     trials = found["trials"]
-    sections: list[PageSection] = []
+    sections: list[Section] = []
     if (applied := found.get("filter")) and "before" in applied:
         charts = [Illustration(chart=chart) for _, chart in _filter_charts(applied)]
-        sections.append(PageSection(heading="Filter", text=applied["sentence"], charts=charts))
+        sections.append(Section(heading="Filter", text=applied["sentence"], charts=charts))
     for label, trial in zip(trial_labels(trials), trials, strict=True):
         steering = trial["rudder_to_yaw_rate"] or {"notices": ()}
         sections.append(
-            PageSection(
+            Section(
                 heading=label,
                 tables=[_signals(trial["columns"])],
                 charts=_illustrations(_trial_charts(label, trial)),
@@ -62,7 +63,7 @@ def signals_page(found: Json) -> Page:
         )
     for label, trial in zip(trial_labels(trials), trials, strict=True):
         sections.append(
-            PageSection(
+            Section(
                 heading=f"Each signal of {label}",
                 text=_HOW,
                 charts=_illustrations(_signal_charts(label, trial)),
@@ -217,7 +218,7 @@ def _caption(kind: str) -> str:
     return next((caption for end, caption in captions.items() if kind.endswith(end)), "")
 
 
-def _signals(columns: Json) -> PageTable:
+def _signals(columns: Json) -> Table:
     heads = [
         Column(title="signal"),
         Column(title="unit"),
@@ -239,10 +240,10 @@ def _signals(columns: Json) -> PageTable:
         ]
         for file, column in columns.items()
     ]
-    return PageTable(caption="Signals", columns=heads, rows=rows)
+    return Table(caption="Signals", columns=heads, rows=rows)
 
 
-def _tests(columns: Json) -> PageTable:
+def _tests(columns: Json) -> Table:
     heads = [
         Column(title="signal"),
         Column(title="stationarity"),
@@ -262,4 +263,4 @@ def _tests(columns: Json) -> PageTable:
         tests: list[Cell] = [column["stationarity"]["verdict"], level["dickey_fuller"], level["kpss"]]
         shape: list[Cell] = [normal["verdict"], least, normal["skewness"], normal["excess_kurtosis"]]
         rows.append([_signal(file).words, *tests, *shape])
-    return PageTable(caption="Tests", columns=heads, rows=rows)
+    return Table(caption="Tests", columns=heads, rows=rows)

@@ -9,9 +9,8 @@ import altair as alt
 import numpy as np
 
 from tank2sim.analysis.stability.response import FIRST_ORDER
-from tank2sim.arrays import Array
-from tank2sim.report.kit.analysis_charts import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
+from tank2sim.answer.charts.parts import (
     NUMBER,
     Chart,
     ChartRecord,
@@ -24,9 +23,10 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     vector,
 )
-from tank2sim.report.kit.chart_parts import stacked as stacked_panels
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
+from tank2sim.answer.charts.parts import stacked as stacked_panels
+from tank2sim.answer.numbers import format_number
+from tank2sim.arrays import Array
+from tank2sim.report.json_values import Json
 
 STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
 BECH = ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")

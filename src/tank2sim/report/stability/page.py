@@ -4,20 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.report.ensemble.sections import BEYOND_CARD_TEXT, stability_section
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
+from tank2sim.report.json_values import Json
 from tank2sim.report.stability.charts import (
     BECH,
     NORRBIN,
@@ -143,10 +134,10 @@ def _margin_figure(straight: Json, margins: Json) -> KeyFigure:
 _NOMOTO_TIMES = ("T", "T1", "T2", "T3")
 
 
-def _straight_line(found: Json) -> PageSection:
+def _straight_line(found: Json) -> Section:
     straight, margins, nomoto = found["stability_criterion"], found["margins"], found["nomoto"]
     states = straight["settled_states"]
-    eigenvalues = PageTable(
+    eigenvalues = Table(
         caption=f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in states)}.",
         columns=[
             Column(title="real part", unit="1/s"),
@@ -163,17 +154,17 @@ def _straight_line(found: Json) -> PageSection:
         [name, format_number(margins["margin_percent"]), "%"],
     ]
     slow = f", in slow motions ({', '.join(states)} at rest)" if states else ""
-    return PageSection(
+    return Section(
         heading="Straight-line stability",
         text=_CRITERION,
         tables=[
-            PageTable(
+            Table(
                 caption="The margin of stability.",
                 columns=[Column(title=""), Column(title="value"), Column(title="unit")],
                 rows=levers,
             ),
             eigenvalues,
-            PageTable(
+            Table(
                 caption=f"Nomoto's coefficients, yaw rate by rudder{slow}.",
                 columns=[Column(title="K", unit="1/s"), *(Column(title=name, unit="s") for name in _NOMOTO_TIMES)],
                 rows=[list(nomoto["dimensional"].values())],
@@ -182,14 +173,14 @@ def _straight_line(found: Json) -> PageSection:
     )
 
 
-def _margin_influences(found: Json) -> PageSection:
+def _margin_influences(found: Json) -> Section:
     margins, trim = found["margins"], found["trim"]
     keys = ("value", "percent", "neutral_value", "neutral_percent")
     rows: list[list[Cell]] = [
         [influence["name"].rpartition(".")[2], *(influence[key] for key in keys)]
         for influence in margins["derivatives"]
     ]
-    table = PageTable(
+    table = Table(
         caption="Exact sensitivity of C′, and the value at which the ship is neutral, all else unchanged.",
         columns=[
             Column(title="coefficient"),
@@ -214,33 +205,33 @@ def _margin_influences(found: Json) -> PageSection:
     if margins["derivatives"]:
         charts.insert(0, Illustration(chart=influence_chart(margins, title="Influence on C′")))
     text = f"Derivatives are prime, mass in kg and x_G in m. {_TRIM}"
-    return PageSection(heading="What moves the margin", text=text, tables=[table], charts=charts, folded=True)
+    return Section(heading="What moves the margin", text=text, tables=[table], charts=charts, folded=True)
 
 
-def _response(responses: Sequence[Json]) -> PageSection:
+def _response(responses: Sequence[Json]) -> Section:
     heading = "Response to the rudder"
     if not responses:
-        return PageSection(heading=heading, text="The yaw rate does not answer to the rudder.")
+        return Section(heading=heading, text="The yaw rate does not answer to the rudder.")
     charts = [
         Illustration(chart=steering_poles(responses, title="Poles and zeros")),
         Illustration(chart=steering_bode(responses, title="Bode diagram")),
         Illustration(chart=step_chart(responses, title="Step of the rudder")),
     ]
-    return PageSection(heading=heading, text=_RESPONSE, charts=charts, folded=True)
+    return Section(heading=heading, text=_RESPONSE, charts=charts, folded=True)
 
 
-def _turning(turning: Json, spirals: Json) -> PageSection:
+def _turning(turning: Json, spirals: Json) -> Section:
     heads = [Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s")]
     rows: list[list[Cell]] = [
         [turn["rudder_deg"], turn["yaw_rate_degps"], "stable" if turn["stable"] else "unstable"]
         for turn in turning.get("turns") or ()
     ]
-    tables = [PageTable(caption="Steady turns.", columns=[*heads, Column(title="")], rows=rows)]
+    tables = [Table(caption="Steady turns.", columns=[*heads, Column(title="")], rows=rows)]
     if turning["folds"]:
         folds: list[list[Cell]] = [[fold["rudder_deg"], fold["yaw_rate_degps"]] for fold in turning["folds"]]
-        tables.append(PageTable(caption="Folds, where the ship leaves its branch.", columns=heads, rows=folds))
+        tables.append(Table(caption="Folds, where the ship leaves its branch.", columns=heads, rows=folds))
     chart = steering_diagram(turning, spirals, title="Steady turns against the rudder")
-    return PageSection(
+    return Section(
         heading="Steady turning",
         text=f"{_TURNING}\n\n{_SPIRALS}" if any(spirals.values()) else _TURNING,
         tables=tables,
@@ -248,7 +239,7 @@ def _turning(turning: Json, spirals: Json) -> PageSection:
     )
 
 
-def _characteristic(found: Json) -> PageSection:
+def _characteristic(found: Json) -> Section:
     bech, norrbin = found["bech"], found["norrbin"]
     rows: list[list[Cell]] = [
         ["Bech", *(bech[key] for key in BECH), *bech["error"].values()],
@@ -266,10 +257,10 @@ def _characteristic(found: Json) -> PageSection:
         Column(title="beyond the fit", unit="deg", digits=3),
     ]
     caption = "Coefficients by powers of the yaw rate, rad and s: Bech's of δ, Norrbin's of K δ."
-    return PageSection(
+    return Section(
         heading="Nonlinear steering characteristic",
         text=_CHARACTERISTIC,
-        tables=[PageTable(caption=caption, columns=heads, rows=rows)],
+        tables=[Table(caption=caption, columns=heads, rows=rows)],
         folded=True,
         charts=[Illustration(chart=characteristic_chart(found, title="Rudder that holds a yaw rate"))],
     )
@@ -282,7 +273,7 @@ def imo_verdict(criterion: Mapping[str, Json]) -> Cell:
     return "open" if criterion["passed"] is None else _VERDICTS[criterion["passed"]]
 
 
-def imo_section(criteria: Sequence[Mapping[str, Json]]) -> PageSection:
+def imo_section(criteria: Sequence[Mapping[str, Json]]) -> Section:
     """Return the criteria of IMO MSC.137(76), from ``imo`` of the JSON: bars, table, and what is to be said of each."""
     charts = []
     if any(criterion["found"] is not None for criterion in criteria):
@@ -292,10 +283,10 @@ def imo_section(criteria: Sequence[Mapping[str, Json]]) -> PageSection:
         if criterion["remark"]:
             remarks.setdefault(criterion["remark"], []).append(criterion["name"])
     notes = [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
-    return PageSection(heading="IMO criteria", text=_IMO, tables=[_imo(criteria)], charts=charts, notes=notes)
+    return Section(heading="IMO criteria", text=_IMO, tables=[_imo(criteria)], charts=charts, notes=notes)
 
 
-def _imo(criteria: Sequence[Mapping[str, Json]]) -> PageTable:
+def _imo(criteria: Sequence[Mapping[str, Json]]) -> Table:
     rows: list[list[Cell]] = [
         [
             *(criterion[key] for key in ("name", "found", "allowed", "unit")),
@@ -312,4 +303,4 @@ def _imo(criteria: Sequence[Mapping[str, Json]]) -> PageTable:
         Column(title="verdict"),
         Column(title="margin", unit="%", digits=3),
     ]
-    return PageTable(caption="IMO resolution MSC.137(76), 5.3.1 to 5.3.4.", columns=columns, rows=rows)
+    return Table(caption="IMO resolution MSC.137(76), 5.3.1 to 5.3.4.", columns=columns, rows=rows)

@@ -14,11 +14,11 @@ import jinja2
 from markupsafe import Markup
 
 from tank2sim import __version__
+from tank2sim.answer.page import resource_text
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.escaping import json_in_html
 from tank2sim.fmu.interface import interface
-from tank2sim.report.kit.page import resource_text
 from tank2sim.report.steering.ghost import Ghost
 from tank2sim.report.steering.members import NO_COVARIANCE
 from tank2sim.report.steering.scenario import Scenario
@@ -200,13 +200,13 @@ def steering_page(
         fails="steering.failed" in model.input_names,
         view_3d=view_3d,
         style=Markup("".join(map(resource_text, _styles(view_3d)))),
-        script=Markup("\n".join(resource_text(f"steering/{name}") for name in _scripts(view_3d))),
+        script=Markup("\n".join(resource_text(f"report/steering/{name}") for name in _scripts(view_3d))),
         data=json_in_html(_data(ship, ghost, scenario)),
     )
 
 
 def _styles(view_3d: bool) -> list[str]:
-    return ["kit/page.css", "steering/page.css", *(["steering/view3d.css"] if view_3d else [])]
+    return ["answer/page.css", "report/steering/page.css", *(["report/steering/view3d.css"] if view_3d else [])]
 
 
 def _scripts(view_3d: bool) -> list[str]:

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, ChartRecord, data, pan_zoom, plain, series_look
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import TrackData, track_chart
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
-from tank2sim.report.kit.theme import SHAPES
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, data, pan_zoom, plain, series_look
+from tank2sim.answer.charts.theme import SHAPES
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.report.json_values import Json
 
 
 def steering_catalogue_page(found: Json) -> Page:
@@ -59,7 +60,7 @@ def _figures(found: Json) -> list[KeyFigure]:
     return [*figures, KeyFigure(label="Models that cannot be computed", value=incomplete, note=note, verdict=verdict)]
 
 
-def _turning(found: Json) -> PageSection:
+def _turning(found: Json) -> Section:
     keys = ("rudder_deg", "radius_m", "yaw_rate_degpmin", "drift_deg")
     rows: list[list[Cell]] = [
         [found["titles"][model], *(turn[key] for key in keys)]
@@ -75,12 +76,12 @@ def _turning(found: Json) -> PageSection:
         Column(title="drift", unit="deg", digits=3),
     ]
     points = found["diagrams"]["points"]
-    return PageSection(
+    return Section(
         heading="Steady turning",
         text="Each model has a speed that does not fall in the turn. Its steady turns are followed from the straight "
         "course, so that they are those that the ship comes to.",
         charts=[_diagrams(found["diagrams"])],
-        tables=[PageTable(caption="Steady turns", columns=columns, rows=rows)],
+        tables=[Table(caption="Steady turns", columns=columns, rows=rows)],
         notes=[f"{point['label']}: {point['source']}" for point in points if point["radius_measured"]],
     )
 
@@ -136,7 +137,7 @@ def _diagram(lines: list[ChartRecord], points: list[ChartRecord]) -> alt.LayerCh
     )
 
 
-def _influence(found: Json) -> PageSection:
+def _influence(found: Json) -> Section:
     tables, printed = found["influence"], found["printed_influence"]
     names = list(dict.fromkeys(name for table in tables.values() for name in table["K_percent"]))
     columns = [Column(title=""), *(Column(title=found["titles"][model], digits=3) for model in tables)]
@@ -150,11 +151,11 @@ def _influence(found: Json) -> PageSection:
         "C_y are coefficients of the lateral force, C_m of the yaw moment, by powers of drift angle b, yaw rate w and "
         "rudder angle d: C_m_wwb is that of b w²."
     )
-    return PageSection(
+    return Section(
         heading="Influence on the steady radius",
         text=text,
         charts=[Illustration(chart=influence_bars(models))],
-        tables=[PageTable(caption="K, %", columns=columns, rows=rows)],
+        tables=[Table(caption="K, %", columns=columns, rows=rows)],
     )
 
 
@@ -185,7 +186,7 @@ def influence_bars(models: Mapping[str, Mapping[str, float]]) -> alt.LayerChart:
     )
 
 
-def _joint_variation(found: Json) -> PageSection:
+def _joint_variation(found: Json) -> Section:
     predictions = found["combined_predictions"]
     rows: list[list[Cell]] = []
     for model, prediction in predictions.items():
@@ -215,19 +216,19 @@ def _joint_variation(found: Json) -> PageSection:
     heads = [Column(title=""), *(Column(title=found["titles"][model]) for model in predictions)]
     pairs = (found["printed_influence"] or {}).get("misread_as") or {}
     slip = ", ".join(f"{name} with the K of {misread}" for name, misread in pairs.items())
-    return PageSection(
+    return Section(
         heading="Agreed variation",
         text="Kc: change of each coefficient in % with 1 % of draught. The sum of Kc K / 10 predicts the radius.",
         tables=[
-            PageTable(caption="Kc, %", columns=heads, rows=variations),
-            PageTable(caption="Predicted and computed radius", columns=columns, rows=rows),
+            Table(caption="Kc, %", columns=heads, rows=variations),
+            Table(caption="Predicted and computed radius", columns=columns, rows=rows),
         ],
         notes=[f"The source multiplies {slip}: that slip, not the method, is the difference."] if slip else [],
         folded=True,
     )
 
 
-def _manoeuvres(found: Json) -> PageSection:
+def _manoeuvres(found: Json) -> Section:
     keys = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
     rows: list[list[Cell]] = []
     for model, figures in found["manoeuvres"].items():
@@ -241,22 +242,22 @@ def _manoeuvres(found: Json) -> PageSection:
     ]
     chart = track_chart(tracks, title=f"Turning circles, {found['rudder_deg']:g} deg of rudder")
     columns = [Column(title="model"), *heads, *overshoot_heads]
-    return PageSection(
+    return Section(
         heading="Manoeuvres",
         text="The steady models in time, by drift angle and yaw rate, from a straight course.",
         charts=[Illustration(chart=chart)],
-        tables=[PageTable(caption="Figures", columns=columns, rows=rows)],
+        tables=[Table(caption="Figures", columns=columns, rows=rows)],
     )
 
 
-def _tuning(tuning: Json) -> PageSection:
+def _tuning(tuning: Json) -> Section:
     heading = "Two characteristics, two points"
     text = (
         "A steadier hull (static moment divided, damping multiplied by one factor) and a better rudder are found so "
         "that two measured points of the steering diagram are met."
     )
     if isinstance(tuning, str):
-        return PageSection(heading=heading, text=text, notes=[tuning])
+        return Section(heading=heading, text=text, notes=[tuning])
     rows: list[list[Cell]] = [
         [after["rudder_deg"], before["yaw_rate_degpmin"], after["yaw_rate_degpmin"]]
         for before, after in zip(tuning["before"], tuning["after"], strict=True)
@@ -266,27 +267,27 @@ def _tuning(tuning: Json) -> PageSection:
     notes = []
     if tuning["course_stable_before"] and not tuning["course_stable_after"]:
         notes.append("With these factors the ship, stable before, is unstable on a straight course.")
-    return PageSection(
+    return Section(
         heading=heading,
         text=text,
         tables=[
-            PageTable(caption="Factors", columns=[Column(title=""), Column(title="factor")], rows=factors),
-            PageTable(caption="Yaw rate", columns=[Column(title="rudder", unit="deg"), *columns], rows=rows),
+            Table(caption="Factors", columns=[Column(title=""), Column(title="factor")], rows=factors),
+            Table(caption="Yaw rate", columns=[Column(title="rudder", unit="deg"), *columns], rows=rows),
         ],
         notes=notes,
     )
 
 
-def _missing(found: Json) -> PageSection:
+def _missing(found: Json) -> Section:
     rows: list[list[Cell]] = [
         [found["titles"][model], text] for model, texts in found["missing"].items() for text in texts
     ]
     polynomials: list[list[Cell]] = [[name, *values] for name, values in found["influence_over_draught"].items()]
     degrees = max((len(row) for row in polynomials), default=1) - 1
     heads = [Column(title=""), *(Column(title=f"T^{n}") for n in range(degrees))]
-    tables = [PageTable(caption="Not known", columns=[Column(title="model"), Column(title="what")], rows=rows)]
+    tables = [Table(caption="Not known", columns=[Column(title="model"), Column(title="what")], rows=rows)]
     if polynomials:
         tables.append(
-            PageTable(caption="K over the draught T in m, through its printed values", columns=heads, rows=polynomials)
+            Table(caption="K over the draught T in m, through its printed values", columns=heads, rows=polynomials)
         )
-    return PageSection(heading="What is missing", text="As far as it is published.", tables=tables, folded=True)
+    return Section(heading="What is missing", text="As far as it is published.", tables=tables, folded=True)

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.arrays import Array
-from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.charts.parts import (
     NUMBER,
     STACKS,
     Chart,
@@ -21,8 +20,9 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     vector,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import History, Signal, history_chart
+from tank2sim.arrays import Array
+from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
+from tank2sim.report.json_values import Json
 
 _SPEEDS = (
     Signal(name="speed", title="speed", unit="m/s"),

@@ -7,15 +7,16 @@ from pathlib import PurePath
 
 from numpy.polynomial import Polynomial
 
+from tank2sim.answer.numbers import format_number, without_exponents
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.dynamics.surge import SurgeCoefficients
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.fit import DELAY, TOW_PARAMETERS
 from tank2sim.identification.tow.force import force_words
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number, without_exponents
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 from tank2sim.report.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
 
 _LARGEST_CONDITION = COLLINEAR**2
@@ -101,7 +102,7 @@ _FIT_ROWS = (
 )
 
 
-def _estimates(found: Json) -> PageSection:
+def _estimates(found: Json) -> Section:
     methods = found["methods"]
     columns = [Column(title="")]
     for name in methods:
@@ -114,8 +115,8 @@ def _estimates(found: Json) -> PageSection:
         rows.append([f"{names[key]}, {_UNITS.get(names[key], 'kg')}", *cells])
     for title, key in _FIT_ROWS:
         rows.append([title, *(cell for fit in methods.values() for cell in (_text(fit[key], 5), None))])
-    tables = [PageTable(caption="Estimates by method", columns=columns, rows=rows), _polynomials(found)]
-    return PageSection(heading="Estimates by method", text=_ESTIMATES, tables=tables, folded=True)
+    tables = [Table(caption="Estimates by method", columns=columns, rows=rows), _polynomials(found)]
+    return Section(heading="Estimates by method", text=_ESTIMATES, tables=tables, folded=True)
 
 
 def _cells(fit: Json, key: str) -> tuple[Cell, Cell]:
@@ -132,7 +133,7 @@ def _half_width(value: float | None) -> str:
     return "unknown" if value is None else format_number(value, 2)
 
 
-def _polynomials(found: Json) -> PageTable:
+def _polynomials(found: Json) -> Table:
     heads = ("degree", "α₀", "α₁", "α₂", "α₃", "rms", "rms by n − 1")
     columns = [Column(title=head, unit="m/s" if head.startswith("rms") else "", digits=4) for head in heads]
     rows: list[list[Cell]] = []
@@ -147,21 +148,21 @@ def _polynomials(found: Json) -> PageTable:
             rows.append([f"{degree}, printed", *values, *absent, error, None])
     source = ", next to the printed ones, which no single change of the printed readings gives" if printed else ""
     caption = f"Polynomials v = α₀ + α₁ t + ... through the mean speeds, m/s over s{source}"
-    return PageTable(caption=caption, columns=columns, rows=rows)
+    return Table(caption=caption, columns=columns, rows=rows)
 
 
-def _speeds(found: Json) -> PageSection:
+def _speeds(found: Json) -> Section:
     """Readings, simulated speeds and their differences, and what the reader of the result must not miss."""
     heading, speeds = "Measured and computed speeds", found["speeds"]
     notes = [without_exponents(note) for note in found["warnings"]]
     if not speeds["simulated_mps"]:
-        return PageSection(heading=heading, notes=notes)
+        return Section(heading=heading, notes=notes)
     chart = tow_speed_chart(speeds, title="Speeds of the tows and of the models")
     caption = f"Below, everything less {next(iter(speeds['simulated_mps']))}."
-    return PageSection(heading=heading, charts=[Illustration(chart=chart, caption=caption)], notes=notes)
+    return Section(heading=heading, charts=[Illustration(chart=chart, caption=caption)], notes=notes)
 
 
-def _models(found: Json) -> PageSection:
+def _models(found: Json) -> Section:
     columns = [
         Column(title="model"),
         Column(title="estimates with 95 % half-widths"),
@@ -183,11 +184,11 @@ def _models(found: Json) -> PageSection:
     if found["confidence_ellipses"]:
         chart = ellipse_chart(found["confidence_ellipses"], found["tow_by_tow"])
         charts.append(Illustration(chart=chart, caption=_ELLIPSES))
-    return PageSection(
+    return Section(
         heading="What these tows determine",
         text="The same readings by output error with fewer and with more unknowns (SI units; delay: the body starts so "
         "much later than t = 0).",
-        tables=[PageTable(caption="Models by output error", columns=columns, rows=rows, folded=True)],
+        tables=[Table(caption="Models by output error", columns=columns, rows=rows, folded=True)],
         charts=charts,
     )
 
@@ -203,7 +204,7 @@ _ELLIPSES = (
 )
 
 
-def _by_tow(by_tow: Mapping[str, Json]) -> PageSection:
+def _by_tow(by_tow: Mapping[str, Json]) -> Section:
     tables = []
     for label, subset in by_tow.items():
         columns = [Column(title=""), *(Column(title=name, unit=_UNITS[name]) for name in subset["unknowns"])]
@@ -215,8 +216,8 @@ def _by_tow(by_tow: Mapping[str, Json]) -> PageSection:
             ["the same, 95 % half-width", *subset["jackknife_half_widths_95"]],
             ["standard error, spread of the tows", *subset["spread_standard_errors"]],
         ]
-        tables.append(PageTable(caption=label[0].upper() + label[1:], columns=columns, rows=rows))
-    return PageSection(
+        tables.append(Table(caption=label[0].upper() + label[1:], columns=columns, rows=rows))
+    return Section(
         heading="Tow by tow",
         text="Each tow by itself, and one left out in turn. These errors hold "
         "also where the readings of one tow err together.",
@@ -228,7 +229,7 @@ def _by_tow(by_tow: Mapping[str, Json]) -> PageSection:
 _ORDERS = (("A1", "s²/m²"), ("A2", "s/m"), ("A3", ""))
 
 
-def _drag(found: Json, best: Json) -> PageSection:
+def _drag(found: Json, best: Json) -> Section:
     body = TowedBody(**found["body"])
     drags = {
         _METHODS.get(name, name): DragPolynomial(**drag["by_length_squared"])
@@ -249,17 +250,17 @@ def _drag(found: Json, best: Json) -> PageSection:
         [name, *drag.as_json().values(), *drag.times(body.area_ratio).as_json().values()]
         for name, drag in drags.items()
     ]
-    table = PageTable(caption="C = A1 v² + A2 v + A3", columns=columns, rows=rows, folded=True)
+    table = Table(caption="C = A1 v² + A2 v + A3", columns=columns, rows=rows, folded=True)
     chart = drag_chart(drags, body, found["top_speed_mps"])
     viscosity = format_number(body.viscosity_m2ps)
     caption = (
         f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {viscosity} m²/s. The frame is that of "
         "the curves that stay above zero; no hull has a coefficient below zero."
     )
-    return PageSection(heading="Drag coefficient", tables=[table], charts=[Illustration(chart=chart, caption=caption)])
+    return Section(heading="Drag coefficient", tables=[table], charts=[Illustration(chart=chart, caption=caption)])
 
 
-def _theory(found: Json, best: Json) -> PageSection:
+def _theory(found: Json, best: Json) -> Section:
     columns = [
         Column(title="k₁₁ of"),
         Column(title="k₁₁", digits=4),
@@ -274,9 +275,9 @@ def _theory(found: Json, best: Json) -> PageSection:
     if best is not None:
         mass, half = best["estimates"]["M"], best["half_widths_95"]["M"]
         estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
-    return PageSection(
+    return Section(
         heading="Mass by theory",
         text="M_s = k* (1 + k₁₁) ρ V, with Lamb's k₁₁ of ellipsoids and the published k* = 0.96 for the free surface. "
         "The published k₁₁ of 0.156 belongs to a spheroid 2.5 times as long as thick." + estimate,
-        tables=[PageTable(caption="Mass in surge by theory", columns=columns, rows=rows)],
+        tables=[Table(caption="Mass in surge by theory", columns=columns, rows=rows)],
     )

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, Chart, data, series_look
-from tank2sim.report.kit.json_values import Json
+from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
+from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 COMPARISON_ERRORS = (

@@ -8,20 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from tank2sim.analysis.validation.study import ComparisonOutcome
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Page,
-    PageSection,
-    PageTable,
-    Verdict,
-    notices_section,
-)
+from tank2sim.report.json_values import Json
 from tank2sim.report.results.motions import motions
 from tank2sim.report.stability.page import imo_section
 from tank2sim.report.validation.charts import COMPARISON_ERRORS, comparison_error_chart
@@ -102,16 +93,16 @@ def _figures(found: Json) -> list[KeyFigure]:
     return shown
 
 
-def _documentation(items: Mapping[str, str]) -> PageSection:
-    table = PageTable(
+def _documentation(items: Mapping[str, str]) -> Section:
+    table = Table(
         caption="Documentation asked for by ITTC 7.5-02-06-03.",
         columns=[Column(title="item"), Column(title="here")],
         rows=[[item, text] for item, text in items.items()],
     )
-    return PageSection(heading="The simulation model", tables=[table])
+    return Section(heading="The simulation model", tables=[table])
 
 
-def _coefficients(coefficients: Mapping[str, Json]) -> PageSection:
+def _coefficients(coefficients: Mapping[str, Json]) -> Section:
     rows: list[list[Cell]] = [
         [
             name,
@@ -131,12 +122,10 @@ def _coefficients(coefficients: Mapping[str, Json]) -> PageSection:
     ]
     text = f"Where the card states no standard error, {DEFAULT_RELATIVE_ERROR:.0%} of the value is assumed."
     caption = "Prime system, rudder positive to starboard, times 1000."
-    return PageSection(
-        heading="Coefficients", text=text, tables=[PageTable(caption=caption, columns=columns, rows=rows)]
-    )
+    return Section(heading="Coefficients", text=text, tables=[Table(caption=caption, columns=columns, rows=rows)])
 
 
-def _verification(verified: Sequence[Json]) -> PageSection:
+def _verification(verified: Sequence[Json]) -> Section:
     rows: list[list[Cell]] = []
     for row in verified:
         value, deviation = row["value"], row["deviation"]
@@ -152,14 +141,14 @@ def _verification(verified: Sequence[Json]) -> PageSection:
         Column(title="u_input", digits=3),
         Column(title="u_input", unit="%", digits=3),
     ]
-    table = PageTable(caption="Standard trials at the speed of expansion in calm water.", columns=columns, rows=rows)
-    return PageSection(heading="Verification and uncertainty of the simulation", text=_NUMERICAL, tables=[table])
+    table = Table(caption="Standard trials at the speed of expansion in calm water.", columns=columns, rows=rows)
+    return Section(heading="Verification and uncertainty of the simulation", text=_NUMERICAL, tables=[table])
 
 
-def _comparison(figures: Sequence[Json], verdict: str) -> PageSection:
+def _comparison(figures: Sequence[Json], verdict: str) -> Section:
     if not figures:
         text = "No turning circle or zigzag was given: the model is documented and verified here, and not validated."
-        return PageSection(heading="Validation", text=text, notes=[verdict])
+        return Section(heading="Validation", text=text, notes=[verdict])
     manoeuvres = {figure["trial"]: figure["manoeuvre"] for figure in figures}
     numbers = {trial: number for number, trial in enumerate(manoeuvres, start=1)}
     rows: list[list[Cell]] = [
@@ -172,7 +161,7 @@ def _comparison(figures: Sequence[Json], verdict: str) -> PageSection:
         ]
         for figure in figures
     ]
-    benchmark = PageTable(
+    benchmark = Table(
         caption="Benchmark data.",
         columns=[Column(title="no."), Column(title="trial"), Column(title="manoeuvre, as recognised")],
         rows=[[numbers[trial], trial, manoeuvre] for trial, manoeuvre in manoeuvres.items()],
@@ -184,19 +173,19 @@ def _comparison(figures: Sequence[Json], verdict: str) -> PageSection:
         Column(title="level", unit="%", digits=3),
         Column(title="verdict"),
     ]
-    table = PageTable(caption="Errors and their uncertainty.", columns=columns, rows=rows, folded=True)
+    table = Table(caption="Errors and their uncertainty.", columns=columns, rows=rows, folded=True)
     chart = Illustration(chart=comparison_error_chart(figures, numbers), caption=COMPARISON_ERRORS)
     text = f"{verdict[:1].upper()}{verdict[1:]}."
-    return PageSection(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
+    return Section(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
 
 
-def _method(figures: Sequence[Json]) -> PageSection:
+def _method(figures: Sequence[Json]) -> Section:
     """How the verdicts come about."""
     shares = (100 * figure["numerical"] / abs(figure["measured"]) for figure in figures if figure["measured"])
     numerical = f"u_num is {format_number(max(shares, default=0.0), 2)} % of D at most."
     level = f"The level is U_val in per cent of D; required here: {figures[0]['required_percent']:g} %."
     text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
-    return PageSection(heading="Method", text=text)
+    return Section(heading="Method", text=text)
 
 
 def _text(value: float | None, digits: int = 4) -> str | None:
@@ -209,7 +198,7 @@ def _named(name: str) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-def _replays(replays: Sequence[Json]) -> PageSection:
+def _replays(replays: Sequence[Json]) -> Section:
     keys = ("signal", "unit", "rms_error", "percent_of_range", "noise")
     rows: list[list[Cell]] = [
         [replay["trial"], *(error[key] for key in keys)] for replay in replays for error in replay["errors"]
@@ -229,11 +218,11 @@ def _replays(replays: Sequence[Json]) -> PageSection:
             replay["trial"], {key: replay[key] for key in ("measured", "simulated")}, measured=["measured"]
         )
     ]
-    table = PageTable(caption="Free-running replays with the recorded inputs.", columns=columns, rows=rows)
-    return PageSection(heading="Replays", text=_REPLAY, tables=[table], charts=charts)
+    table = Table(caption="Free-running replays with the recorded inputs.", columns=columns, rows=rows)
+    return Section(heading="Replays", text=_REPLAY, tables=[table], charts=charts)
 
 
-def _standards(criteria: Sequence[Json]) -> PageSection:
+def _standards(criteria: Sequence[Json]) -> Section:
     text = "Figures of the model next to the standards; they hold as far as the figures above are validated."
     return replace(imo_section(criteria), heading="Standard manoeuvres", text=text)
 
@@ -248,11 +237,11 @@ _CAUSES = (
 _NO_PROPULSION = "Engine and propeller: the card has none, so loss of revolutions in a turn is in the coefficients."
 
 
-def _causes(propulsion: bool) -> PageSection:
+def _causes(propulsion: bool) -> Section:
     rows: list[list[Cell]] = [[cause] for cause in (*_CAUSES, *([] if propulsion else [_NO_PROPULSION]))]
     text = (
         "Potential causes of an error E (7.5-02-06-03). The command influence gives the dependence of each figure on "
         "each coefficient (sensitivity), the command gap looks for the missing effect."
     )
-    table = PageTable(caption="Potential causes of prediction error.", columns=[Column(title="cause")], rows=rows)
-    return PageSection(heading="Causes of error and sensitivity", text=text, tables=[table])
+    table = Table(caption="Potential causes of prediction error.", columns=[Column(title="cause")], rows=rows)
+    return Section(heading="Causes of error and sensitivity", text=text, tables=[table])

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look, vector
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.motion_charts import History, Signal, history_chart
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look, vector
+from tank2sim.report.json_values import Json
 
 _NORMAL = 1.959964
 _SIGNALS = (

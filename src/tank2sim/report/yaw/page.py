@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import Page
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.json_values import Json
 from tank2sim.report.yaw.charts import (
     angle_residual_chart,
     balance_chart,
@@ -48,19 +49,19 @@ def yaw_page(found: Json) -> Page:
     residuals = Illustration(chart=energy_residual_chart(found["energy_residuals"]))
     records = [Illustration(chart=record_chart(name, columns)) for name, columns in found["histories"].items()]
     sections = [
-        PageSection(
+        Section(
             heading="Estimates by method",
             text=_ESTIMATES,
             tables=[_estimates(found["methods"])],
             charts=[estimates],
             notes=found["notes"],
         ),
-        PageSection(heading="Energy balance", text=_BALANCE, tables=[_friction(found)], charts=[balance, residuals]),
-        PageSection(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
+        Section(heading="Energy balance", text=_BALANCE, tables=[_friction(found)], charts=[balance, residuals]),
+        Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
     ]
     if residual := found["angle_residual"]:
         chart = Illustration(chart=angle_residual_chart(residual))
-        sections.append(PageSection(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
+        sections.append(Section(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
     names = ", ".join(PurePath(record).name for record in found["records"])
     return Page(
         title="Added yaw inertia by the energy method",
@@ -71,7 +72,7 @@ def yaw_page(found: Json) -> Page:
     )
 
 
-def _theory(values: Sequence[Json]) -> list[PageSection]:
+def _theory(values: Sequence[Json]) -> list[Section]:
     if not values:
         return []
     columns = [
@@ -85,8 +86,8 @@ def _theory(values: Sequence[Json]) -> list[PageSection]:
         for value in values
     ]
     text = "Added yaw inertia from the body's form, by the formulas of Alyshev (2019)."
-    table = PageTable(caption="From the form", columns=columns, rows=rows)
-    return [PageSection(heading="Theory", text=text, tables=[table])]
+    table = Table(caption="From the form", columns=columns, rows=rows)
+    return [Section(heading="Theory", text=text, tables=[table])]
 
 
 def _scaled(value: float | None) -> float | None:
@@ -147,17 +148,17 @@ _COLUMNS = (
 )
 
 
-def _estimates(methods: Json) -> PageTable:
+def _estimates(methods: Json) -> Table:
     rows: list[list[Cell]] = [
         [method.replace("_", " "), _HOW[method], *(_scaled(estimate.get(key)) for *_, key in _COLUMNS)]
         for method, estimate in methods.items()
     ]
     columns = [Column(title=title, unit=unit, digits=digits) for title, unit, digits, _ in _COLUMNS]
     heads = [Column(title="method"), Column(title="how")]
-    return PageTable(caption="Estimates with standard errors", columns=[*heads, *columns], rows=rows, folded=True)
+    return Table(caption="Estimates with standard errors", columns=[*heads, *columns], rows=rows, folded=True)
 
 
-def _friction(found: Json) -> PageTable:
+def _friction(found: Json) -> Table:
     """A row for each term, a column for each method that gives it."""
     _, *terms = found["energy_balance"]["spent_J"]
     units = {term: ENERGY_TERMS[term][1] for term in terms}
@@ -175,7 +176,7 @@ def _friction(found: Json) -> PageTable:
             row.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
         rows.append(row)
     columns = [Column(title=title) for title in ("term", "unit", *(name.replace("_", " ") for name in methods))]
-    return PageTable(caption="Friction and water, times 10⁴", columns=columns, rows=rows, folded=True)
+    return Table(caption="Friction and water, times 10⁴", columns=columns, rows=rows, folded=True)
 
 
 _UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}

@@ -1,7 +1,7 @@
 """One plot function for each kind of thing, and the chart as a picture.
 
 A chart is defined once, in Altair, and is drawn the same in a picture (:func:`chart_png`) and in a page
-(:mod:`tank2sim.report.kit.page`). It states what is drawn; the looks are defined in :mod:`tank2sim.report.kit.theme`.
+(:mod:`tank2sim.answer.page`). It states what is drawn; the looks are defined in :mod:`tank2sim.answer.charts.theme`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 import altair as alt
 
-from tank2sim.report.kit.analysis_charts import (
+from tank2sim.answer.charts.analysis import (
     FrequencyResponse,
     OutputError,
     PolesZeros,
@@ -18,7 +18,7 @@ from tank2sim.report.kit.analysis_charts import (
     error_chart,
     pole_zero_chart,
 )
-from tank2sim.report.kit.motion_charts import (
+from tank2sim.answer.charts.motion import (
     History,
     Signal,
     SpiralData,
@@ -30,7 +30,7 @@ from tank2sim.report.kit.motion_charts import (
     tow_chart,
     track_chart,
 )
-from tank2sim.report.kit.theme import LIGHT, LOCALE
+from tank2sim.answer.charts.theme import LIGHT, LOCALE
 
 __all__ = [
     "VEGALITE_VERSION",

@@ -15,9 +15,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.arrays import Array
-from tank2sim.records.thinning import thin_line
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     Chart,
@@ -33,8 +31,10 @@ from tank2sim.report.kit.chart_parts import (
     stacked,
     vector,
 )
-from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.numbers import format_number
+from tank2sim.answer.numbers import format_number
+from tank2sim.arrays import Array
+from tank2sim.records.thinning import thin_line
+from tank2sim.report.json_values import Json
 
 MOST_HULLS = 14
 """Outlines of the ship along a track at most: more would hide it. Project choice."""

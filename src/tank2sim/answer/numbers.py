@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from numbers import Integral, Real
+from typing import TypeGuard
 
 NO_VALUE = "–"
 """Shown for what is missing or no number."""
@@ -15,7 +16,7 @@ _THIN_SPACE = "\u202f"
 _SMALL, _LARGE = 1e-3, 1e7
 
 
-def is_number_text(value: object) -> bool:
+def is_number_text(value: object) -> TypeGuard[float]:
     """True for integers and floats (numpy's too), not for truth values."""
     return isinstance(value, Real) and not isinstance(value, bool)
 

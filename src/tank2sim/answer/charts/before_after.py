@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.report.kit.chart_parts import STACKS, Chart, ChartRecord, data
+from tank2sim.answer.charts.parts import STACKS, Chart, ChartRecord, data
 
 BOTH, ALL = "both", "all"
 """The first setting of a switch, and that on paper: two series together, or more of them."""

@@ -9,9 +9,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.arrays import Array
-from tank2sim.records.thinning import thin_line, thin_points
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     HOVER_SAMPLES,
     LINE_SAMPLES,
     NUMBER,
@@ -33,7 +31,9 @@ from tank2sim.report.kit.chart_parts import (
     vector,
     with_unit,
 )
-from tank2sim.report.kit.numbers import format_number
+from tank2sim.answer.numbers import format_number
+from tank2sim.arrays import Array
+from tank2sim.records.thinning import thin_line, thin_points
 
 
 @dataclass(frozen=True, kw_only=True)

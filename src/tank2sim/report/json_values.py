@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, TypeGuard
 
-from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, PageTable, Verdict
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, Table, Verdict
 
 Json = Any
 """What JSON holds: numbers, text, truth values, None, lists and objects of these."""
@@ -152,12 +152,12 @@ def cell(key: str, value: Json) -> Cell:
     return str(value)
 
 
-def quantities(caption: str, values: Mapping[str, Json], unit: str = "") -> PageTable:
+def quantities(caption: str, values: Mapping[str, Json], unit: str = "") -> Table:
     """One row a value: its name, the value, its unit, which is `unit` where its key has none."""
     return _listed(caption, ["quantity"], [(words(key)[0], key, value) for key, value in values.items()], unit)
 
 
-def grouped(caption: str, groups: Mapping[str, Mapping[str, Json]]) -> PageTable:
+def grouped(caption: str, groups: Mapping[str, Mapping[str, Json]]) -> Table:
     """One row a value, under the name of its object: for small objects that have little in common."""
     rows = [
         (titled(group) if place == 0 else "", words(key)[0], key, value)
@@ -167,7 +167,7 @@ def grouped(caption: str, groups: Mapping[str, Mapping[str, Json]]) -> PageTable
     return _listed(caption, ["of", "quantity"], rows)
 
 
-def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]], unit: str = "") -> PageTable:
+def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]], unit: str = "") -> Table:
     """Rows that end with a key and its value: each value has its own digits, for the column has no one unit. What is
     not known has no row."""
     rows = [row for row in rows if cell(row[-2], row[-1]) is not None]
@@ -177,14 +177,14 @@ def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]]
         [*names, _digits(cell(key, value)), *([unit_shown] if any(units) else [])]
         for (*names, key, value), unit_shown in zip(rows, units, strict=True)
     ]
-    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)
+    return Table(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)
 
 
 def _digits(value: Cell) -> Cell:
     return format_number(value) if is_number_value(value) else value
 
 
-def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first: str) -> PageTable:
+def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first: str) -> Table:
     """One row an object, one column a key that any of them has; `first` heads the names, empty where there are none."""
     keys = [
         key for key in dict.fromkeys(key for _, values in named for key in scalars(values)) if _is_known(key, named)
@@ -198,14 +198,14 @@ def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first
         columns.insert(0, Column(title=first))
         cells = [[name, *row] for (name, _), row in zip(named, cells, strict=False)]
     note = f" The first {_MOST_ROWS} of {len(named)} rows." if len(named) > _MOST_ROWS else ""
-    return PageTable(caption=f"{caption}.{note}" if note else caption, columns=columns, rows=cells)
+    return Table(caption=f"{caption}.{note}" if note else caption, columns=columns, rows=cells)
 
 
 def _is_known(key: str, named: Sequence[tuple[str, Mapping[str, Json]]]) -> bool:
     return any(is_scalar(values.get(key)) and cell(key, values.get(key)) is not None for _, values in named)
 
 
-def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> PageTable:
+def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> Table:
     """A row a key and a column an object, for few objects with many keys: on paper a wide table is cut off."""
     units = [words(key)[1] for key in keys]
     heads = [name or f"no. {place}" if len(named) > 1 else name or "value" for place, (name, _) in enumerate(named, 1)]
@@ -214,7 +214,7 @@ def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys:
         [words(key)[0], *(_shown(key, values.get(key), True) for _, values in named), *([unit] if any(units) else [])]
         for key, unit in zip(keys, units, strict=True)
     ]
-    return PageTable(caption=caption, columns=messages, rows=rows)
+    return Table(caption=caption, columns=messages, rows=rows)
 
 
 def _wide(named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> set[str]:
@@ -252,7 +252,7 @@ def _as_long(column: list[Json], all_of_them: Any) -> bool:
     return sum(len(numbers) == len(column) for numbers in all_of_them) > 1
 
 
-def numbered(caption: str, values: Mapping[str, list[Json]]) -> PageTable:
+def numbered(caption: str, values: Mapping[str, list[Json]]) -> Table:
     """Short lists next to each other, one row a place, counted from 1."""
     longest = max(len(value) for value in values.values())
     columns = [Column(title="no."), *(Column(title=words(key)[0], unit=words(key)[1]) for key in values)]
@@ -260,7 +260,7 @@ def numbered(caption: str, values: Mapping[str, list[Json]]) -> PageTable:
         [place + 1, *(value[place] if place < len(value) else None for value in values.values())]
         for place in range(longest)
     ]
-    return PageTable(caption=caption, columns=columns, rows=rows)
+    return Table(caption=caption, columns=columns, rows=rows)
 
 
 def rises(values: Sequence[Json]) -> bool:

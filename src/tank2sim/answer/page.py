@@ -9,77 +9,22 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import importlib.resources
-import urllib.parse
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-import altair as alt
 import jinja2
 from markupsafe import Markup
 
 from tank2sim import __version__
+from tank2sim.answer.charts.picture import VEGALITE_VERSION, chart_specification
+from tank2sim.answer.charts.theme import DARK, LIGHT, LOCALE
+from tank2sim.answer.numbers import NO_VALUE, format_column, format_number, is_number_text
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict
 from tank2sim.escaping import json_in_html
 from tank2sim.marks import marked
 from tank2sim.native.library import kept
-from tank2sim.report.kit.charts import VEGALITE_VERSION, chart_specification
-from tank2sim.report.kit.numbers import NO_VALUE, format_column, format_number, is_number_text
-from tank2sim.report.kit.theme import DARK, LIGHT, LOCALE
-
-
-class Verdict(StrEnum):
-    """What a figure means, in words; sign and colour only go with them."""
-
-    NONE = ""
-    PASSED = "passed"
-    CAUTION = "caution"
-    FAILED = "failed"
-
-
-@dataclass(frozen=True, kw_only=True)
-class KeyFigure:
-    """A key figure, shown on a card at the top: `value` in `unit`; `note` is a few words under it.
-
-    With a `limit` (largest value allowed, in `unit`), a bar shows the size of the value next to it.
-    """
-
-    label: str
-    value: float | str
-    unit: str = ""
-    verdict: Verdict = Verdict.NONE
-    note: str = ""
-    limit: float | None = None
-
-    @property
-    def reach_percent(self) -> float:
-        """Length of the bar, % of its room."""
-        return self._percent(self.value)
-
-    @property
-    def limit_percent(self) -> float:
-        """Place of the limit, % of the room of the bar."""
-        return self._percent(self.limit)
-
-    def _percent(self, value: float | str | None) -> float:
-        sizes = [abs(size) for size in (self.value, self.limit) if isinstance(size, float | int)]
-        largest = max(sizes, default=0.0)
-        return round(100 * abs(value) / (_ROOM * largest), 1) if isinstance(value, float | int) and largest else 0.0
-
-
-_ROOM = 1.15
-"""Room of the bar of a key figure, over the larger of figure and limit. Project choice: both ends are seen."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Column:
-    """Head of a column: its title, the unit of its numbers, and their significant digits."""
-
-    title: str
-    unit: str = ""
-    digits: int = 4
-
 
 _SHORT = 24
 """Characters of text in a table that are not broken into lines."""
@@ -89,91 +34,6 @@ _LONG = 10
 
 _NOTES_SHOWN = 2
 """Notices of a section that are not folded. Project choice."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Link:
-    """A cell that leads elsewhere: `path` is that of a file relative to the page, with slashes."""
-
-    text: str
-    path: str
-
-    @property
-    def address(self) -> str:
-        """The path as a page has it: no character of a name means anything but itself."""
-        return urllib.parse.quote(self.path)
-
-
-Cell = float | int | bool | str | Verdict | Link | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class PageTable:
-    """A table. Cells are numbers in the unit of their column, text, verdicts, truth values or None (nothing known).
-
-    Parameters
-    ----------
-    caption : str
-    columns : sequence of Column
-    rows : sequence of sequences
-    folded : bool, optional
-        Whether only the caption is seen until the reader opens the table; by default a long table is. On paper all
-        are open.
-
-    Raises
-    ------
-    ValueError
-        A row has not as many cells as there are columns.
-    """
-
-    caption: str
-    columns: Sequence[Column]
-    rows: Sequence[Sequence[Cell]]
-    folded: bool | None = None
-
-    def __post_init__(self) -> None:
-        for row in self.rows:
-            if len(row) != len(self.columns):
-                raise ValueError(f"table {self.caption!r}: {len(row)} cells in a row of {len(self.columns)} columns")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Illustration:
-    """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption.
-
-    Where the page is wide, two charts of `half` its width that follow each other are side by side.
-    """
-
-    chart: alt.TopLevelMixin
-    caption: str = ""
-    half: bool = False
-
-    @property
-    def title(self) -> str:
-        """Title of the chart; empty if it has none."""
-        title = getattr(self.chart, "title", "")
-        text = getattr(title, "text", title)
-        return text if isinstance(text, str) else ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PageSection:
-    """A part of the page. An empty line in `text` starts a paragraph; `notes` are what the reader must not miss.
-
-    Of a `folded` section only the heading is seen until the reader opens it; on paper it is open.
-    """
-
-    heading: str
-    text: str = ""
-    tables: Sequence[PageTable] = ()
-    charts: Sequence[Illustration] = ()
-    notes: Sequence[str] = ()
-    folded: bool = False
-
-
-def notices_section(notices: Sequence[str]) -> list[PageSection]:
-    """Return the section with the notices of a result, empty without any."""
-    return [PageSection(heading="Notices", notes=notices)] if notices else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,7 +47,7 @@ class Page:
     subtitle: str = ""
     verdict: str = ""
     figures: Sequence[KeyFigure] = ()
-    sections: Sequence[PageSection] = ()
+    sections: Sequence[Section] = ()
 
 
 def render_page(page: Page) -> str:
@@ -198,11 +58,11 @@ def render_page(page: Page) -> str:
     sections = [section for section in sections if _has_content(section)]
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("tank2sim", "answer"), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.trim_blocks = environment.lstrip_blocks = True
     environment.filters["paragraphs"] = _paragraphs
-    return environment.get_template("kit/page.html.j2").render(
+    return environment.get_template("page.html.j2").render(
         page=page,
         marks=marks,
         notes_shown=_NOTES_SHOWN,
@@ -210,8 +70,8 @@ def render_page(page: Page) -> str:
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
         version=__version__,
-        style=Markup(resource_text("kit/page.css")),
-        script=Markup(resource_text("kit/page.js")),
+        style=Markup(resource_text("answer/page.css")),
+        script=Markup(resource_text("answer/page.js")),
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
@@ -250,7 +110,7 @@ class _Counter:
         return self.tables
 
 
-def _section(section: PageSection, counter: _Counter, marks: Sequence[str]) -> dict[str, Any]:
+def _section(section: Section, counter: _Counter, marks: Sequence[str]) -> dict[str, Any]:
     """The parts of a section; notices that mark the whole page are at its top, and not repeated."""
     return {
         "content": section,
@@ -260,7 +120,7 @@ def _section(section: PageSection, counter: _Counter, marks: Sequence[str]) -> d
     }
 
 
-def _table(table: PageTable, number: int) -> dict[str, Any]:
+def _table(table: Table, number: int) -> dict[str, Any]:
     columns = [_column(column, [row[place] for row in table.rows]) for place, column in enumerate(table.columns)]
     return {
         "number": number,
@@ -294,6 +154,8 @@ def _shown(cell: Cell) -> str:
         return str(cell)
     if isinstance(cell, Link):
         return cell.text
+    if isinstance(cell, list):
+        return ", ".join(map(_shown, cell)) or NO_VALUE
     if is_number_text(cell):
         return format_number(cell)
     return "yes" if cell else "no"
@@ -322,8 +184,8 @@ def _paragraphs(text: str) -> Iterable[str]:
 
 
 def resource_text(name: str) -> str:
-    """Return the text of a file of the package ``tank2sim.report``."""
-    return importlib.resources.files("tank2sim.report").joinpath(name).read_text(encoding="utf-8")
+    """Return the text of a file of the package, for example ``answer/page.css``."""
+    return importlib.resources.files("tank2sim").joinpath(name).read_text(encoding="utf-8")
 
 
 @functools.cache

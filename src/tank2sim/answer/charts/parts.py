@@ -12,8 +12,8 @@ import numpy as np
 from altair.utils.schemapi import debug_mode
 from numpy.typing import ArrayLike
 
+from tank2sim.answer.charts.theme import DASHES, SHAPES, STROKE
 from tank2sim.arrays import Array
-from tank2sim.report.kit.theme import DASHES, SHAPES, STROKE
 from tank2sim.units import UNITS
 
 LINE_SAMPLES = 600

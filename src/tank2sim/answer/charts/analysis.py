@@ -10,8 +10,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tank2sim.records.thinning import thin_line
-from tank2sim.report.kit.chart_parts import (
+from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     Chart,
@@ -29,7 +28,8 @@ from tank2sim.report.kit.chart_parts import (
     stacked,
     vector,
 )
-from tank2sim.report.kit.theme import CROSS
+from tank2sim.answer.charts.theme import CROSS
+from tank2sim.records.thinning import thin_line
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from tank2sim.answer.charts.picture import History, Signal, TrackData
 from tank2sim.dynamics.model import Model
-from tank2sim.report.kit.charts import History, Signal, TrackData
 from tank2sim.simulation.thruster_manoeuvres import thruster_commands
 from tank2sim.simulation.trajectory import Trajectory
 

@@ -1,0 +1,86 @@
+"""Public names of tank2sim, each imported when it is first used."""
+
+from .answer.parts import Table as Table
+from .api.audit import AuditResult as AuditResult
+from .api.audit import audit as audit
+from .api.autopilot import AutopilotResult as AutopilotResult
+from .api.bridge import PilotCardResult as PilotCardResult
+from .api.bridge import PosterResult as PosterResult
+from .api.bundled_ships import ShipsResult as ShipsResult
+from .api.captive_run import CaptiveRunResult as CaptiveRunResult
+from .api.captive_run import reduce_runs as reduce_runs
+from .api.comparison import ComparisonResult as ComparisonResult
+from .api.comparison import compare as compare
+from .api.convention import ConventionResult as ConventionResult
+from .api.convention import convention as convention
+from .api.conversion import ConversionResult as ConversionResult
+from .api.conversion import convert as convert
+from .api.craft_identification import (
+    CraftIdentificationResult as CraftIdentificationResult,
+)
+from .api.craft_identification import (
+    identify_craft as identify_craft,
+)
+from .api.demo import DemoResult as DemoResult
+from .api.demo import run_demo as run_demo
+from .api.design import (
+    CampaignDesignResult as CampaignDesignResult,
+)
+from .api.design import (
+    TrialDesignResult as TrialDesignResult,
+)
+from .api.design import (
+    design_campaign as design_campaign,
+)
+from .api.design import (
+    design_trial as design_trial,
+)
+from .api.fmu import CheckResult as CheckResult
+from .api.fmu import ExportResult as ExportResult
+from .api.fmu import check_fmu as check_fmu
+from .api.gap import GapResult as GapResult
+from .api.gap import find_gap as find_gap
+from .api.glide import GlideResult as GlideResult
+from .api.guess import GuessResult as GuessResult
+from .api.guess import guess as guess
+from .api.identification import IdentificationResult as IdentificationResult
+from .api.identification import identify as identify
+from .api.influence import InfluenceResult as InfluenceResult
+from .api.influence import TuningResult as TuningResult
+from .api.log import LogResult as LogResult
+from .api.log import log as log
+from .api.manoeuvre import ManoeuvreResult as ManoeuvreResult
+from .api.mmg_reduction import MmgReductionResult as MmgReductionResult
+from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
+from .api.reduction import ReductionResult as ReductionResult
+from .api.reduction import reduce as reduce
+from .api.report import ReportResult as ReportResult
+from .api.report import make_report as make_report
+from .api.result import Result as Result
+from .api.schemas import json_schema as json_schema
+from .api.ship import Ship as Ship
+from .api.ship import load as load
+from .api.ship import ships as ships
+from .api.signals import SignalsResult as SignalsResult
+from .api.signals import signals as signals
+from .api.stability import StabilityResult as StabilityResult
+from .api.steering_models import (
+    SteeringModelsResult as SteeringModelsResult,
+)
+from .api.steering_models import (
+    steering_models as steering_models,
+)
+from .api.steering_page import SteeringPageResult as SteeringPageResult
+from .api.tow import TowResult as TowResult
+from .api.tow import tow as tow
+from .api.trial import TrialRecord as TrialRecord
+from .api.trial import read_trial as read_trial
+from .api.turn_tuning import TurnTuningResult as TurnTuningResult
+from .api.validation import ValidationResult as ValidationResult
+from .api.validation import validate as validate
+from .api.yaw import YawResult as YawResult
+from .api.yaw import simulate_yaw as simulate_yaw
+from .api.yaw import yaw as yaw
+from .errors import InputError as InputError
+
+__version__: str

@@ -1,0 +1,1 @@
+"""The kinds of charts, their looks, and pictures of them."""

@@ -1,0 +1,277 @@
+"""The parts of an answer: notices, key figures, tables, charts and sections; everything is plain text, never HTML."""
+
+from __future__ import annotations
+
+import urllib.parse
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+
+class Verdict(StrEnum):
+    """What a figure means, in words; sign and colour only go with them."""
+
+    NONE = ""
+    PASSED = "passed"
+    CAUTION = "caution"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyFigure:
+    """A key figure, shown on a card at the top of the page.
+
+    Parameters
+    ----------
+    label : str
+    value : float or str
+        In `unit`.
+    unit : str
+    verdict : Verdict
+    note : str
+        A few words under the value.
+    limit : float, optional
+        Largest value allowed, in `unit`; a bar then shows the size of the value next to it.
+    """
+
+    label: str
+    value: float | str
+    unit: str = ""
+    verdict: Verdict = Verdict.NONE
+    note: str = ""
+    limit: float | None = None
+
+    @property
+    def reach_percent(self) -> float:
+        """Length of the bar, % of its room."""
+        return self._percent(self.value)
+
+    @property
+    def limit_percent(self) -> float:
+        """Place of the limit, % of the room of the bar."""
+        return self._percent(self.limit)
+
+    def _percent(self, value: float | str | None) -> float:
+        sizes = [abs(size) for size in (self.value, self.limit) if isinstance(size, float | int)]
+        largest = max(sizes, default=0.0)
+        return round(100 * abs(value) / (_ROOM * largest), 1) if isinstance(value, float | int) and largest else 0.0
+
+
+_ROOM = 1.15
+"""Room of the bar of a key figure, over the larger of figure and limit. Project choice: both ends are seen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """Head of a column: its title, the unit of its numbers, and their significant digits."""
+
+    title: str
+    unit: str = ""
+    digits: int = 4
+
+    @property
+    def head(self) -> str:
+        """Title with the unit in brackets."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A cell that leads elsewhere: `path` names a file relative to the page, with slashes."""
+
+    text: str
+    path: str
+
+    @property
+    def address(self) -> str:
+        """The path as a page has it: no character of a name means anything but itself."""
+        return urllib.parse.quote(self.path)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+Cell = float | int | bool | str | Verdict | Link | list[float] | list[str] | None
+"""A number in the unit of its column, text, a verdict, a truth value, a short list, or None (nothing known)."""
+
+REPR_ROWS = 20
+"""Rows of a table in ``repr``: with its heading it fits a screen of 24 lines. Project choice."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table, on the screen, on the page and as a data frame. :func:`table` makes one from heads with units.
+
+    Parameters
+    ----------
+    caption : str
+    columns : sequence of Column
+    rows : sequence of sequences of Cell
+    notes : sequence of str
+        Sentences under the table.
+    folded : bool, optional
+        Whether the page shows only the caption until the reader opens the table; by default a long table is folded.
+        On paper all are open.
+    on_screen : bool
+        Whether the command prints it; ``.tables`` and the page have every table.
+    wide : bool
+        Names in it are never broken on the screen, however wide it becomes.
+
+    Raises
+    ------
+    ValueError
+        A row has not as many cells as there are columns.
+    """
+
+    caption: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+    notes: Sequence[str] = ()
+    folded: bool | None = None
+    on_screen: bool = True
+    wide: bool = False
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"table {self.caption!r}: {len(row)} cells in a row of {len(self.columns)} columns")
+
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Heads of the columns, units in brackets."""
+        return tuple(column.head for column in self.columns)
+
+    @property
+    def df(self) -> pd.DataFrame:
+        """The table as a data frame; its columns are :attr:`heads`."""
+        import pandas as pd
+
+        return pd.DataFrame([list(row) for row in self.rows], columns=list(self.heads))
+
+    @property
+    def text(self) -> str:
+        """The table as text, at most :data:`REPR_ROWS` rows; numbers with five digits."""
+        import pandas as pd
+
+        cells = [[cell_text(cell) for cell in row] for row in self.rows[:REPR_ROWS]]
+        lines = [self.caption, pd.DataFrame(cells, columns=list(self.heads)).to_string(index=False)]
+        omitted = len(self.rows) - REPR_ROWS
+        return "\n".join(lines + ([f"... {omitted} more rows in .tables"] if omitted > 0 else []))
+
+
+def table(
+    caption: str,
+    heads: Iterable[str | Column],
+    rows: Iterable[Sequence[Cell]],
+    *notes: str,
+    digits: int = 4,
+    folded: bool | None = None,
+    on_screen: bool = True,
+) -> Table:
+    """Return a table whose heads are written with their units: ``("run", "speed (m/s)")``.
+
+    Parameters
+    ----------
+    caption : str
+    heads : iterable of str or Column
+        Heads as text; the unit is in the last brackets.
+    rows : iterable of sequences of Cell
+    *notes : str
+        Sentences under the table.
+    digits : int
+        Significant digits of the numbers.
+    folded, on_screen
+        As of :class:`Table`.
+
+    Examples
+    --------
+    >>> table("Turns", ["angle (deg)", "advance (m)"], [[35.0, 512.25]]).df.columns.to_list()
+    ['angle (deg)', 'advance (m)']
+    """
+    columns = [head if isinstance(head, Column) else _column(head, digits) for head in heads]
+    rows = [list(row) for row in rows]
+    return Table(caption=caption, columns=columns, rows=rows, notes=notes, folded=folded, on_screen=on_screen)
+
+
+def _column(head: str, digits: int) -> Column:
+    title, bracket, unit = head.rpartition(" (")
+    if not bracket or not unit.endswith(")"):
+        return Column(title=head, digits=digits)
+    return Column(title=title, unit=unit.removesuffix(")"), digits=digits)
+
+
+def cell_text(value: object) -> str:
+    """A value as the screen shows it: numbers with five digits, ``-`` for None."""
+    match value:
+        case None:
+            return "-"
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.5g}"
+        case list() | tuple():
+            return ", ".join(cell_text(item) for item in value)
+        case _:
+            return str(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Illustration:
+    """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption.
+
+    Parameters
+    ----------
+    chart : alt.TopLevelMixin
+    caption : str
+    half : bool
+        Where the page is wide, two such charts that follow each other are side by side.
+    name : str
+        Name in ``charts()`` and of its picture; by default from the title of the chart or the heading of its section.
+    """
+
+    chart: alt.TopLevelMixin
+    caption: str = ""
+    half: bool = False
+    name: str = ""
+
+    @property
+    def title(self) -> str:
+        """Title of the chart; empty if it has none."""
+        title = getattr(self.chart, "title", "")
+        text = getattr(title, "text", title)
+        return text if isinstance(text, str) else ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A part of an answer.
+
+    Parameters
+    ----------
+    heading : str
+    text : str
+        An empty line starts a paragraph.
+    tables : sequence of Table
+    charts : sequence of Illustration
+    notes : sequence of str
+        What the reader must not miss.
+    folded : bool
+        Whether the page shows only the heading until the reader opens the section; on paper it is open.
+    """
+
+    heading: str
+    text: str = ""
+    tables: Sequence[Table] = ()
+    charts: Sequence[Illustration] = ()
+    notes: Sequence[str] = ()
+    folded: bool = False
+
+
+def notices_section(notices: Sequence[str]) -> list[Section]:
+    """Return the section with the notices of a result, empty without any."""
+    return [Section(heading="Notices", notes=notices)] if notices else []

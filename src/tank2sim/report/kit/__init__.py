@@ -1,1 +1,0 @@
-"""What every page is made of: the page, its theme, charts, numbers and values from JSON."""
