@@ -12,9 +12,9 @@ import pytest
 from _pytest.mark import ParameterSet
 
 import tank2sim as t2s
+from tank2sim.answer.result import Result
 from tank2sim.api.bundled_ships import list_ships
 from tank2sim.api.gap import GapResult
-from tank2sim.api.result import Result
 from tank2sim.bundled import bundled
 from tank2sim.gap.result import Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured

@@ -1,6 +1,7 @@
 """Public names of tank2sim, each imported when it is first used."""
 
 from .answer.parts import Table as Table
+from .answer.result import Result as Result
 from .api.audit import AuditResult as AuditResult
 from .api.audit import audit as audit
 from .api.autopilot import AutopilotResult as AutopilotResult
@@ -56,7 +57,6 @@ from .api.reduction import ReductionResult as ReductionResult
 from .api.reduction import reduce as reduce
 from .api.report import ReportResult as ReportResult
 from .api.report import make_report as make_report
-from .api.result import Result as Result
 from .api.schemas import json_schema as json_schema
 from .api.ship import Ship as Ship
 from .api.ship import load as load

@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.result import Result
+from tank2sim.answer.result import Result
 from tank2sim.api.schemas import KEYS
 from tank2sim.report.results.result_types import kind_of
 from tests.made_results import OWN_DOCUMENTS, RESULTS, marked

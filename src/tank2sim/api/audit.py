@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, screen_table, section_charts
+from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.records import audit as records_audit
 from tank2sim.records.audit import Finding, record_noise
@@ -25,7 +25,7 @@ MEASURED_SAMPLES = 400
 itself is the file."""
 
 
-class AuditResult(Result):
+class AuditResult(OldResult):
     """Faults of the columns of trials, and the noise of each signal.
 
     Parameters
@@ -74,7 +74,7 @@ class AuditResult(Result):
         return pd.DataFrame(rows, columns=["file", "column", "sigma", "stated"])
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {
             "findings": [entry for finding in self._all_findings for entry in finding.as_json()],
             "trials": [_summary(record.trial, noise) for record, noise in zip(self.trials, self._noise, strict=True)],

@@ -208,7 +208,7 @@ class AutopilotResult(ResultWithAutopilot):
         return {name: pd.DataFrame(trial_columns(run)) for name, run in self.study.runs.items()}
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {**self.study.as_json(), **({"export": self.fmu.as_json()} if self.fmu else {})}
 
     @property

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, Bridge, bridge_of
 from tank2sim.analysis.validation.comparison import differences_of_size
 from tank2sim.answer.parts import Table
-from tank2sim.api.result import Result, charts_of
+from tank2sim.api.result import OldResult, charts_of
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.errors import InputError
@@ -29,7 +29,7 @@ LONGEST_ORDER, MORE_ORDERS = 24, 3
 _ON_FORM = {order.casefold() for order in ORDERS_AHEAD}
 
 
-class BridgeResult(Result):
+class BridgeResult(OldResult):
     """Circles, stops, speeds by revolutions and zigzags of a ship on a sheet of paper; what is not known is blank.
 
     Parameters
@@ -75,7 +75,7 @@ class BridgeResult(Result):
         return pd.DataFrame([vars(order) for order in self.bridge.telegraph])
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {**self.bridge.as_json(), "ballast": self.ballast.as_json() if self.ballast else None}
 
     @property

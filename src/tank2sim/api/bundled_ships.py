@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import Card, read_card
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class ShipsResult(Result):
+class ShipsResult(OldResult):
     """The bundled ships.
 
     Parameters
@@ -41,7 +41,7 @@ class ShipsResult(Result):
         return pd.DataFrame(rows, columns=["name", "ship", "model", "length_m", "source"]).set_index("name")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         listed = [
             {
                 "name": name,

@@ -15,7 +15,7 @@ import numpy as np
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import AngleArgument, SpeedArgument, checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import write_together
 from tank2sim.identification.captive.single_runs import (
@@ -52,7 +52,7 @@ TYPE_NAMES = (*RUN_TYPES, *SHORT_TYPES, "combined")
 _STEADY_YAW_RADPS = 1e-6
 
 
-class CaptiveRunResult(Result):
+class CaptiveRunResult(OldResult):
     """Fourier coefficients, averaged cycle, residual and repeats of captive runs.
 
     Parameters
@@ -156,7 +156,7 @@ class CaptiveRunResult(Result):
         return text.getvalue()
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {
             "runs": [_run_json(run) for run in self.runs],
             "repeats": [asdict(row) for row in self.repeats],

@@ -11,7 +11,7 @@ from tank2sim.analysis.validation.comparison import CardComparison, compare_card
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import SmallEnsemble, checked
-from tank2sim.api.result import Result, screen_table, section_charts
+from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard, SteeredCard
 from tank2sim.units import in_words
@@ -27,7 +27,7 @@ _SHOWN = ("advance_m", "tactical_diameter_m", "overshoot_1_deg", "overshoot_2_de
 _SHOWN_OF_CRAFT = ("final_speed_mps", "steady_diameter_m", "steady_rate_degps", "final_rate_degps")
 
 
-class ComparisonResult(Result):
+class ComparisonResult(OldResult):
     """Cards of one ship compared; the first is the reference.
 
     Parameters
@@ -105,7 +105,7 @@ class ComparisonResult(Result):
         return pd.DataFrame(rows, columns=columns)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self.comparison.as_json()
 
     @property

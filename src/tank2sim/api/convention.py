@@ -20,7 +20,7 @@ from tank2sim.analysis.conversion.readings import (
 )
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.coefficient_table import CoefficientTable, read_coefficients
@@ -65,7 +65,7 @@ class ReadingFigures:
     overshoot_1_deg: float | None = None
 
 
-class ConventionResult(Result):
+class ConventionResult(OldResult):
     """Readings of a table, the most probable first.
 
     Parameters
@@ -116,7 +116,7 @@ class ConventionResult(Result):
         return bool(pairs) and all(abs(a - b) <= _ALIKE * max(abs(a), abs(b)) for a, b in pairs)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {
             "source": self.table.source,
             "stated": dict(self.table.conventions),

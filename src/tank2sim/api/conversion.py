@@ -30,7 +30,7 @@ from tank2sim.analysis.conversion.robotics import (
 )
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import NumberArgument, Scatter, checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.cards.card import MmgCard
@@ -68,7 +68,7 @@ class ConvertedText:
     changes: tuple[FigureChange, ...] = ()
 
 
-class ConversionResult(Result):
+class ConversionResult(OldResult):
     """A ship in another language.
 
     Parameters
@@ -120,7 +120,7 @@ class ConversionResult(Result):
         write_together(self.files(path), inputs=[Path(self.ship.card.source)])
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         fit = self.made.fit
         return {
             "ship": self.ship.name,

@@ -59,7 +59,7 @@ class CraftAutopilotResult(ResultWithAutopilot):
         return {name: pd.DataFrame(trial_columns(run)) for name, run in self.study.runs.items()}
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         export = {"export": self.fmu.as_json()} if self.fmu else {}
         return {
             "ship": self.ship.name,

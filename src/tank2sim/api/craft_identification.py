@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, CraftCard
 from tank2sim.cards.examination import doubts
@@ -40,7 +40,7 @@ CraftTrialPaths = str | Path | Sequence[str | Path]
 """Trials: a file, a folder with CSV files, or several of them."""
 
 
-class CraftIdentificationResult(Result):
+class CraftIdentificationResult(OldResult):
     """Coefficients and thrust curves of a craft.
 
     Parameters
@@ -161,7 +161,7 @@ class CraftIdentificationResult(Result):
         return rows
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         keys = ("value", "standard_error", "before", "prior_standard_error", "verdict", "by")
         return {
             "ship": self.before.name,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.stability.craft import CraftAtSpeed, CraftStability, SteadyCraftTurn, craft_stability
 from tank2sim.answer.parts import Table
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.stability import four_digits
 from tank2sim.cards import CraftCard
 from tank2sim.units import from_si
@@ -23,7 +23,7 @@ degree for each length, which wind, waves and errors of a few per cent in its co
 NO_RUDDER = "the criteria of IMO MSC.137(76) and the spirals are of a rudder, and are not judged"
 
 
-class CraftStabilityResult(Result):
+class CraftStabilityResult(OldResult):
     """Straight-line stability, surge and turning of a craft with thrusters at both sides.
 
     Parameters
@@ -42,7 +42,8 @@ class CraftStabilityResult(Result):
     command = "stability"
 
     def __init__(self, ship: Ship, study: CraftStability) -> None:
-        self.ship, self.study = ship, study
+        self.ship = ship
+        self.study: CraftStability = study
         self.notices = (*ship.model.notices, NO_RUDDER)
 
     @property
@@ -66,7 +67,7 @@ class CraftStabilityResult(Result):
         return self.stable or (alone is not None and alone.diameter_m > STRAIGHT_FROM_LENGTHS * self._length_m)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         study = self.study
         return {
             "ship": study.name,

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.craft_identification import CraftTrialPaths, craft_trial_files
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard
 from tank2sim.cards.examination import doubts
@@ -34,7 +34,7 @@ NOT_ITS_OWN = (
 """Notice of each validation: a card of a craft does not say what it was identified from."""
 
 
-class CraftValidationResult(Result):
+class CraftValidationResult(OldResult):
     """Free-running predictions of trials by a craft's card.
 
     Parameters
@@ -77,7 +77,7 @@ class CraftValidationResult(Result):
         return [[row[0], *(None if value is None else float(value) for value in row[1:])] for row in rows]
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         place, heading = _at_ends(self.predictions)
         keys = ("predictions", "rms_u_mps", "rms_v_mps", "rms_r_degps", "end_distance_m", "end_heading_deg")
         return {

@@ -8,13 +8,13 @@ from typing import Any
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result
+from tank2sim.api.result import OldResult
 from tank2sim.demo import PAGE
 from tank2sim.files import writable_folder
 from tank2sim.native.compiler import require_compiler
 
 
-class DemoResult(Result):
+class DemoResult(OldResult):
     """A folder with the demo: cards, FMUs, simulated trials and a page that shows them.
 
     Parameters
@@ -41,7 +41,7 @@ class DemoResult(Result):
         return tuple(self.folder / str(name) for name in self._values["files"])
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self._values
 
     @property

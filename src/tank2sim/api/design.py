@@ -106,7 +106,7 @@ class CampaignDesignResult(PagedResult):
         return campaign_template(self.design, self._rows)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         design = self.design
         runs, gauges = design.tank_runs, design.planned.gauges
         return {
@@ -365,7 +365,7 @@ class TrialDesignResult(PagedResult):
         return {str(row["orders"]): manoeuvre.orders for row, (manoeuvre, _) in pairs}
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         design = self.design
         return {
             "ship": self.ship.name,

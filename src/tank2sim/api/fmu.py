@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Files = Mapping[Path, str | bytes]
 
 
-class ExportResult(Result):
+class ExportResult(OldResult):
     """An FMU that was made.
 
     Parameters
@@ -60,7 +60,7 @@ class ExportResult(Result):
         self.notices = (*ship.model.notices, *notices)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         about = {"ship": self.ship.name, "fmu": self.path, "ssp": self.ssp}
         return {**about, **self.exported.as_json(), "notices": self.notices}
 
@@ -78,7 +78,7 @@ class ExportResult(Result):
         return ()
 
 
-class CheckResult(Result):
+class CheckResult(OldResult):
     """The check of an FMU against its card.
 
     Parameters
@@ -114,7 +114,7 @@ class CheckResult(Result):
         return (*self.report.validation, *self.report.differences)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self.report.as_json()
 
     @property

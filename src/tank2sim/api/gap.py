@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import Count, Effects, NumberArgument, checked
 from tank2sim.api.gap_files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
@@ -55,7 +55,7 @@ SUREST_WRONG = round(1 - SUREST, 9)
 """Probability with which even the surest name may be wrong."""
 
 
-class GapResult(Result):
+class GapResult(OldResult):
     """The effect that a model lacks to follow trials, and the card with it.
 
     Parameters
@@ -159,7 +159,7 @@ class GapResult(Result):
         return Ship(self.improved)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self._results
 
     @cached_property

@@ -88,7 +88,7 @@ class GlideResult(PagedResult):
         return pd.DataFrame([each.as_json() for each in self.found.ranges])
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self.found.as_json()
 
     @property

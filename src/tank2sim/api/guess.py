@@ -62,7 +62,7 @@ class GuessResult(PagedResult):
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("figure")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {**self.guess.as_json(), "notices": self.notices}
 
     @property

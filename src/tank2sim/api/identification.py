@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class IdentificationResult(Result):
+class IdentificationResult(OldResult):
     """Coefficients identified from trials, and how well the new card follows trials.
 
     Parameters
@@ -125,7 +125,7 @@ class IdentificationResult(Result):
         return pd.DataFrame(rows, columns=columns)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {**self._found, "replays": self._replays}
 
     @property

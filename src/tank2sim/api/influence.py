@@ -116,7 +116,7 @@ class InfluenceResult(PagedResult):
         return self._frame(self.found.shares)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         ensemble = {"ensemble": self.bands.as_json()} if self.bands else {}
         return {**self.found.as_json(), **ensemble, "notices": self._notices}
 
@@ -219,7 +219,7 @@ class TuningResult(InfluenceResult):
         return pd.DataFrame(rows, columns=["parameter", "before", "after", "standard_errors"]).set_index("parameter")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         figures = dict(zip(self._names, self.after.tolist(), strict=True))
         return {**super().content(), "tuned": self.tuned.as_json(figures)}
 

@@ -159,7 +159,7 @@ class LogResult(PagedResult):
         return list(files)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         voyage = self.voyage
         return {
             "logs": [

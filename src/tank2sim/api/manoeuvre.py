@@ -109,7 +109,7 @@ class ManoeuvreResult(PagedResult):
         return text
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         particulars = getattr(self.ship.card, "ship", None)
         other = self.other_side
         return {

@@ -215,7 +215,7 @@ class MmgReductionResult(PagedResult):
         return pd.DataFrame.from_dict(rows, orient="index")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         fit = self.fit
         arm, arm_error = fit.yaw_arm()
         computed, channels = fit.tests.readings - fit.residuals, fit.tests.channels

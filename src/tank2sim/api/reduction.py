@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.errors import InputError
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from tank2sim.api.ship import Ship
 
 
-class ReductionResult(Result):
+class ReductionResult(OldResult):
     """Hydrodynamic derivatives from captive tests.
 
     Parameters
@@ -111,7 +111,7 @@ class ReductionResult(Result):
         return pd.DataFrame(rows).set_index("name")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return reduction_as_json(self.reduction, self.contents, self.notices)
 
     @property

@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tank2sim.answer.parts import Table
+from tank2sim.answer.result import Result
+from tank2sim.answer.study import not_as_written
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import PagedResult, Result
-from tank2sim.files import parsed_json, plain_json, read_text, refuse_deep, write_together
+from tank2sim.api.result import PagedResult
+from tank2sim.api.results import RESULT_CLASSES, read_result
+from tank2sim.files import parsed_json, plain_json, read_text, refuse_deep, schema_command, write_together
 from tank2sim.marks import marked
 
 if TYPE_CHECKING:
@@ -43,10 +46,8 @@ class ReportResult(PagedResult):
     command = "report"
 
     def __init__(self, values: Mapping[str, Any], source: str) -> None:
-        from tank2sim.report.results.page import result_page
-
         self._values, self.source = values, source
-        self._layout = result_page(values, source)
+        self._layout = _layout(values, source)
         self.notices = tuple(marked(values.get("notices") or ()))
 
     @property
@@ -80,8 +81,22 @@ class ReportResult(PagedResult):
         return self._layout
 
 
+def _layout(values: Mapping[str, Any], source: str) -> Page:
+    if not isinstance(values, Mapping) or schema_command(values.get("schema")) not in RESULT_CLASSES:
+        from tank2sim.report.results.page import result_page
+
+        return result_page(values, source)
+    result = read_result(values, source)
+    try:
+        return result.layout()
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError, ArithmeticError, LookupError) as fault:
+        raise not_as_written(source, "") from fault
+
+
 @checked
-def make_report(result: Result | Mapping[str, object] | str | Path, path: str | Path | None = None) -> ReportResult:
+def make_report(
+    result: Result[Any] | Mapping[str, object] | str | Path, path: str | Path | None = None
+) -> ReportResult:
     """Make the page of a result.
 
     Parameters
@@ -102,14 +117,14 @@ def make_report(result: Result | Mapping[str, object] | str | Path, path: str | 
         refuse_deep(result, "the result")
         found = ReportResult(plain_json(result), "the result")
     else:
-        found = ReportResult(read_result(Path(result)), str(result))
+        found = ReportResult(read_values(Path(result)), str(result))
     if path is not None:
         inputs = [Path(result)] if isinstance(result, str | Path) else []
         write_together({Path(path): found.page()}, inputs=inputs)
     return found
 
 
-def read_result(path: Path) -> Any:
+def read_values(path: Path) -> Any:
     """The JSON of a file.
 
     Raises

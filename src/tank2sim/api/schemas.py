@@ -11,6 +11,7 @@ from pydantic import ConfigDict, TypeAdapter
 from typing_extensions import TypedDict
 
 from tank2sim.api.bounds import checked
+from tank2sim.api.results import RESULT_CLASSES, result_schema
 from tank2sim.files import schema_name
 
 Number = float | None
@@ -1270,6 +1271,8 @@ def json_schema(command: str) -> dict[str, Any]:
     >>> t2s.json_schema("simulate")["properties"]["schema"]
     {'const': 'tank2sim/simulate/1'}
     """
+    if command in RESULT_CLASSES:
+        return result_schema(command)
     schema = TypeAdapter(KEYS[command]).json_schema()
     if "anyOf" in schema:  # no key is allowed that is not declared, so that one shape alone fits
         schema["oneOf"] = schema.pop("anyOf")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import control
     import pandas as pd
 
+    from tank2sim.answer.result import Result
     from tank2sim.api.autopilot import AutopilotResult
     from tank2sim.api.bridge import PilotCardResult, PosterResult
     from tank2sim.api.craft_autopilot import CraftAutopilotResult
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from tank2sim.api.glide import GlideResult
     from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.manoeuvre import ManoeuvreResult
-    from tank2sim.api.result import Result
     from tank2sim.api.stability import StabilityResult
     from tank2sim.api.steering_page import SteeringPageResult
     from tank2sim.api.turn_tuning import TurnTuningResult
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from tank2sim.simulation.manoeuvres import Manoeuvre
 
 
-AnyResult = TypeVar("AnyResult", bound="Result")
+AnyResult = TypeVar("AnyResult", bound="Result[Any]")
 
 
 class SimulationOptions(TypedDict, total=False):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tank2sim.answer.parts import Table
 from tank2sim.api.audit import MEASURED_SAMPLES
 from tank2sim.api.bounds import PositiveArgument, checked
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.errors import InputError
 from tank2sim.records.signals.analysis import ColumnAnalysis, SignalSettings, Steering, TrialAnalysis, analyse
@@ -55,7 +55,7 @@ class FilteredSignal:
     trial: Trial
 
 
-class SignalsResult(Result):
+class SignalsResult(OldResult):
     """Statistics and spectra of the signals of trials, and a filter.
 
     Parameters
@@ -130,7 +130,7 @@ class SignalsResult(Result):
         return TrialRecord(self.filtering.trial) if self.filtering else None
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         content: dict[str, object] = {
             "trials": [analysis_as_json(each) | {"histories": _histories(each)} for each in self.analyses]
         }

@@ -47,7 +47,8 @@ class StabilityResult(PagedResult):
     command = "stability"
 
     def __init__(self, ship: Ship, study: StabilityStudy, bands: StabilityBands | None = None) -> None:
-        self.ship, self.study, self.bands = ship, study, bands
+        self.ship, self.bands = ship, bands
+        self.study: StabilityStudy = study
         compiler = [] if find_compiler() else [NO_COMPILER]
         members = bands.asked.notices if bands else ()
         self.notices = tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler, *members]))
@@ -82,7 +83,7 @@ class StabilityResult(PagedResult):
         return pd.DataFrame(rows, columns=columns).set_index("criterion")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         ensemble = {"ensemble": self.bands.as_json()} if self.bands else {}
         members = self.bands.asked.notices if self.bands else ()
         notices = [notice for notice in self.notices if notice not in members or notice in self.study.notices]

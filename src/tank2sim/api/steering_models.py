@@ -58,7 +58,7 @@ class SteeringModelsResult(PagedResult):
         return pd.DataFrame({each.model: dict(each.K_percent) for each in self.found.influence})
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self.found.as_json()
 
     @property

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
-from tank2sim.api.result import Result
+from tank2sim.api.result import OldResult
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.errors import InputError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
 
 
-class SteeringPageResult(Result):
+class SteeringPageResult(OldResult):
     """A page in which a ship is steered; it needs no network.
 
     Parameters
@@ -64,7 +64,7 @@ class SteeringPageResult(Result):
         self.notices = tuple(dict.fromkeys(notices))
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {
             "ship": self.ship.name,
             "ghost": self.ghost.label if self.ghost else None,

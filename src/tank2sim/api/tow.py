@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial
 
 from tank2sim.answer.parts import Table, cell_text
 from tank2sim.api.bounds import NumberArgument, checked
-from tank2sim.api.result import Result, screen_table, section_charts
+from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import InputError
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class TowResult(Result):
+class TowResult(OldResult):
     """Surge mass and drag of a towed body, SI.
 
     Parameters
@@ -42,7 +42,8 @@ class TowResult(Result):
     command = "tow"
 
     def __init__(self, study: TowStudy, method: str, name: str) -> None:
-        self.study, self.name = study, name
+        self.study: TowStudy = study
+        self.name = name
         fits = study.result.fits
         self.fit = fits[method] if method in fits else fits["qr"]
         self.notices = study.notes
@@ -100,7 +101,7 @@ class TowResult(Result):
         return Ship(self.card)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return self.study.as_json()
 
     @property

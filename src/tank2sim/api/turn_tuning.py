@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_ship, tune_to_two_points
 from tank2sim.answer.parts import Table
-from tank2sim.api.result import Result, screen_table
+from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
 from tank2sim.cards.card import MmgCard
@@ -27,7 +27,7 @@ THROUGH_REMEDY = "give two, as --through 61@35 47@15 (deg/min at deg of rudder) 
 _POINT = re.compile(r"(?P<value>[\d.]+)(?P<metre>m?)@(?P<rudder>[+-]?[\d.]+)")
 
 
-class TurnTuningResult(Result):
+class TurnTuningResult(OldResult):
     """A ship whose steady turns go through two points.
 
     Parameters
@@ -82,7 +82,7 @@ class TurnTuningResult(Result):
         return pd.DataFrame(turn_rows(self.tuning), columns=columns)
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {**self.tuning.as_json(), "notices": self.notices}
 
     @property

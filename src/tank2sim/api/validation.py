@@ -18,7 +18,7 @@ from tank2sim.analysis.validation.study import validate_card as validate_figures
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import PositiveArgument, SmallEnsemble, checked
 from tank2sim.api.craft_validation import CraftValidationResult, validate_craft
-from tank2sim.api.result import Result, screen_table, section_charts
+from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, trial_files, trials_of
 from tank2sim.arrays import Array
@@ -53,7 +53,7 @@ class Replays:
     notices: tuple[str, ...]
 
 
-class ValidationResult(Result):
+class ValidationResult(OldResult):
     """Figures of a ship's trials next to those simulated, with the validation uncertainty.
 
     Parameters
@@ -109,7 +109,7 @@ class ValidationResult(Result):
         return pd.DataFrame(rows, columns=["trial", "figure", "value", "numerical", "deviation"])
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         card, model = self.ready.manoeuvring, self.ready.model
         return {
             "kind": "validate",

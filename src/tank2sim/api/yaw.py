@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument, checked
-from tank2sim.api.result import Result, screen_table, section_charts
+from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, YawRigCard, parse_card
 from tank2sim.dynamics.yaw_programme import Similarity, YawProgramme, programme_of
@@ -45,7 +45,7 @@ CONTROLLERS: dict[str, Controller | None] = {"tuned": None, "adaptive": Adaptive
 """Names of the controllers (4), from the right inertia, and (6)."""
 
 
-class YawResult(Result):
+class YawResult(OldResult):
     """Added yaw inertia and dissipation of a body on the yaw rig, SI.
 
     Parameters
@@ -149,7 +149,7 @@ class YawResult(Result):
         return parse_card(rig_card_text(found, method, name=name, source=source, known=known), "the card found")
 
     def content(self) -> Mapping[str, object]:
-        """As :meth:`.Result.content`."""
+        """As :meth:`.OldResult.content`."""
         return {**self.identification.as_json(), "theory": [asdict(value) for value in self.theory]}
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 from rich.console import Console
@@ -13,7 +14,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from tank2sim.answer.parts import cell_text
-from tank2sim.api.result import Result
+from tank2sim.answer.result import Result
 from tank2sim.errors import InputError
 from tank2sim.escaping import file_name, one_line
 from tank2sim.files import JSON, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
@@ -77,12 +78,12 @@ def show_marked(notices: Iterable[str]) -> list[str]:
     return [notice for notice in notices if notice not in first]
 
 
-def show_result(result: Result) -> None:
+def show_result(result: Result[Any]) -> None:
     """Print a result: its marks first, then the main findings, tables and notices."""
     others = show_marked(result.notices)
     for line in result.headline:
         screen.print(escape(one_line(line)), soft_wrap=True)
-    for table in result.tables:
+    for table in result.screen_tables:
         show_table(table.caption, table.heads, table.rows, wide=table.wide)
         for note in table.notes:
             screen.print(escape(one_line(note)), soft_wrap=True)
@@ -90,7 +91,7 @@ def show_result(result: Result) -> None:
 
 
 def write_result(
-    result: Result,
+    result: Result[Any],
     inputs: Iterable[str | Path],
     *,
     json_file: Path | None = None,

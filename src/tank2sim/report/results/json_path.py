@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from tank2sim.errors import InputError
+from tank2sim.answer.study import not_as_written
 from tank2sim.report.json_values import Json
 
 _T = TypeVar("_T")
@@ -63,9 +63,3 @@ def drawn_from(result: Json, source: str, draw: Callable[[Json], _T]) -> _T:
         return draw(_watched(result, "", place))
     except _FAULTS as error:
         raise not_as_written(source, place.last) from error
-
-
-def not_as_written(source: str, key: str) -> InputError:
-    """Return the error for a key whose value is not as the command wrote it."""
-    remedy = "give the file as the command wrote it, or let this version of tank2sim write it again"
-    return InputError(source, key, "has not the form of a result of this command", remedy)
