@@ -65,22 +65,25 @@ def _stability(model: Model) -> None:
 
 
 def _autopilot(card: ManoeuvringCard, model: Model, kind: str) -> None:
-    study = study_autopilot(card, model, StudySettings(kind=kind))
+    study, piloted = study_autopilot(card, model, StudySettings(kind=kind))
     first = study.margins[0]
     print(
         f"  {kind}: phase margin {first.phase_margin_deg:.1f} deg, Ms {first.sensitivity_peak:.3f}, "
         f"delay margin {first.delay_margin_s:.1f} s"
     )
-    large = {name: round(one.overshoot_deg, 2) for name, one in study.changes.items() if name.startswith("large")}
+    loop = study.closed_loop
+    large = {name: round(one.overshoot_deg, 2) for name, one in loop.course_changes.items() if name.startswith("large")}
     print(f"    overshoot of a 90 deg change (deg): {large}")
-    print(f"    course keeping: heading {study.keeping.heading_error_rms_deg:.3g} deg rms", end="")
-    print(f", rudder {study.keeping.rudder_rms_deg:.3g} deg rms")
+    print(f"    course keeping: heading {loop.course_keeping.heading_error_rms_deg:.3g} deg rms", end="")
+    print(f", rudder {loop.course_keeping.rudder_rms_deg:.3g} deg rms")
     if kind == "pid":
-        filtered = study_autopilot(card, model, StudySettings(kind=kind, wave_filter_radps=WAVE_FILTER)).keeping
+        settings = StudySettings(kind=kind, wave_filter_radps=WAVE_FILTER)
+        filtered = study_autopilot(card, model, settings)[0].closed_loop.course_keeping
         print(f"    with a wave filter: {filtered.heading_error_rms_deg:.3g}, {filtered.rudder_rms_deg:.3g} deg rms")
-        autopilot = study.design.autopilot
-        agreement = verify_together(model, autopilot, make_autopilot_fmu(autopilot, study.design.source, fmi=3))
-        steps = ", ".join(f"{error:.3g} deg at {step:g} s" for step, error in sorted(agreement.error_deg.items()))
+        agreement = verify_together(
+            model, piloted.autopilot, make_autopilot_fmu(piloted.autopilot, study.source, fmi=3)
+        )
+        steps = ", ".join(f"{one.error_deg:.3g} deg at {one.step_s:g} s" for one in agreement.steps)
         print(f"    two FMUs against one model: {steps}; order {agreement.order:.2f}")
 
 

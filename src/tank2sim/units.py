@@ -42,25 +42,65 @@ def from_si(name: str, value: float) -> float:
     return value / factor
 
 
-_WORDS = {
-    "m": "m",
-    "s": "s",
-    "deg": "deg",
-    "degps": "deg/s",
+_WRITTEN = {
+    "s2_per_rad2": "s²/rad²",
+    "s3_per_rad2": "s³/rad²",
+    "s2_per_rad": "s²/rad",
+    "s_per_m": "s/m",
+    "per_s": "1/s",
+    "radpmps": "rad s/m",
     "degpmin": "deg/min",
+    "kgs2pm3": "kg s²/m³",
+    "kgspm2": "kg s/m²",
+    "kgpm3": "kg/m³",
+    "radps": "rad/s",
+    "degps": "deg/s",
+    "m2ps": "m²/s",
+    "kgm2": "kg m²",
+    "deg2s": "deg² s",
+    "NmpA": "N m/A",
+    "Nmps": "N m/s",
+    "kgpm": "kg/m",
+    "kgps": "kg/s",
+    "mps2": "m/s²",
+    "Npm": "N/m",
     "mps": "m/s",
+    "Nms": "N m s",
+    "rpm": "rpm",
+    "rps": "1/s",
+    "deg": "deg",
+    "rad": "rad",
     "percent": "%",
     "lengths": "L",
+    "bytes": "B",
+    "dB": "dB",
+    "Nm": "N m",
+    "Hz": "Hz",
+    "kg": "kg",
+    "kN": "kN",
+    "m2": "m²",
+    "m3": "m³",
+    "N": "N",
+    "A": "A",
+    "J": "J",
+    "m": "m",
+    "s": "s",
 }
+"""Units at the end of names, longest first, as a reader writes them."""
 
 
 def in_words(name: str) -> tuple[str, str]:
-    """Words and unit of a figure's name for a reader: ``("steady_rate_degps")`` is ``("steady rate", "deg/s")``."""
-    if name.endswith("_per_s"):
-        return name.removesuffix("_per_s").replace("_", " "), "1/s"
-    stem, _, suffix = name.rpartition("_")
-    words, unit = (stem, _WORDS[suffix]) if stem and suffix in _WORDS else (name, "")
-    return words.replace("_", " "), unit
+    """Words and unit of a name for a reader.
+
+    Examples
+    --------
+    >>> in_words("steady_rate_degps"), in_words("Kd_per_s"), in_words("members")
+    (('steady rate', 'deg/s'), ('Kd', '1/s'), ('members', ''))
+    """
+    for suffix, unit in _WRITTEN.items():
+        if name.endswith(f"_{suffix}"):
+            return name.removesuffix(f"_{suffix}").replace("_", " "), unit
+    return name.replace("_", " "), ""
 
 
 def rounded_down(value: float) -> float:

@@ -41,9 +41,10 @@ def test_two_fmus_agree_with_one_model_in_proportion_to_their_step(
 ) -> None:
     found = loop_difference(mariner, design.autopilot, pair, math.radians(20.0), steps_s=(2.0, 0.4, 0.1))
     assert found.order == pytest.approx(1.0, abs=0.1)
-    assert 0.005 < found.error_deg[0.1] < 0.02
+    error = {one.step_s: one.error_deg for one in found.steps}
+    assert 0.005 < error[0.1] < 0.02
     # In proportion: what a straight line through two of them leaves at a step of 0 is nothing.
-    rest = (4 * found.error_deg[0.1] - found.error_deg[0.4]) / 3
+    rest = (4 * error[0.1] - error[0.4]) / 3
     assert abs(rest) < 1e-3
 
 

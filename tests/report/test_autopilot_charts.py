@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.analysis import FrequencyResponse
+from tank2sim.answer.charts.loops import CrossTrack, cross_track_chart, nyquist_chart, sensitivity_chart
 from tank2sim.answer.charts.picture import chart_png, chart_specification
-from tank2sim.report.autopilot.charts import CrossTrack, cross_track_chart, nyquist_chart, sensitivity_chart
 
 OMEGA = np.logspace(-2, 2, 400)
 LOOP = 2 / (1j * OMEGA * (1j * OMEGA + 1))

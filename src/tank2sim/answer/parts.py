@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import urllib.parse
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from tank2sim.answer.numbers import format_number, is_number_text
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import altair as alt
@@ -203,6 +207,66 @@ def _column(head: str, digits: int) -> Column:
     if not bracket or not unit.endswith(")"):
         return Column(title=head, digits=digits)
     return Column(title=title, unit=unit.removesuffix(")"), digits=digits)
+
+
+def quantities(caption: str, values: Mapping[str, Cell], **options: Any) -> Table:
+    """Return a table with one row a value: its words, the value, and its unit, both from its name.
+
+    Parameters
+    ----------
+    caption : str
+    values : mapping
+        Names with their units (``Kd_s``) to values; what is not known (None) has no row.
+    **options
+        As of :func:`table`.
+
+    Examples
+    --------
+    >>> quantities("Gains", {"Kp": 1.0, "Kd_s": 24.5}).df.to_dict("list")
+    {'quantity': ['Kp', 'Kd'], 'value': ['1', '24.5'], 'unit': ['', 's']}
+    """
+    rows: list[list[Cell]] = []
+    for name, value in values.items():
+        if value is not None:
+            words, unit = in_words(name)
+            rows.append([words, format_number(value) if is_number_text(value) else value, unit])
+    return table(caption, ("quantity", "value", "unit"), rows, **options)
+
+
+def records_table(
+    caption: str,
+    records: Mapping[str, Any] | Sequence[Any],
+    *,
+    first: str = "",
+    fields: Mapping[str, str] | Iterable[str] = (),
+    **options: Any,
+) -> Table:
+    """Return a table with one row a record (a dataclass); its fields are the columns, with units from their names.
+
+    Parameters
+    ----------
+    caption : str
+    records : mapping or sequence
+        Records; with names, `first` heads the column of the names.
+    first : str
+    fields : mapping or iterable of str
+        Fields to show, in their order, by default all; a mapping also gives the words of each ("" for those of its
+        name).
+    **options
+        As of :func:`table`.
+    """
+    values = list(records.values()) if isinstance(records, Mapping) else list(records)
+    words = dict(fields) if isinstance(fields, Mapping) else dict.fromkeys(fields, "")
+    if not words:
+        words = dict.fromkeys((field.name for field in dataclasses.fields(values[0])) if values else (), "")
+    heads = [Column(title=first)] if isinstance(records, Mapping) else []
+    for name, title in words.items():
+        own, unit = in_words(name)
+        heads.append(Column(title=title or own, unit=unit, digits=options.get("digits", 4)))
+    rows: list[list[Cell]] = [[getattr(record, name) for name in words] for record in values]
+    if isinstance(records, Mapping):
+        rows = [[name, *row] for name, row in zip(records, rows, strict=True)]
+    return table(caption, heads, rows, **options)
 
 
 def cell_text(value: object) -> str:

@@ -11,7 +11,9 @@ from tank2sim.answer.study import study_schema
 from tank2sim.errors import InputError
 from tank2sim.files import schema_command, schema_name
 
-RESULT_CLASSES: dict[str, tuple[str, ...]] = {}
+RESULT_CLASSES: dict[str, tuple[str, ...]] = {
+    "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
+}
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 
 

@@ -749,53 +749,6 @@ class LogKeys(_Keys):
     notices: list[str]
 
 
-class AutopilotKeys(_Keys):
-    """A heading controller, its margins and its runs."""
-
-    ship: str
-    design: str
-    source: str
-    gains: dict[str, Number]
-    limits: dict[str, Number]
-    margins: dict[str, Any]
-    closed_loop: dict[str, Any]
-    weather: dict[str, Number]
-    track: dict[str, Any] | None
-    ship_alone: dict[str, bool | float | None]
-    responses: list[dict[str, Any]]
-    histories: dict[str, Columns]
-    track_histories: dict[str, Columns]
-    waypoints_m: list[list[Number]]
-    notices: list[str]
-    export: NotRequired[dict[str, Any]]
-
-
-class StepFiguresKeys(_Part):
-    """The response to an order that steps; of a course in deg, of a speed in m/s."""
-
-    ordered: float
-    rise_time_s: float | None
-    overshoot: float
-    settling_time_s: float | None
-
-
-class CraftAutopilotKeys(_Keys):
-    """An autopilot of heading and speed for a craft with thrusters, and its runs."""
-
-    ship: str
-    speed_mps: float
-    source: str
-    gains: dict[str, float]
-    largest_moment_Nm: list[float]
-    poles: list[list[float]]
-    course_change: StepFiguresKeys
-    speed_change: StepFiguresKeys
-    at_limit_percent: dict[str, float]
-    histories: dict[str, Columns]
-    notices: list[str]
-    export: NotRequired[dict[str, Any]]
-
-
 class CompareKeys(_Keys):
     """Cards of one ship side by side."""
 
@@ -1221,7 +1174,6 @@ class GuessKeys(_Keys):
 
 KEYS: dict[str, Any] = {
     "audit": AuditKeys,
-    "autopilot": AutopilotKeys | CraftAutopilotKeys,
     "check": CheckKeys,
     "compare": CompareKeys,
     "convention": ConventionKeys,

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tank2sim.answer.result import Result
-    from tank2sim.api.autopilot import AutopilotResult
     from tank2sim.api.bridge import PilotCardResult, PosterResult
-    from tank2sim.api.craft_autopilot import CraftAutopilotResult
     from tank2sim.api.craft_stability import CraftStabilityResult
     from tank2sim.api.fmu import ExportResult
     from tank2sim.api.glide import GlideResult
@@ -48,6 +46,7 @@ if TYPE_CHECKING:
     from tank2sim.api.steering_page import SteeringPageResult
     from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.dynamics.model import Model
+    from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
     from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
 
@@ -582,7 +581,7 @@ class Ship:
             The ship has neither rudder nor fixed thrusters, a value is out of bounds, or no controller holds the ship.
         """
         if isinstance(self.card, CraftCard):
-            from tank2sim.api.craft_autopilot import pilot_craft
+            from tank2sim.api.autopilot import pilot_craft
 
             given = {
                 "--design": design != "pid",

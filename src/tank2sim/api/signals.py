@@ -11,6 +11,7 @@ from tank2sim.api.audit import MEASURED_SAMPLES
 from tank2sim.api.bounds import PositiveArgument, checked
 from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
+from tank2sim.arrays import Columns
 from tank2sim.errors import InputError
 from tank2sim.records.signals.analysis import ColumnAnalysis, SignalSettings, Steering, TrialAnalysis, analyse
 from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
@@ -236,14 +237,14 @@ def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSet
     return FilteredSignal(request, before[0], after[0], sentence, changed)
 
 
-def _histories(analysis: TrialAnalysis) -> dict[str, list[float]]:
+def _histories(analysis: TrialAnalysis) -> Columns:
     """The signals of a trial over time in the units of its columns, thinned to draw."""
     shown = {"t_s", *(SignalName(column.series.name).file for column in analysis.columns)}
     columns = {name: values for name, values in file_columns(analysis.trial).items() if name in shown}
     return drawn_columns(columns, MEASURED_SAMPLES, peaks=True)
 
 
-def _history(series: Series) -> dict[str, list[float]]:
+def _history(series: Series) -> Columns:
     """A signal over time in the unit of its column, thinned to draw."""
     name = SignalName(series.name)
     return drawn_columns({"t_s": series.time_s, name.file: name.factor * series.values}, peaks=True)

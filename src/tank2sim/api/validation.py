@@ -21,7 +21,7 @@ from tank2sim.api.craft_validation import CraftValidationResult, validate_craft
 from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, trial_files, trials_of
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
@@ -216,7 +216,7 @@ def _replay_as_json(replay: Passed) -> dict[str, object]:
     """A trial as measured and as simulated, thinned to draw; columns as in a trial file."""
     names = {name: signal_display_name(name) for name in replay.measured if name in replay.before}
 
-    def columns(values: Mapping[str, Array]) -> dict[str, list[float]]:
+    def columns(values: Mapping[str, Array]) -> Columns:
         in_file = {column.file: column.factor * values[name] for name, column in names.items()}
         return drawn_columns({"t_s": replay.time_s, **in_file}, REPLAY_SAMPLES)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.analysis.heading.piloted import CoSimulated, StepError
 from tank2sim.analysis.heading.runs import HeadingLoop
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
@@ -127,28 +128,9 @@ def _lacking(path: Path, name: str) -> InputError:
     return InputError(path, "", f"has no {name}", _REMEDY)
 
 
-@dataclass(frozen=True)
-class LoopDifference:
-    """Largest difference of heading (deg) from the closed loop in one model, by communication step (s)."""
-
-    error_deg: Mapping[float, float]
-
-    @property
-    def order(self) -> float:
-        """Power of the step by which the difference falls, between the longest step and the shortest."""
-        steps = sorted(self.error_deg)
-        ratio = self.error_deg[steps[-1]] / self.error_deg[steps[0]]
-        return float(np.log(ratio) / np.log(steps[-1] / steps[0]))
-
-    def as_json(self) -> dict[str, object]:
-        """The result as JSON has it."""
-        rows = [{"step_s": step, "error_deg": error} for step, error in sorted(self.error_deg.items())]
-        return {"steps": rows, "order": self.order}
-
-
 def loop_difference(
     ship: Model, autopilot: Model, fmus: tuple[Path, Path], heading_rad: float, *, steps_s: Sequence[float]
-) -> LoopDifference:
+) -> CoSimulated:
     """Hold the co-simulation of two FMUs against the closed loop simulated as one model.
 
     Parameters
@@ -170,14 +152,16 @@ def loop_difference(
     for step in steps_s:
         run = co_simulate_heading(*fmus, heading_rad, step_s=step, duration_s=duration)
         errors[step] = _difference(run, direct.t, direct["motion.psi"])
-    return LoopDifference(errors)
+    steps = sorted(errors)
+    order = np.log(errors[steps[-1]] / errors[steps[0]]) / np.log(steps[-1] / steps[0])
+    return CoSimulated(tuple(StepError(step, errors[step]) for step in steps), float(order))
 
 
 def _difference(run: SteeredRun, time: Array, heading: Array) -> float:
     return float(np.degrees(np.abs(run.heading_rad - np.interp(run.time_s, time, heading)).max()))
 
 
-def verify_together(ship: Model, autopilot: Model, made: ExportedFmu) -> LoopDifference:
+def verify_together(ship: Model, autopilot: Model, made: ExportedFmu) -> CoSimulated:
     """The agreement of an autopilot's FMU with a ship's of the same version of FMI, on a change of course by 20 deg.
 
     Communication steps are 2, 4, 10 and 20 steps of the ship's integration. Raises as :func:`loop_difference`.

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 
 Indices = NDArray[np.int64]
 
@@ -69,9 +69,7 @@ DRAWN_SAMPLES = 600
 _DIGITS = 7
 
 
-def drawn_columns(
-    columns: Mapping[str, ArrayLike], limit: int = DRAWN_SAMPLES, *, peaks: bool = False
-) -> dict[str, list[float]]:
+def drawn_columns(columns: Mapping[str, ArrayLike], limit: int = DRAWN_SAMPLES, *, peaks: bool = False) -> Columns:
     """Columns (n,) of one table, thinned to draw, to seven digits; the first lies across.
 
     Parameters
@@ -86,4 +84,4 @@ def drawn_columns(
     whole = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     up = list(whole.values())[1:]
     kept = thin_line(up, limit) if peaks else thin_points(up, limit)
-    return {name: [float(f"{value:.{_DIGITS}g}") for value in values[kept]] for name, values in whole.items()}
+    return {name: np.array([float(f"{value:.{_DIGITS}g}") for value in values[kept]]) for name, values in whole.items()}

@@ -8,6 +8,7 @@ from typing import Any, TypeGuard
 
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Table, Verdict
+from tank2sim.units import in_words
 
 Json = Any
 """What JSON holds: numbers, text, truth values, None, lists and objects of these."""
@@ -27,48 +28,6 @@ _WIDE = 300.0
 
 VERDICT_TEXTS = ("passed", "met", "within", "stable", "finished", "course_stable_before", "course_stable_after")
 """Keys whose truth is good."""
-
-# The unit at the end of a key, longest first, as a reader writes it.
-_UNITS = {
-    "s2_per_rad2": "s²/rad²",
-    "s3_per_rad2": "s³/rad²",
-    "s2_per_rad": "s²/rad",
-    "s_per_m": "s/m",
-    "per_s": "1/s",
-    "degpmin": "deg/min",
-    "kgs2pm3": "kg s²/m³",
-    "kgspm2": "kg s/m²",
-    "kgpm3": "kg/m³",
-    "radps": "rad/s",
-    "degps": "deg/s",
-    "m2ps": "m²/s",
-    "kgm2": "kg m²",
-    "deg2s": "deg² s",
-    "NmpA": "N m/A",
-    "kgpm": "kg/m",
-    "kgps": "kg/s",
-    "mps2": "m/s²",
-    "mps": "m/s",
-    "Nms": "N m s",
-    "rpm": "rpm",
-    "rps": "1/s",
-    "deg": "deg",
-    "rad": "rad",
-    "percent": "%",
-    "lengths": "L",
-    "bytes": "B",
-    "dB": "dB",
-    "Nm": "N m",
-    "Hz": "Hz",
-    "kg": "kg",
-    "m2": "m²",
-    "N": "N",
-    "A": "A",
-    "J": "J",
-    "m": "m",
-    "s": "s",
-}
-
 
 _NAMES = {
     "speed_polynomial": ("speed polynomial, constant first", "m/s, by powers of t/s"),
@@ -91,10 +50,9 @@ def words(key: str) -> tuple[str, str]:
     stem, _, condition = key.partition("@")
     if stem.endswith("_prime"):
         return f"{stem.removesuffix('_prime')}′", ""
-    for suffix, unit in _UNITS.items():
-        if stem.endswith(f"_{suffix}"):
-            name = words(stem.removesuffix(f"_{suffix}"))[0]
-            return (f"{name} at {condition} deg" if condition else name), unit
+    if unit := in_words(stem)[1]:
+        name = words(stem[: stem.rindex("_") if not stem.endswith("_per_s") else stem.rindex("_per_s")])[0]
+        return (f"{name} at {condition} deg" if condition else name), unit
     named = "." in key or "/" in key or key[1:2] == "_"  # a file, a parameter, x_G
     return (key if named else key.replace("_", " ")), ""
 
@@ -152,7 +110,7 @@ def cell(key: str, value: Json) -> Cell:
     return str(value)
 
 
-def quantities(caption: str, values: Mapping[str, Json], unit: str = "") -> Table:
+def json_quantities(caption: str, values: Mapping[str, Json], unit: str = "") -> Table:
     """One row a value: its name, the value, its unit, which is `unit` where its key has none."""
     return _listed(caption, ["quantity"], [(words(key)[0], key, value) for key, value in values.items()], unit)
 

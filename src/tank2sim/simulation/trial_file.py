@@ -6,7 +6,7 @@ import io
 
 import numpy as np
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
@@ -49,7 +49,7 @@ def trial_csv(trajectory: Trajectory, comment: str) -> str:
     return text.getvalue()
 
 
-def histories(trajectory: Trajectory, begin_s: float = 0.0) -> dict[str, list[float]]:
+def histories(trajectory: Trajectory, begin_s: float = 0.0) -> Columns:
     """The columns of :func:`trial_columns` from `begin_s`, thinned for a chart, for the JSON of a result."""
     columns = trial_columns(trajectory)
     shown = columns["t_s"] >= begin_s

@@ -43,7 +43,7 @@ def test_a_change_of_course_to_starboard_settles_and_keeps_its_speed(otter: t2s.
     assert run["r_degps"].iloc[1:50].min() > 0 and run["n_port_rpm"].iloc[1] > run["n_starboard_rpm"].iloc[1]
     assert run["psi_deg"].iloc[-1] == pytest.approx(45.0, abs=0.05)
     assert run["u_mps"].iloc[-1] == pytest.approx(1.5, abs=0.005)
-    assert found.study.course.overshoot < math.radians(4.5)
+    assert found.study.course_change.overshoot < 4.5
     speed = found.runs["speed"]
     assert speed["u_mps"].iloc[0] == pytest.approx(0.75, abs=0.01)
     assert speed["u_mps"].iloc[-1] == pytest.approx(1.5, abs=0.005)

@@ -74,8 +74,8 @@ def test_the_largest_step_is_where_the_linear_answer_meets_the_limit(mariner: Mo
     time = np.linspace(0, 300, 30_001)
     _, answer, _ = lsim(StateSpace(whole.A, whole.B, whole.C, whole.D), np.ones_like(time), time)
     order, rate = np.abs(answer[:, 1:]).max(axis=0)
-    assert steps.within_rate_rad * rate == pytest.approx(math.radians(5.0), rel=1e-3)
-    assert steps.within_angle_rad * order == pytest.approx(math.radians(35.0), rel=1e-3)
+    assert math.radians(steps.within_rate_deg) * rate == pytest.approx(math.radians(5.0), rel=1e-3)
+    assert math.radians(steps.within_angle_deg) * order == pytest.approx(math.radians(35.0), rel=1e-3)
 
 
 @pytest.mark.slow

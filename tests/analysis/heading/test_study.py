@@ -43,13 +43,13 @@ def test_a_ship_that_is_unstable_in_yaw_alone_has_no_growing_effect(card) -> Non
 def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
     card = linear_card(read_card("mariner"))
     ship = build(card)
-    found = study_autopilot(card, ship, StudySettings(speed_mps=card.model.speed_mps))
+    found, piloted = study_autopilot(card, ship, StudySettings(speed_mps=card.model.speed_mps))
     assert [one.speed_mps for one in found.margins] == [card.model.speed_mps]
     assert any("other speeds" in notice for notice in found.notices)
     assert found.limits == pytest.approx(
         {"largest_rudder_deg": 35, "anti_windup_time_s": 24.07, "integral_band_deg": 2}, rel=1e-2
     )
-    assert found.runs["change"]["motion.r"][0] == pytest.approx(0.0, abs=1e-9)
+    assert piloted.runs["change"]["motion.r"][0] == pytest.approx(0.0, abs=1e-9)
     assert any("35 deg of rudder" in notice and "40 deg" in notice for notice in found.notices)
     with pytest.raises(InputError, match="--speed"):
         study_autopilot(card, ship, StudySettings(speed_mps=6.0))
@@ -59,9 +59,9 @@ def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
 def test_a_gear_that_waves_overwork_is_reported_with_the_remedy_which_helps() -> None:
     card = read_card("kvlcc2-captive")
     ship = build(card)
-    found = study_autopilot(card, ship, StudySettings())
+    found, _ = study_autopilot(card, ship, StudySettings())
     (reported,) = [notice for notice in found.notices if "full rate" in notice]
-    assert found.keeping.rate_limited_percent > 50 and "--wave-filter 0.424" in reported
-    filtered = study_autopilot(card, ship, StudySettings(wave_filter_radps=0.424))
-    assert filtered.keeping.rate_limited_percent < 10
+    assert found.closed_loop.course_keeping.rate_limited_percent > 50 and "--wave-filter 0.424" in reported
+    filtered, _ = study_autopilot(card, ship, StudySettings(wave_filter_radps=0.424))
+    assert filtered.closed_loop.course_keeping.rate_limited_percent < 10
     assert not any("full rate" in notice for notice in filtered.notices)

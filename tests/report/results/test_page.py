@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tank2sim.answer.page import render_page
 from tank2sim.answer.parts import Verdict
 from tank2sim.errors import InputError
-from tank2sim.report.json_values import alike, quantities, rows_of, titled, words
+from tank2sim.report.json_values import alike, json_quantities, rows_of, titled, words
 from tank2sim.report.results.page import result_page
 from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
 from tank2sim.report.results.subjects import needs_of
@@ -83,7 +83,7 @@ def test_units_are_read_off_the_keys(key, shown):
 
 
 def test_each_quantity_keeps_its_own_digits():
-    table = quantities("all", {"gravity_mps2": 9.81, "length_m": 1234.5, "small": 1.5e-7})
+    table = json_quantities("all", {"gravity_mps2": 9.81, "length_m": 1234.5, "small": 1.5e-7})
     assert [row[1] for row in table.rows] == ["9.81", "1234", "1.5×10⁻⁷"] or table.rows[0][1] == "9.81"
     wide = rows_of("all", [("a", {"value": -8.868e-05}), ("b", {"value": 0.08744})], "name")
     assert wide.rows[0][1].startswith("−8.868")
@@ -189,7 +189,7 @@ def test_few_rows_of_many_columns_are_turned_and_what_nobody_knows_is_left_out()
     table = rows_of("all", [("a", one), ("b", one)], "name")
     assert [column.title for column in table.columns] == ["quantity", "a", "b", "unit"]
     assert [tuple(row) for row in table.rows] == [(f"length {place}", "1.5", "1.5", "m") for place in range(12)]
-    assert [row[0] for row in quantities("all", {"bootstrap": None, "ranges": [], "runs": 0}).rows] == ["runs"]
+    assert [row[0] for row in json_quantities("all", {"bootstrap": None, "ranges": [], "runs": 0}).rows] == ["runs"]
 
 
 def test_a_fleet_is_reported_by_the_names_of_the_folders_without_ways_that_lead_nowhere():

@@ -6,7 +6,6 @@ import json
 import math
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tank2sim.analysis.glide.study import GlideQuestion
@@ -24,6 +23,7 @@ from tank2sim.records.tows import read_tows
 from tank2sim.records.yaw import read_yaw_record
 from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
+from tests.report.drawn import line, panels, rows_of
 from tests.report.opened_page import CHROMIUM, opened
 from tests.yaw_truth import Truth, record, written
 
@@ -88,8 +88,12 @@ WAY = {"name": "starboard", "figures": {}, "ahead_m": [0.0, 500.0, 600.0], "star
 POSTER = {"ship": "A ship", "turning_circles_deep": [WAY], "turning_circles_shallow": [], "stops": [], "telegraph": []}
 
 
-def rows_of(chart: Any) -> list[dict[str, Any]]:
-    return [row for rows in chart_specification(chart)["datasets"].values() for row in rows]
+def line_of(chart: Illustration, up: str, run: str | None = None) -> list[float]:
+    return line(chart.chart, up, run)
+
+
+def panels_of(chart: Illustration) -> dict[str, list[dict[str, Any]]]:
+    return panels(chart.chart)
 
 
 def charts_of(page: Page) -> dict[str, Illustration]:
@@ -106,29 +110,12 @@ def drawn(result: Any) -> dict[str, Illustration]:
     return charts_of(result_page(json.loads(json_text(result)), "r.json"))
 
 
-def line(chart: Illustration, up: str, run: str | None = None) -> list[float]:
-    rows = {
-        row["i"]: row[up] for row in rows_of(chart.chart) if {up, "i"} <= set(row) and run in (None, row.get("run"))
-    }
-    return [rows[place] for place in sorted(rows)]
-
-
-def panels(chart: Illustration) -> dict[str, list[dict[str, Any]]]:
-    """Title of each panel to the rows of its first layer."""
-    specification = chart_specification(chart.chart)
-    found = {}
-    for panel in specification["vconcat"]:
-        title = panel["layer"][0]["encoding"]["y"]["axis"]["title"]
-        found[title] = specification["datasets"][panel["layer"][0]["data"]["name"]]
-    return found
-
-
 def test_a_simulated_manoeuvre_has_its_track_and_its_histories_in_their_units() -> None:
     charts = drawn(SIMULATED)
     assert list(charts) == [TURN, "Time histories"]
     track = [(row["x"], row["y"]) for row in rows_of(charts[TURN].chart) if row.get("run") == "track"]
     assert track[:4] == list(zip(HISTORIES["x_m"], HISTORIES["y_m"], strict=True))
-    shown = panels(charts["Time histories"])
+    shown = panels_of(charts["Time histories"])
     assert list(shown) == [
         "rudder, + to starboard (deg)",
         "heading (deg)",
@@ -178,7 +165,7 @@ def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -
     charts = drawn(VALIDATED)
     (row,) = (row for row in rows_of(charts["Comparison error and validation uncertainty"].chart) if "e" in row)
     assert (row["e"], row["low"], row["high"]) == (10.0, -15.0, 15.0)
-    speeds = panels(charts["Histories: zigzag"])["surge velocity (m/s)"]
+    speeds = panels_of(charts["Histories: zigzag"])["surge velocity (m/s)"]
     assert [row["v"] for row in speeds if row["run"] == "simulated"] == [7.0, 6.95, 6.9, 6.85]
 
 
@@ -198,7 +185,7 @@ def test_tows_have_their_readings_their_fits_and_what_is_between_them(tow: dict[
     charts = drawn(tow)
     titles = ["Speeds of the tows and of the models", "Models of different size", "M and B3 together"]
     assert list(charts)[:4] == [*titles, "Drag coefficient"]
-    speed, left = panels(charts[titles[0]]).values()
+    speed, left = panels_of(charts[titles[0]]).values()
     first, *_ = tow["speeds"]["simulated_mps"]
     assert [row["v"] for row in speed if row["run"] == first] == pytest.approx(
         tow["speeds"]["simulated_mps"][first], 1e-5
@@ -241,78 +228,8 @@ def glide() -> dict[str, Any]:
 
 
 def test_a_glider_has_its_polar(glide: dict[str, Any]) -> None:
-    speeds = line(drawn(glide)["Glide polar"], "y")
+    speeds = line_of(drawn(glide)["Glide polar"], "y")
     assert speeds == pytest.approx([-climb for climb in glide["polar"]["climb_mps"]], rel=1e-5)
-
-
-RESPONSE = {"omega_radps": list(np.logspace(-3, 1, 60))}
-LOOP = 0.1 / (1j * np.array(RESPONSE["omega_radps"]) * (1 + 10j * np.array(RESPONSE["omega_radps"])))
-MARGINS = {
-    "speed_mps": 7.7,
-    "gain_margin_up": None,
-    "gain_margin_down": 0.0,
-    "phase_margin_deg": 60.0,
-    "delay_margin_s": 10.0,
-    "sensitivity_peak": float(1 / np.abs(1 + LOOP).min()),
-    "crossover_radps": 0.1,
-    "bandwidth_radps": 0.1,
-    "stable": True,
-    "poles": [[-0.05, 0.08], [-0.05, -0.08]],
-}
-CHANGE = {"ordered_deg": 20.0, "rise_time_s": 60.0, "overshoot_deg": 1.0, "settling_time_s": 200.0}
-CHANGE |= {"largest_rudder_deg": 15.0, "rate_limited_s": 3.0}
-KEEPING = ("duration_s", "heading_error_deg2s", "rudder_deg2s", "heading_error_rms_deg", "heading_error_mean_deg")
-KEEPING += ("rudder_rms_deg", "rudder_travel_degps", "rate_limited_percent")
-STEERED = {name: HISTORIES[name] for name in ("t_s", "delta_deg", "r_degps", "psi_deg")}
-PILOTED = {
-    "ship": "A ship",
-    "design": "pid",
-    "source": "poles placed",
-    "gains": {"Kp": 1.2},
-    "limits": {"largest_rudder_deg": 35.0},
-    "margins": {"at_design": MARGINS, "at_speeds": [MARGINS]},
-    "closed_loop": {
-        "course_changes": {"change": CHANGE, "large": CHANGE},
-        "course_keeping": dict.fromkeys(KEEPING, 1.0),
-        "largest_step_within_rate_limit_deg": 4.0,
-        "largest_step_within_angle_limit_deg": None,
-    },
-    "weather": {"current_mps": 0.5, "current_towards_deg": 90.0, "wind_mps": 10.0, "wind_from_deg": 45.0}
-    | {"wave_yaw_deg": 0.2, "wave_radps": 0.6, "seed": 1},
-    "track": {},
-    "ship_alone": {"speed_mps": 7.7, "stable": True, "rudder_deg": -1.0, "K_per_s": 0.2, "T_s": 100.0},
-    "responses": [
-        {"speed_mps": 7.7, **RESPONSE, "loop_real": list(LOOP.real), "loop_imaginary": list(LOOP.imag)}
-        | {"heading_real": list((LOOP / (1 + LOOP)).real), "heading_imaginary": list((LOOP / (1 + LOOP)).imag)}
-    ],
-    "histories": dict.fromkeys(("change", "large", "keeping"), STEERED),
-    "notices": [],
-}
-
-
-def test_an_autopilot_has_its_loop_and_its_steps() -> None:
-    charts = drawn(PILOTED)
-    assert list(charts) == [
-        "Course change by 20 deg",
-        "A change that takes the rudder to its limit",
-        "Course keeping, the last waves",
-        "Loop transfer",
-        "Nyquist curve",
-        "Sensitivity and closed loop",
-        "Poles of the closed loop",
-    ]
-    magnitude, phase = panels(charts["Loop transfer"]).values()
-    assert [row["v"] for row in magnitude] == pytest.approx(20 * np.log10(np.abs(LOOP)), rel=1e-4)
-    assert [row["v"] for row in phase] == pytest.approx(np.degrees(np.angle(LOOP)), rel=1e-4)
-    sensitivity = line(charts["Sensitivity and closed loop"], "v", "S, 7.7 m/s")
-    wanted = -20 * np.log10(np.abs(1 + LOOP))
-    assert sensitivity == pytest.approx(wanted[wanted > -60], rel=1e-4)
-    assert [row["v"] for row in panels(charts["Course change by 20 deg"])["heading (deg)"]] == HISTORIES["psi_deg"]
-
-
-def test_an_older_autopilot_without_responses_has_tables_in_their_place() -> None:
-    older = {key: value for key, value in PILOTED.items() if key not in ("responses", "histories", "ship_alone")}
-    assert [section.heading for section in result_page(older, "a.json").sections][:2] == ["Overview", "Gains"]
 
 
 @pytest.mark.slow
@@ -333,7 +250,7 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
     tow: dict[str, Any], yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
 ) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, tow, yaw, glide, PILOTED]
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, tow, yaw, glide]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

@@ -22,6 +22,7 @@ from tank2sim.analysis.catalogue.tables import (
 )
 from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_form, tune_to_two_points
+from tank2sim.arrays import Columns
 from tank2sim.cards.steering_card import PrintedInfluence, SteeringCard, SteeringPoint
 from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
@@ -197,7 +198,7 @@ def _diagrams(
     return {label: tuple(turns) for label, turns in found.items()}
 
 
-def _circle(turn: Trajectory) -> dict[str, list[float]]:
+def _circle(turn: Trajectory) -> Columns:
     return drawn_columns({"t_s": turn.t, "x_m": turn["motion.x"], "y_m": turn["motion.y"]}, _CIRCLE_SAMPLES)
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tank2sim.analysis.glide.steady import SteadyGlide, glide_as_printed, glide_at_pitch, steady_glide
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.cards.card import GliderCard
 from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
@@ -77,7 +77,7 @@ class GlidePath:
             rows += [_after(begin, glide, duration * part / parts) for part in range(1, parts + 1)]
         return np.array(rows)
 
-    def histories(self) -> dict[str, list[float]]:
+    def histories(self) -> Columns:
         """The path in points dense enough for a chart, for JSON."""
         rows = self.sampled()
         return drawn_columns({name: rows[:, k] for k, name in enumerate(("t_s", "x_m", "y_m", "height_m"))}, len(rows))

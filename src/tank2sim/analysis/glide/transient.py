@@ -12,7 +12,7 @@ import numpy as np
 from tank2sim.analysis.glide.path import GlidePath, path_of
 from tank2sim.analysis.glide.steady import SteadyGlide, smallest_angle, steady_glide
 from tank2sim.analysis.linearisation import OperatingPoint
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.cards.card import GliderCard
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -130,7 +130,7 @@ class Compared:
         result = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
         return result | {"histories": self._histories(), "orders": self._orders()}
 
-    def _histories(self) -> dict[str, list[float]]:
+    def _histories(self) -> Columns:
         """The transient motion, thinned for a chart."""
         run, degrees = self.motion, math.degrees(1.0)
         angles = {"pitch_deg": "pitch.angle", "roll_deg": "roll.angle", "incidence_deg": "motion.incidence"}
@@ -138,7 +138,7 @@ class Compared:
         columns |= {"buoyancy_kg": run["buoyancy.mass"]} | {key: degrees * run[name] for key, name in angles.items()}
         return drawn_columns(columns | {"speed_mps": run["motion.speed"]})
 
-    def _orders(self) -> dict[str, list[float]]:
+    def _orders(self) -> Columns:
         """The orders and their steady glides, each constant through its step."""
         ends = np.array([place.time_s for place in self.path.places])
         steps = [glide.as_json() for glide in self.path.glides]

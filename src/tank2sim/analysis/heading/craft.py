@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
 
 from tank2sim.analysis.heading.control import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
+from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
 from tank2sim.analysis.heading.runs import HeadingLoop, StepFigures, step_figures
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns, ComplexNumber
 from tank2sim.cards.card import CraftCard
 from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES
 from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
@@ -20,6 +20,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
 from tank2sim.errors import InputError
 from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.simulation.trial_file import histories
 
 HALF_MOMENT_AT_RAD = math.radians(30.0)
 """Heading error for which half of the largest yaw moment is ordered (project choice: a usual change of course does not
@@ -42,66 +43,50 @@ RUN_LENGTHS = 30.0
 """Length of a run in L/u0 (project choice): several times what heading and speed need to settle."""
 
 
-@dataclass(frozen=True, eq=False)
-class CraftAutopilot:
-    """The autopilot of a craft, and what it does.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CraftAutopilotStudy:
+    """The autopilot of a craft, and its runs.
 
     Parameters
     ----------
+    ship, source : str
+        Name of the craft, and how the autopilot was found, in a sentence.
     speed_mps : float
         Speed of the design.
-    gains : CraftGains
-    model : Model
-        The autopilot.
-    source : str
-        How it was found, in a sentence.
+    gains : dict
+        Yaw moment (N m) by heading error and yaw rate, surge force (N) by speed error, with their integrals.
+    largest_moment_Nm : tuple of two floats
+        Largest yaw moment to port (negative) and to starboard.
     poles : tuple of complex
-        Of the whole closed loop at that speed, 1/s, the slowest first.
-    runs : mapping
-        ``course`` and ``speed`` to their motion.
-    course, speed : StepFigures
-        Of the change of course (rad) and of speed (m/s).
-    at_limit_share : mapping
-        Run to the share of its time in which an order is at a limit of a thruster.
+        Poles of the whole closed loop at that speed, 1/s, the slowest first.
+    course_change, speed_change : StepFigures
+        A change of course (deg) and of speed (m/s).
+    at_limit_percent : dict
+        Share of the time of each run in which an order is at a limit of a thruster.
+    histories : dict
+        Columns of the runs ``course`` and ``speed``, to draw.
+    notices : tuple of str
+    export : AutopilotExport, optional
+        The autopilot as an FMU, if one was made.
     """
 
-    speed_mps: float
-    gains: CraftGains
-    model: Model
+    ship: str
     source: str
-    poles: tuple[complex, ...]
-    runs: Mapping[str, Trajectory]
-    course: StepFigures
-    speed: StepFigures
-    at_limit_share: Mapping[str, float]
-
-    def as_json(self) -> dict[str, object]:
-        """The result as JSON has it; angles in degrees."""
-        course = asdict(self.course)
-        for key in ("ordered", "overshoot"):
-            course[key] = math.degrees(course[key])
-        gains = self.gains
-        return {
-            "speed_mps": self.speed_mps,
-            "source": self.source,
-            "gains": {
-                "Kp_Nm": gains.heading,
-                "Kd_Nms": gains.yaw_rate,
-                "Ki_Nmps": gains.heading_integral,
-                "Ku_kgps": gains.speed,
-                "Ki_u_Npm": gains.speed_integral,
-            },
-            "largest_moment_Nm": list(gains.largest_moment_Nm),
-            "poles": [[pole.real, pole.imag] for pole in self.poles],
-            "course_change": course,
-            "speed_change": asdict(self.speed),
-            "at_limit_percent": {name: 100 * share for name, share in self.at_limit_share.items()},
-        }
+    speed_mps: float
+    gains: dict[str, float]
+    largest_moment_Nm: tuple[float, float]
+    poles: tuple[ComplexNumber, ...]
+    course_change: StepFigures
+    speed_change: StepFigures
+    at_limit_percent: dict[str, float]
+    histories: dict[str, Columns]
+    notices: tuple[str, ...] = ()
+    export: AutopilotExport | None = None
 
 
 def study_craft_autopilot(
     card: CraftCard, model: Model, *, speed_mps: float | None, course_change_rad: float
-) -> CraftAutopilot:
+) -> tuple[CraftAutopilotStudy, Piloted]:
     """Design the autopilot of a craft, and try a change of course and one of speed.
 
     Parameters
@@ -134,20 +119,31 @@ def study_craft_autopilot(
         "course": loop.run({"speed.command": speed, "heading.command": course_change_rad}, duration, begin=steady),
         "speed": loop.run({"speed.command": speed, "heading.command": 0.0}, duration, begin=slower),
     }
-    return CraftAutopilot(
-        speed_mps=speed,
-        gains=gains,
-        model=autopilot,
+    course = step_figures(runs["course"].t, runs["course"]["motion.psi"], course_change_rad)
+    in_degrees = {name: math.degrees(getattr(course, name)) for name in ("ordered", "overshoot")}
+    reached = speed - float(runs["speed"]["motion.u"][0])
+    study = CraftAutopilotStudy(
+        ship=card.ship.name,
         source=(
             f"Poles placed on the yaw (relative damping {DAMPING:g}) and the surge (two equal poles) of "
             f"{card.ship.name} at {speed:.4g} m/s"
         ),
+        speed_mps=speed,
+        gains={
+            "Kp_Nm": gains.heading,
+            "Kd_Nms": gains.yaw_rate,
+            "Ki_Nmps": gains.heading_integral,
+            "Ku_kgps": gains.speed,
+            "Ki_u_Npm": gains.speed_integral,
+        },
+        largest_moment_Nm=gains.largest_moment_Nm,
         poles=poles,
-        runs=runs,
-        course=step_figures(runs["course"].t, runs["course"]["motion.psi"], course_change_rad),
-        speed=step_figures(runs["speed"].t, runs["speed"]["motion.u"], speed - float(runs["speed"]["motion.u"][0])),
-        at_limit_share={name: _at_limit(card, run) for name, run in runs.items()},
+        course_change=replace(course, **in_degrees),
+        speed_change=step_figures(runs["speed"].t, runs["speed"]["motion.u"], reached),
+        at_limit_percent={name: 100 * _at_limit(card, run) for name, run in runs.items()},
+        histories={name: histories(run) for name, run in runs.items()},
     )
+    return study, Piloted(model, autopilot, runs)
 
 
 def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> CraftGains:

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
 from tank2sim.analysis.stability.straight_line import settled_states
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, ComplexArray, ComplexNumber, Number
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
-from tank2sim.records.thinning import drawn_columns
 
 _HELD = ("motion.x", "motion.y", "motion.u")
 """States that a small course change does not move: position, and to first order the speed."""
@@ -34,9 +32,9 @@ class LoopMargins:
     Parameters
     ----------
     speed_mps : float
-    gain_margin_up, gain_margin_down : float
-        Factor by which the loop gain may grow, and share to which it may fall; inf and 0 without a limit. For an
-        unstable ship the second is above 0: the ship needs its helmsman.
+    gain_margin_up, gain_margin_down, gain_margin_dB : float
+        Factor by which the loop gain may grow, and share to which it may fall; inf and 0 without a limit (null in
+        JSON). For an unstable ship the second is above 0: the ship needs its helmsman. The first in dB.
     phase_margin_deg : float
         The least of all crossovers.
     delay_margin_s : float
@@ -45,42 +43,34 @@ class LoopMargins:
         Ms, the largest \\|1/(1 + L)\\|: 1/Ms is the least distance of the Nyquist curve from -1.
     crossover_radps, bandwidth_radps : float
         Last crossover of the loop gain; and where the heading answers its order by 3 dB less than slow ones.
+    stable : bool
+        Whether every mode of the closed loop decays.
     poles : tuple of complex
-        Of the closed loop, 1/s, slowest first.
+        Poles of the closed loop, 1/s, slowest first.
     """
 
     speed_mps: float
-    gain_margin_up: float
+    gain_margin_up: Number
     gain_margin_down: float
-    phase_margin_deg: float
-    delay_margin_s: float
-    sensitivity_peak: float
-    crossover_radps: float
-    bandwidth_radps: float
-    poles: tuple[complex, ...]
-
-    @property
-    def stable(self) -> bool:
-        """True if every mode of the closed loop decays."""
-        return all(pole.real < 0 for pole in self.poles)
-
-    def as_json(self) -> dict[str, object]:
-        """The result for JSON; poles as [real, imaginary], infinite values as null."""
-        values = {key: value for key, value in vars(self).items() if key != "poles"}
-        decibel = 20 * math.log10(self.gain_margin_up) if math.isfinite(self.gain_margin_up) else None
-        poles = [[pole.real, pole.imag] for pole in self.poles]
-        return {**values, "gain_margin_dB": decibel, "stable": self.stable, "poles": poles}
+    gain_margin_dB: Number
+    phase_margin_deg: Number
+    delay_margin_s: Number
+    sensitivity_peak: Number
+    crossover_radps: Number
+    bandwidth_radps: Number
+    stable: bool
+    poles: tuple[ComplexNumber, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LargestSteps:
-    """Largest change of course that stays linear, rad: without the gear's rate limit, and without its angle limit.
+    """Largest change of course (deg) that stays linear: within the gear's rate limit, and within its angle limit.
 
     inf without such a limit. The linear response to a step in ``heading.command`` is scaled until it meets it.
     """
 
-    within_rate_rad: float
-    within_angle_rad: float
+    within_rate_deg: Number
+    within_angle_deg: Number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -90,16 +80,8 @@ class LoopResponse:
 
     speed_mps: float
     omega_radps: Array
-    loop: NDArray[np.complex128]
-    heading: NDArray[np.complex128]
-
-    def as_json(self) -> dict[str, object]:
-        """The result for JSON, to seven digits; complex values as their two parts."""
-        parts = {"loop": self.loop, "heading": self.heading}
-        columns = {"omega_radps": self.omega_radps}
-        for name, values in parts.items():
-            columns |= {f"{name}_real": values.real, f"{name}_imaginary": values.imag}
-        return {"speed_mps": self.speed_mps, **drawn_columns(columns, len(self.omega_radps))}
+    loop: ComplexArray
+    heading: ComplexArray
 
 
 _DECADES = (-2.0, 1.3)
@@ -174,15 +156,18 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
     below = np.flatnonzero(heading < math.sqrt(0.5))
     poles = sorted((complex(pole) for pole in whole.poles()), key=lambda pole: -pole.real)
     values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    largest_gain = float(up.min()) if up.size else math.inf
     return LoopMargins(
         speed_mps=values["ship.speed"] if speed_mps is None else speed_mps,
-        gain_margin_up=float(up.min()) if up.size else math.inf,
+        gain_margin_up=largest_gain,
+        gain_margin_dB=20 * math.log10(largest_gain),
         gain_margin_down=float(down.max()) if down.size else 0.0,
         phase_margin_deg=float(min(phase, key=abs)) if phase.size else math.inf,
         delay_margin_s=float(delays.min()) if delays.size else math.inf,
         sensitivity_peak=float(1 / nearest.min()),
         crossover_radps=float(crossover.max()) if crossover.size else math.nan,
         bandwidth_radps=float(omega[below[0]]) if below.size else math.inf,
+        stable=all(pole.real < 0 for pole in poles),
         poles=tuple(poles),
     )
 
@@ -227,4 +212,7 @@ def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None)
         answer = control.step_response(whole, np.linspace(0, duration, 2000)).outputs
         peaks = np.maximum(peaks, np.abs(answer).max(axis=-1).ravel())
     order, moved = (float(peak) for peak in peaks[1:])
-    return LargestSteps(within_rate_rad=rate / moved, within_angle_rad=limits["autopilot.max_rudder"] / order)
+    return LargestSteps(
+        within_rate_deg=math.degrees(rate / moved),
+        within_angle_deg=math.degrees(limits["autopilot.max_rudder"] / order),
+    )

@@ -20,6 +20,7 @@ from tank2sim.analysis.heading.margins import (
     loop_margins,
     loop_response,
 )
+from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
 from tank2sim.analysis.heading.runs import (
     CourseChange,
     CourseKeeping,
@@ -28,8 +29,8 @@ from tank2sim.analysis.heading.runs import (
     course_keeping,
     without_anti_windup,
 )
-from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_track
-from tank2sim.arrays import Array
+from tank2sim.analysis.heading.track_keeping import Guidance, TrackKeeping, TrackRun, keep_track
+from tank2sim.arrays import Array, Columns
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.effects import undisturbed_inputs
@@ -101,96 +102,105 @@ class StudySettings:
     waypoints: Array | None = None
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AutopilotStudy:
-    """Result of the study.
+@dataclass(frozen=True, kw_only=True)
+class ShipAlone:
+    """The ship at the speed of the design, without a controller: Nomoto's K and T, and the rudder of its straight
+    course (deg, positive to starboard)."""
+
+    speed_mps: float
+    stable: bool
+    rudder_deg: float
+    K_per_s: float
+    T_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoop:
+    """Motion of the ship under its controller.
 
     Parameters
     ----------
-    design : HeadingDesign
+    largest_steps : LargestSteps
+        At the speed of the design.
+    course_changes : dict
+        Figures by run: ``change``, ``large``, ``large without anti-windup`` (with an integral).
+    course_keeping : CourseKeeping
+        In current, wind and waves.
+    """
+
+    largest_steps: LargestSteps
+    course_changes: dict[str, CourseChange]
+    course_keeping: CourseKeeping
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AutopilotStudy:
+    """A heading controller, its margins and its runs.
+
+    Parameters
+    ----------
+    ship, design, source : str
+        Name of the ship, way of design, and how the controller was found, in a sentence.
+    gains : dict
+        Figures of the controller by name with their unit: rad of rudder for rad of heading, and s.
+    limits : dict
+        ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and ``integral_band_deg`` (for designs with
+        their own states ``integral_limit_radps``, the band times its gain).
+    ship_alone : ShipAlone
     margins : tuple of LoopMargins
         At the speed of the design, then at others, all with the gains of the design.
     responses : tuple of LoopResponse
         At the speed of the design, and at the slowest and the fastest of `margins`.
-    steps : LargestSteps
-        At the speed of the design.
-    weather : Weather
-    runs : mapping
-        Name to motion: ``change``, ``large``, ``large without anti-windup`` (with an integral), ``keeping``.
-    changes : mapping
-        Figures of the changes of course, by the same names.
-    keeping : CourseKeeping
-    tracks : mapping
-        ``line of sight`` and ``with integral``, for a given track.
-    waypoints : array (n, 2), optional
+    closed_loop : ClosedLoop
+    weather : dict
+        Fields of :class:`Weather`, angles in degrees.
+    track : dict
+        Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
+    waypoints_m : array (n, 2)
+        North and east; empty without a track.
+    histories, track_histories : dict
+        Columns to draw by run, and by guidance.
     notices : tuple of str
+    export : AutopilotExport, optional
+        The controller as an FMU, if one was made.
     """
 
-    design: HeadingDesign
+    ship: str
+    design: str
+    source: str
+    gains: dict[str, float]
+    limits: dict[str, float]
+    ship_alone: ShipAlone
     margins: tuple[LoopMargins, ...]
     responses: tuple[LoopResponse, ...]
-    steps: LargestSteps
-    weather: Weather
-    runs: Mapping[str, Trajectory]
-    changes: Mapping[str, CourseChange]
-    keeping: CourseKeeping
-    tracks: Mapping[str, TrackRun]
-    waypoints: Array | None
+    closed_loop: ClosedLoop
+    weather: dict[str, float]
+    track: dict[str, TrackKeeping]
+    waypoints_m: Array
+    histories: dict[str, Columns]
+    track_histories: dict[str, Columns]
     notices: tuple[str, ...]
+    export: AutopilotExport | None = None
 
-    @property
-    def limits(self) -> dict[str, float]:
-        """Limits of the controller: ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and
-        ``integral_band_deg`` (for designs with their own states ``integral_limit_radps``, the band times its gain)."""
-        names = {
-            "autopilot.max_rudder": "largest_rudder_rad",
-            "autopilot.anti_windup_time": "anti_windup_time_s",
-            "autopilot.integral_band": "integral_band_rad",
-            "autopilot.integral_limit": "integral_limit_radps",
-        }
-        found = {
-            names[parameter.name]: parameter.start
-            for parameter in self.design.autopilot.parameters
-            if parameter.name in names
-        }
-        if "autopilot.integral" not in self.design.autopilot:
-            found.pop("anti_windup_time_s", None)
-        return _in_degrees(found)
 
-    def as_json(self) -> dict[str, object]:
-        """The result for JSON; responses and histories are thinned for a chart."""
-        first, found = self.margins[0], self.design.found
-        alone = {"speed_mps": found.speed_mps, "stable": found.stable, "rudder_deg": found.rudder_deg}
-        alone |= {"K_per_s": found.nomoto.K_per_s, "T_s": found.nomoto.T_s}
-        return {
-            "ship": self.design.found.name,
-            "design": self.design.kind,
-            "source": self.design.source,
-            "gains": dict(self.design.gains),
-            "limits": self.limits,
-            "margins": {"at_design": first.as_json(), "at_speeds": [margin.as_json() for margin in self.margins]},
-            "closed_loop": {
-                "poles": [[pole.real, pole.imag] for pole in first.poles],
-                "bandwidth_radps": first.bandwidth_radps,
-                "largest_step_within_rate_limit_deg": math.degrees(self.steps.within_rate_rad),
-                "largest_step_within_angle_limit_deg": math.degrees(self.steps.within_angle_rad),
-                "course_changes": {name: asdict(change) for name, change in self.changes.items()},
-                "course_keeping": asdict(self.keeping),
-            },
-            "weather": _in_degrees(asdict(self.weather)),
-            "track": {name: asdict(track.figures) for name, track in self.tracks.items()},
-            "ship_alone": alone,
-            "responses": [response.as_json() for response in self.responses],
-            "histories": self._histories(),
-            "track_histories": {name: track.as_json() for name, track in self.tracks.items()},
-            "waypoints_m": [] if self.waypoints is None else self.waypoints.tolist(),
-            "notices": list(self.notices),
-        }
+def _limits(autopilot: Model) -> dict[str, float]:
+    """Limits of the controller by name."""
+    names = {
+        "autopilot.max_rudder": "largest_rudder_rad",
+        "autopilot.anti_windup_time": "anti_windup_time_s",
+        "autopilot.integral_band": "integral_band_rad",
+        "autopilot.integral_limit": "integral_limit_radps",
+    }
+    found = {names[one.name]: one.start for one in autopilot.parameters if one.name in names}
+    if "autopilot.integral" not in autopilot:
+        found.pop("anti_windup_time_s", None)
+    return _in_degrees(found)
 
-    def _histories(self) -> dict[str, dict[str, list[float]]]:
-        """Histories of the runs by name; of course keeping only the last waves, so that single ones remain visible."""
-        last = self.runs["keeping"].t[-1] - _WAVES_SHOWN * 2 * math.pi / self.weather.wave_radps
-        return {name: histories(run, last if name == "keeping" else 0.0) for name, run in self.runs.items()}
+
+def _histories(runs: Mapping[str, Trajectory], weather: Weather) -> dict[str, Columns]:
+    """Histories of the runs by name; course keeping shows the last waves alone, so that single ones remain visible."""
+    last = runs["keeping"].t[-1] - _WAVES_SHOWN * 2 * math.pi / weather.wave_radps
+    return {name: histories(run, last if name == "keeping" else 0.0) for name, run in runs.items()}
 
 
 def check_settings(settings: StudySettings) -> None:
@@ -222,7 +232,7 @@ def check_course_change(change_rad: float) -> None:
         raise InputError("--course-change", "", f"is {change:g}", remedy)
 
 
-def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> AutopilotStudy:
+def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> tuple[AutopilotStudy, Piloted]:
     """Design a heading controller and test it.
 
     Parameters
@@ -256,17 +266,32 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
     kept = course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2)
     tracks = _tracks(loop, settings.waypoints, inputs)
-    return AutopilotStudy(
-        design=design,
+    alone = design.found
+    study = AutopilotStudy(
+        ship=alone.name,
+        design=design.kind,
+        source=design.source,
+        gains=dict(design.gains),
+        limits=_limits(design.autopilot),
+        ship_alone=ShipAlone(
+            speed_mps=alone.speed_mps,
+            stable=alone.stable,
+            rudder_deg=alone.rudder_deg,
+            K_per_s=alone.nomoto.K_per_s,
+            T_s=alone.nomoto.T_s,
+        ),
         margins=margins,
         responses=_responses(ship, design, margins),
-        steps=largest_steps(ship, design.autopilot, settings.speed_mps),
-        weather=weather,
-        runs=runs,
-        changes=changes,
-        keeping=kept,
-        tracks=tracks,
-        waypoints=settings.waypoints,
+        closed_loop=ClosedLoop(
+            largest_steps=largest_steps(ship, design.autopilot, settings.speed_mps),
+            course_changes=changes,
+            course_keeping=kept,
+        ),
+        weather=_in_degrees(asdict(weather)),
+        track={name: track.figures for name, track in tracks.items()},
+        waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
+        histories=_histories(runs, weather),
+        track_histories={name: track.histories() for name, track in tracks.items()},
         notices=(
             *_not_held(kept, weather, runs["keeping"]),
             *outside.notices,
@@ -276,6 +301,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             *_of_the_gear(ship, design, kept, weather),
         ),
     )
+    return study, Piloted(ship, design.autopilot, runs)
 
 
 def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[str]:

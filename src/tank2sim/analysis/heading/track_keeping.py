@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.analysis.heading.runs import HeadingLoop
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.thinning import drawn_columns
@@ -91,7 +91,7 @@ class TrackRun:
     error_m: Array
     figures: TrackKeeping
 
-    def as_json(self) -> dict[str, list[float]]:
+    def histories(self) -> Columns:
         """Position and error over time, thinned for a chart; the error positive to starboard of the track."""
         run = self.trajectory
         x_m, y_m = (np.interp(self.time_s, run.t, run[name]) for name in ("motion.x", "motion.y"))

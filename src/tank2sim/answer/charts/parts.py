@@ -89,10 +89,12 @@ def shown_unit(unit: str, display_unit: str | None = None) -> tuple[str, float]:
     Parameters
     ----------
     unit : str
-        Unit of the value, a key of :data:`tank2sim.units.UNITS`.
+        Unit of the value; one that is no key of :data:`tank2sim.units.UNITS` is shown as it is.
     display_unit : str, optional
         The unit to show it in instead, one of ``UNITS[unit].displays``.
     """
+    if unit not in UNITS:
+        return unit, 1.0
     displays = UNITS[unit].displays
     if display_unit is None:
         display_unit = next((name for name in displays if name.startswith("deg")), unit)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.gap.result import MissingForce, MissingSignal
 from tank2sim.records.thinning import drawn_columns, thin_points
 from tank2sim.units import from_si
@@ -112,5 +112,5 @@ def _over_time(time_s: Array, values: Array, trials: np.ndarray, what: str) -> d
     return {"trial": names, **_columns(dict(columns))}
 
 
-def _columns(columns: dict[str, Array]) -> dict[str, list[float]]:
+def _columns(columns: dict[str, Array]) -> Columns:
     return drawn_columns(columns, len(next(iter(columns.values()))))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import changed_text
 from tank2sim.escaping import one_line
@@ -390,7 +390,7 @@ def replays_as_json(found: Sequence[tuple[Passage, Passage]], *, held_out: bool)
     ]
 
 
-def _columns(time_s: Array, signals: Mapping[str, Array]) -> dict[str, list[float]]:
+def _columns(time_s: Array, signals: Mapping[str, Array]) -> Columns:
     if not len(time_s):
         return {}
     columns = {_COLUMNS[name]: from_si(_COLUMNS[name], 1.0) * values for name, values in signals.items()}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tank2sim.arrays import Columns
 from tank2sim.identification.yaw.energy import EnergyFit
 from tank2sim.identification.yaw.output_error import AngleFit
 from tank2sim.records.thinning import drawn_columns
@@ -21,7 +22,7 @@ _HISTORY_SAMPLES = 900
 STAGES = ("accelerating", "braking")
 
 
-def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, dict[str, list[float]]]:
+def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, Columns]:
     """Record name to histories: evaluated rate, rate of the programme, tracking error and current."""
     found, before = {}, 0
     for record in records:
@@ -79,7 +80,7 @@ def residuals_as_json(fit: EnergyFit) -> list[dict[str, Any]]:
     ]
 
 
-def angle_residual_as_json(angle: AngleFit | None) -> dict[str, list[float]] | None:
+def angle_residual_as_json(angle: AngleFit | None) -> Columns | None:
     """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
     if angle is None:
         return None

@@ -20,8 +20,8 @@ from tank2sim.report.json_values import (
     is_objects,
     is_scalar,
     is_series,
+    json_quantities,
     numbered,
-    quantities,
     rows_of,
     scalars,
     short_columns,
@@ -86,7 +86,7 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
         remaining = {key: value for key, value in remaining.items() if key != "max_error"}
     sections = [_section(key, value) for key, value in remaining.items() if key not in _NOTES and not is_scalar(value)]
     overview = {key: value for key, value in scalars(result).items() if key not in (*_NOTES, "kind", "schema")}
-    table = [quantities("The result", overview)] if overview else []
+    table = [json_quantities("The result", overview)] if overview else []
     first = [
         Section(heading="Overview", text=kind.note, tables=table, charts=[checked] if checked else [], notes=notices)
     ]
@@ -152,7 +152,7 @@ def _fill_object(parts: _Parts, caption: str, key: str, value: Mapping[str, Json
     columns = short_columns(value)
     plain = {name: item for name, item in scalars(value).items() if name not in columns}
     if plain:
-        parts.tables.append(quantities(caption, plain, words(key)[1]))
+        parts.tables.append(json_quantities(caption, plain, words(key)[1]))
     if columns:
         parts.tables.append(numbered(caption, {name: value[name] for name in columns}))
     _draw_series(parts, caption, {name: item for name, item in value.items() if is_series(item)})

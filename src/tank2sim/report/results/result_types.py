@@ -56,15 +56,6 @@ RESULT_TYPES = (
         ("straight_run", "difference_turns"),
         ("straight_run.stable", "straight_run.surge_time_constant_s"),
     ),
-    ResultType(
-        "Heading control", "autopilot", ("ship", "design", "gains"), ("design", "margins.at_design.phase_margin_deg")
-    ),
-    ResultType(
-        "Heading and speed control of a craft",
-        "autopilot",
-        ("course_change", "speed_change", "gains"),
-        ("course_change.overshoot",),
-    ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType(
         "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
 from tank2sim.report.audit.page import audit_page
-from tank2sim.report.autopilot.craft_page import craft_autopilot_page
-from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.captive.mmg_page import mmg_reduction_page
 from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.captive.run_page import run_page
@@ -65,13 +63,6 @@ _PAGES: Mapping[str, _Page] = {
     "Audit of trials": _Page(audit_page, {"findings": list, "trials": list}),
     "Cards compared": _Page(
         compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
-    ),
-    "Heading control": _Page(
-        autopilot_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}
-    ),
-    "Heading and speed control of a craft": _Page(
-        craft_autopilot_page,
-        {"course_change": dict, "speed_change": dict, "histories": dict, "poles": list, "notices": list},
     ),
     "Stability": _Page(
         stability_page,

@@ -1,0 +1,28 @@
+"""Data that a chart draws, read from its specification."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tank2sim.answer.charts.picture import chart_specification
+
+
+def rows_of(chart: Any) -> list[dict[str, Any]]:
+    """All rows of data of a chart."""
+    return [row for rows in chart_specification(chart)["datasets"].values() for row in rows]
+
+
+def line(chart: Any, up: str, run: str | None = None) -> list[float]:
+    """Values of one line in its order."""
+    rows = {row["i"]: row[up] for row in rows_of(chart) if {up, "i"} <= set(row) and run in (None, row.get("run"))}
+    return [rows[place] for place in sorted(rows)]
+
+
+def panels(chart: Any) -> dict[str, list[dict[str, Any]]]:
+    """Title of each panel to the rows of its first layer."""
+    specification = chart_specification(chart)
+    found = {}
+    for panel in specification["vconcat"]:
+        title = panel["layer"][0]["encoding"]["y"]["axis"]["title"]
+        found[title] = specification["datasets"][panel["layer"][0]["data"]["name"]]
+    return found
