@@ -1,11 +1,11 @@
 """No feature that README, manual or help names is lost: the program as its users see it holds ``inventory.json``.
 
-The program is looked at from outside alone (:mod:`tests.inventory.outside`), so that the same inventory holds before and
-after a change of its inside. A feature can be
+The program is looked at from outside alone (:mod:`tests.inventory.outside`), so that the same inventory holds before
+and after a change of its inside. A feature can be
 
 - added: ``python -m tests.inventory.collect`` writes it into the inventory;
-- renamed: by a line of ``renames`` in the inventory, old to new, which belongs in the CHANGELOG, too. An old name is the
-  beginning of a command, an option, a dotted Python name, a way in JSON or a file; ``*`` is for all commands;
+- renamed: by a line of ``renames`` in the inventory, kind to command (``*`` for all, and for kinds without a command) to
+  old and new, which belongs in the CHANGELOG, too. A renamed path in JSON renames all paths that begin with it;
 - removed: only by taking it out of ``inventory.json`` by hand, which a reviewer sees.
 """
 
@@ -32,7 +32,7 @@ FAST_SECONDS, SLOW_SECONDS = 1.0, 20.0
 
 
 def renamed(kind: str, name: str, command: str = "") -> str:
-    """The name that a feature has now: the longest beginning that was renamed, of the command or of all, is replaced."""
+    """The name that a feature has now: its longest beginning that was renamed is replaced."""
     table = RENAMES.get(kind, {}).get("*", {}) | RENAMES.get(kind, {}).get(command, {})
     # A beginning ends where a name does: "figures" is none of "figures_are".
     old = max((old for old in table if re.match(rf"{re.escape(old)}(?![\w-])", name)), key=len, default="")
@@ -99,7 +99,7 @@ def test_every_key_is_in_the_json_schema(command: str) -> None:
     shapes = outside.shapes(command_now(command), renamed("python", "json_schema")).values()
     for title, paths in INVENTORY["json"][command].items():
         keys = [renamed("json", path, command) for path in paths]
-        # One shape has all keys of one: keys that are scattered over several shapes are no result that a script can read.
+        # One shape of today has all keys of one: a script cannot read keys that are scattered over several.
         lost = [[key for key in keys if not outside.holds(outside.in_schema, *shape, key)] for shape in shapes]
         assert min(lost, key=len) == [], title
 
