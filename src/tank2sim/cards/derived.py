@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.covariance import HOLDS, carried, not_referring, read_covariance
+from tank2sim.cards.covariance import not_referring
+from tank2sim.cards.covariance_reading import HOLDS, carried, read_covariance
 from tank2sim.cards.reading import parse_card
 
 

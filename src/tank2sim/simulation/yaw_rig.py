@@ -15,10 +15,10 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import YawRigCard
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.yaw_programme import Reference, YawProgramme, programme_of
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
 from tank2sim.records.yaw import Medium, YawRecord
+from tank2sim.records.yaw_programme import Reference, YawProgramme, programme_of
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.yaw_rig_control import Controller, TunedController
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from tank2sim.analysis.conversion.origin import shift_matrix, shifted_body
 from tank2sim.cards.card import OPPOSITE, ManoeuvringCard, scales_of_file
-from tank2sim.cards.covariance import Covariance, not_referring, read_covariance
+from tank2sim.cards.covariance import Covariance, not_referring
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.form import Roll
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.cards.scaling import FileScales, file_factor

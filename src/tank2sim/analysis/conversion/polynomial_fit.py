@@ -23,7 +23,8 @@ import tomlkit
 from tank2sim.analysis.conversion.conventions import roll_in_file
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
-from tank2sim.cards.covariance import Covariance, not_referring, read_covariance
+from tank2sim.cards.covariance import Covariance, not_referring
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import parse_card
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
