@@ -21,8 +21,7 @@ from tank2sim.analysis.heading.control import (
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.straight_line import Stability, stability
 from tank2sim.arrays import Array
-from tank2sim.dynamics.autopilot import HeadingGains, autopilot_model
-from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
+from tank2sim.dynamics.autopilot import HeadingGains, LinearLaw, autopilot_model, linear_autopilot_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
