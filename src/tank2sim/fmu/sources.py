@@ -1,4 +1,4 @@
-"""The C sources of an FMU: the template, the equations (CasADi functions) and tables generated from them, the FMI headers."""
+"""The C sources of an FMU: template, equations (CasADi functions) and tables generated from them, FMI headers."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ the new origin afterwards: a difference of second order in a' r', which is not i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import comb
 
@@ -63,13 +63,6 @@ def shift_matrix(names: Sequence[str], ahead: float) -> tuple[tuple[str, ...], A
     every = tuple(dict.fromkeys([*names, *(name for column in columns for name in column)]))
     matrix = np.array([[column.get(name, 0.0) for column in columns] for name in every]).reshape(len(every), len(names))
     return every, matrix
-
-
-def shifted_derivatives(derivatives: Mapping[str, float], ahead: float) -> dict[str, float]:
-    """Derivatives (prime) about an origin `ahead` lengths forward of the old one."""
-    names, matrix = shift_matrix(tuple(derivatives), ahead)
-    values = matrix @ np.array(list(derivatives.values())) if derivatives else np.zeros(0)
-    return dict(zip(names, values.tolist(), strict=True))
 
 
 def shifted_body(body: RigidBody, ahead: float) -> RigidBody:
