@@ -286,7 +286,7 @@ class CraftCard(Card):
         return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
 
     def in_file(self, place: str, value: float) -> tuple[str, float]:
-        """As of :class:`ManoeuvringCard`."""
+        """Place and value as the file has them, as in :class:`ManoeuvringCard`."""
         spelling = self.spelt.get(place, place)
         return spelling, from_si(spelling, value)
 

@@ -186,10 +186,7 @@ def _humps(programme: YawProgramme, steps: int, h: float) -> list[tuple[int, int
 def _tuned(
     controller: TunedController, rig: YawRig, programme: YawProgramme, time: Array, current: Array
 ) -> tuple[float, float] | None:
-    """Gains from the last completed pair of intervals; None without one.
-
-    As in the paper for close tracking, the rates are those of the programme.
-    """
+    """Gains from the last completed pair of intervals, with the programme's rates; None without a pair."""
     done = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
     if not done:
         return None

@@ -82,11 +82,7 @@ def fit_common_surroundings(
 
 
 class _AllTrials:
-    """Least squares of all trials together.
-
-    The unknowns `at` (k + 2 trials,) are the k coefficients of the effect's forces, and the parts of each trial's wind
-    or current along north and east, m/s.
-    """
+    """Least squares of all trials; unknowns (k + 2 trials,): k coefficients, currents north and east, m/s."""
 
     def __init__(self, card: ManoeuvringCard, effect: str, trials: Sequence[SurroundedTrial]):
         self.effect, self.trials, self._card = effect, trials, card

@@ -322,8 +322,7 @@ def _replay(replay: Passed, file: str) -> dict[str, object]:
 
 
 def _drawn_rows(replay: Passed) -> Indices:
-    """Instants that are kept of a trial: evenly spread ones, as many of each signal that is measured seldom, and the
-    extremes of each signal and of simulated less measured."""
+    """Instants of a trial that are kept: evenly spread ones, those of seldom measured signals, and all extremes."""
     kept = even = thin_points([replay.time_s], _REPLAY_SAMPLES)
     for variable in measured_in(replay):
         measured = replay.measured[variable]

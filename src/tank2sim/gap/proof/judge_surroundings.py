@@ -55,7 +55,7 @@ class _Simulated:
 
     @property
     def misfit(self) -> float:
-        """Of all trials, noise units."""
+        """Misfit of all trials, noise units."""
         return misfit_of(self.proof.results, "after")
 
 

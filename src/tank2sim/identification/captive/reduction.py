@@ -281,10 +281,7 @@ def _refuse_impossible_body(campaign: Campaign) -> None:
 
 
 def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
-    """Refuse a towed model that the water pushes ahead: its X gauge is reversed.
-
-    With a negative added mass the signs of all forces are in doubt, and a warning states it.
-    """
+    """Refuse a towed model that the water pushes ahead: its X gauge is reversed."""
     found = derivatives.get("X0")
     reversed_forces = "Yvdot" in derivatives and derivatives["Yvdot"].value > 0
     if found is None or not is_resistance(campaign) or reversed_forces:

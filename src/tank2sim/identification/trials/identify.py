@@ -419,10 +419,7 @@ def _fitted(
     *,
     drifts: bool,
 ) -> _Fit:
-    """A fit in a structure; with a current of its own if the water `drifts`.
-
-    Output error and the Kalman filter estimate the current with the parameters; the other methods take the card's.
-    """
+    """A fit in a structure, with a current of its own if the water `drifts` and the method can estimate it."""
     started = STRUCTURES[structure].start(card)
     problem = posed_in(card, started, trials, options)
     unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may

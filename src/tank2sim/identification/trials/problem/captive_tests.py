@@ -113,9 +113,7 @@ class CaptiveTests:
         return residuals, slopes
 
     def _linearised(self, p: Array) -> tuple[Array, Array, Array]:
-        """Residuals (m,), their slopes (m, k), and the effects (m, 6) of the uncertain parameters between tank and
-        ship, each times its standard error.
-        """
+        """Residuals (m,), slopes (m, k), effects (m, 6) of the tank-to-ship parameters per standard error."""
         instants = self.motion.shape[1]
         values, slopes, rudder = map(np.array, self.forces.map(instants)(self.motion, p))
         slopes = slopes.reshape(3, instants, -1)[:, :, self.columns]
