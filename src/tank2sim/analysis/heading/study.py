@@ -40,7 +40,8 @@ from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
 INTEGRAL_SHARE = 0.25
-"""Share of the integral in the line of sight: critically damped (:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
+"""Share of the integral in the line of sight: critically damped
+(:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
 
 _CHANGE_TIMES = 60
 """Length of a course change in 1/w, w = sqrt(K/T): six times the slowest placed mode.

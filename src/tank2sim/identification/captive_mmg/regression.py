@@ -143,7 +143,7 @@ class MmgFit:
 
     @property
     def curves_unexplained(self) -> dict[str, float]:
-        """Standard deviation of the open-water points from the fitted curve over their rms: K_T, and K_Q with torque."""
+        """Standard deviation of open-water points from the fitted curve over their rms: K_T, and K_Q with torque."""
         points = np.sqrt(np.mean(self.tests.open_water[:, 1:] ** 2, axis=0))
         shares = self.sigmas[len(self.tests.channels) :] / points
         return dict(zip(("K_T", "K_Q"), map(float, shares), strict=False))
