@@ -20,7 +20,8 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"identification", "analysis"}),
     frozenset({"gap", "fmu"}),
     frozenset({"logs", "design"}),
-    frozenset({"answer", "report"}),
+    frozenset({"answer"}),
+    frozenset({"report"}),
     frozenset({"demo"}),
     frozenset({"api"}),
     frozenset({"apps", "cli"}),
@@ -35,6 +36,9 @@ KNOWN_CIRCLES = (
     },
 )
 """Modules of ``api`` that still import each other: to be removed with the results that ``Ship`` imports."""
+
+KNOWN_ARROWS = {("tank2sim.answer.charts.manoeuvre", "tank2sim.report.json_values")}
+"""Imports from a higher layer that remain: to be removed with ``report``."""
 
 
 def modules(sources: Path) -> dict[str, Path]:
@@ -64,12 +68,9 @@ def imports(sources: Path) -> dict[str, set[str]]:
     return {name: imported(ast.parse(path.read_text("utf-8")), names) - {name} for name, path in names.items()}
 
 
-def without_known_circles(graph: dict[str, set[str]]) -> dict[str, set[str]]:
-    known = [{f"tank2sim.api.{name}" for name in circle} for circle in KNOWN_CIRCLES]
-    return {
-        name: {other for other in others if not any({name, other} <= circle for circle in known)}
-        for name, others in graph.items()
-    }
+def is_known(name: str, other: str) -> bool:
+    circles = ({f"tank2sim.api.{module}" for module in circle} for circle in KNOWN_CIRCLES)
+    return (name, other) in KNOWN_ARROWS or any({name, other} <= circle for circle in circles)
 
 
 def room(module: str) -> str:
@@ -83,12 +84,13 @@ def layer(module: str) -> int:
 
 @pytest.fixture(scope="module")
 def graph() -> dict[str, set[str]]:
-    return imports(SOURCES)
+    """Each module with its imports, without the known exceptions."""
+    return {name: {other for other in others if not is_known(name, other)} for name, others in imports(SOURCES).items()}
 
 
 def test_no_module_imports_itself_through_others(graph: dict[str, set[str]]) -> None:
     assert len(graph) > 250
-    TopologicalSorter(without_known_circles(graph)).prepare()
+    TopologicalSorter(graph).prepare()
 
 
 def test_no_module_imports_from_a_higher_layer(graph: dict[str, set[str]]) -> None:
