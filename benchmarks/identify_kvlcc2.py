@@ -17,8 +17,7 @@ import numpy as np
 
 from tank2sim.api.identification import captive_runs
 from tank2sim.cards import ManoeuvringCard, read_card
-from tank2sim.identification.trials.assessment.comparison import Comparison
-from tank2sim.identification.trials.assessment.evaluation import FigureComparison, pooled
+from tank2sim.identification.trials.assessment.evaluation import Comparison, FigureComparison, pooled
 from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured

@@ -21,11 +21,11 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import fmu_structure
-from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.interface import FmuVariable, Interface, interface
 from tank2sim.fmu.libraries import ProgressReport, libraries, require_compilers
 from tank2sim.fmu.osp import osp_groups
 from tank2sim.fmu.platforms import Platform
+from tank2sim.fmu.provenance import Documents
 from tank2sim.fmu.sources import c_sources, headers_notice
 from tank2sim.fmu.templates import c_identifier, render
 from tank2sim.fmu.unpacking import CARD_IN_FMU

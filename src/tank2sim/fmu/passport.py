@@ -11,8 +11,7 @@ from importlib.metadata import version
 from typing import Any
 
 from tank2sim.dynamics.model import Input, Model, Parameter
-from tank2sim.fmu.documents import Documents
-from tank2sim.fmu.provenance import ABSENT, STATED_ERROR, ValueOrigin
+from tank2sim.fmu.provenance import ABSENT, STATED_ERROR, Documents, ValueOrigin
 from tank2sim.fmu.reference_run import EXTRA
 from tank2sim.simulation.run import Run
 

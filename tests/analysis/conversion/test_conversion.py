@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.analysis.conversion.origin import shift_matrix
+from tank2sim.analysis.conversion.conventions import shift_matrix
 from tank2sim.analysis.conversion.polynomial_fit import fit_polynomial
 from tank2sim.analysis.conversion.program_code import program_name
 from tank2sim.bundled import bundled_cards

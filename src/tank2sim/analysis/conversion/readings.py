@@ -30,7 +30,7 @@ import tomlkit
 from scipy.linalg import expm
 from scipy.stats import t as student
 
-from tank2sim.analysis.conversion.origin import shift_matrix, shifted_body
+from tank2sim.analysis.conversion.conventions import shift_matrix, shifted_body
 from tank2sim.analysis.guess.prior import rudder_by_rules
 from tank2sim.cards.card import scales_of_file
 from tank2sim.cards.coefficient_table import STATED_CONVENTIONS, CoefficientTable

@@ -1,17 +1,17 @@
 """Selection of the terms of (3.8) that a campaign determines, with the reason for every omitted term.
 
 Every term that the campaign excites and can distinguish is in the regression, third-order terms with a prior about zero
-(:mod:`tank2sim.identification.captive.prior`). The report of a term depends on the design of the tests and never on its
-value: omission of a term because it does not differ from zero would state that it is exactly zero, and would change
-every manoeuvre that needs it. Reported are the linear terms, the acceleration derivatives, X0, and every other term on
-which the tests have more information than the prior: at large angles with a small standard error, at small angles with
-a large one. A term that is not reported still contributes to the standard errors of the other terms.
+(:func:`with_prior`). The report of a term depends on the design of the tests and never on its value: omission of a term
+because it does not differ from zero would state that it is exactly zero, and would change every manoeuvre that needs
+it. Reported are the linear terms, the acceleration derivatives, X0, and every other term on which the tests have more
+information than the prior: at large angles with a small standard error, at small angles with a large one. A term that
+is not reported still contributes to the standard errors of the other terms.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,6 @@ from tank2sim.cards.terms import Term, parse_term
 from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations, candidate_terms, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
-from tank2sim.identification.captive.prior import with_prior
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.records.campaigns import Campaign
@@ -36,6 +35,23 @@ _NORMAL = 1.959964
 _SHOWN_SLOPE = 3.5
 """Standard errors of a significant slope: with eight slopes in a campaign chance reaches it once in 250."""
 _FEWEST_FREQUENCIES = 3
+
+RATIOS: Mapping[str, tuple[str, float]] = {
+    "vvv": ("v", 10.0),
+    "vvr": ("v", 25.0),
+    "vrr": ("v", 10.0),
+    "rrr": ("v", 1.0),
+    "ddd": ("d", 1.0),
+    "vvd": ("d", 6.0),
+    "vdd": ("d", 2.0),
+    "rdd": ("d", 2.0),
+    "rrd": ("d", 2.0),
+    "vrd": ("d", 6.0),
+}
+"""Powers of a term of Y or N to the linear term of the ratio, and the standard deviation of the ratio (prime).
+
+Round figures, above the largest of the Mariner (Chislett & Strom-Tejsen 1965: Yvvv/Yv 7.0, Yvvr/Yv 13, Nvvr/Nv 21,
+Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Other terms are free."""
 
 
 @dataclass(frozen=True)
@@ -304,3 +320,24 @@ def _trend(full: CampaignEquations, names: Sequence[str], name: str, selection: 
 
 def _ratio(trend: Trend) -> float:
     return abs(trend.slope) / max(trend.standard_error, 1e-300)
+
+
+def with_prior(equations: CampaignEquations, spread: Spread) -> CampaignEquations:
+    """The equations with the prior of third-order terms of Y and N, scaled by the estimated linear terms.
+
+    Small angles do not show the third order. Dropping a term that does not differ from zero would state that it is
+    zero, and would make its linear term look more accurate than it is (post-selection inference; Leeb & Pötscher 2005,
+    Econometric Theory 21). A free term would extrapolate noise at 10 degrees of rudder to 35. Therefore every term that
+    the campaign can distinguish stays in the regression with a wide prior about zero: its ratio to the linear term of
+    the same force has the standard deviation of the ratios of known ships. The prior does not move terms that the tests
+    determine; the card has no others.
+    """
+    found = solve(equations, spread)
+    held = {}
+    for name in equations.names:
+        reference, ratio = RATIOS.get(name[1:], ("", math.inf))
+        linear = name[0] + reference
+        if name[0] in "YN" and linear in equations.names:
+            size = max(abs(found.value(linear)), found.error(linear))
+            held[name] = ratio * size
+    return equations.held(held)

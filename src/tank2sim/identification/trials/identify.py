@@ -16,8 +16,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
-from tank2sim.identification.trials.assessment.evaluation import replay_error
+from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
 from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
 from tank2sim.identification.trials.assessment.method_choice import (
     MethodChoice,

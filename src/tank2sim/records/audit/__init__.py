@@ -14,8 +14,7 @@ from tank2sim.records.audit.rudder import rudder_findings, rudder_unit_findings
 from tank2sim.records.audit.rudder_clock import rudder_clock_findings
 from tank2sim.records.audit.sensors import sensor_findings
 from tank2sim.records.audit.speed_unit import speed_unit_findings
-from tank2sim.records.audit.time_base import time_findings
-from tank2sim.records.audit.time_unit import time_unit_findings
+from tank2sim.records.audit.time_base import time_findings, time_unit_findings
 from tank2sim.records.audit.track import track_findings
 from tank2sim.records.audit.yaw import heading_unit_findings, rate_unit_findings, yaw_findings
 from tank2sim.records.trials import Trial, with_signals

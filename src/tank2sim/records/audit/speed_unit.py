@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.audit.time_unit import MISCALIBRATED
+from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.track import PAIRS, TRACK_READINGS, AuditedTrack, audited_track
 from tank2sim.records.audit.weak import Complex, WeakFit, fit
 from tank2sim.records.trials import Trial, with_signals
