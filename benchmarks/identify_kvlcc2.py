@@ -17,9 +17,9 @@ import numpy as np
 
 from tank2sim.api.identification import captive_runs
 from tank2sim.cards import ManoeuvringCard, read_card
-from tank2sim.identification.trials.assessment.comparison import Comparison
-from tank2sim.identification.trials.assessment.evaluation import FigureComparison, pooled
-from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
+from tank2sim.identification.trials.assessment.evaluation import Comparison, FigureComparison, pooled
+from tank2sim.identification.trials.identify import identify_trials
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"

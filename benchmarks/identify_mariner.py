@@ -19,7 +19,8 @@ import numpy as np
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.reading import revised
 from tank2sim.identification.trials.assessment.evaluation import Following
-from tank2sim.identification.trials.identify import IdentificationOptions, estimate_parameters, identify_trials
+from tank2sim.identification.trials.identify import estimate_parameters, identify_trials
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 

@@ -25,9 +25,10 @@ import numpy as np
 from scipy.stats import chisquare, kstest
 
 from tank2sim.api.ship import load
-from tank2sim.identification.trials.identify import IdentificationOptions, estimate_parameters
+from tank2sim.identification.trials.identify import estimate_parameters
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior_sampling import SAMPLERS, sample_posterior
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.structures import STRUCTURES

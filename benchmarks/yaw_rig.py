@@ -21,13 +21,19 @@ from paper_numbers import PaperNumbers
 from tank2sim.cards import YawRigCard, read_card
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics import yaw_theory as theory
-from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
-from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, Similarity, YawProgramme, full_turns
 from tank2sim.dynamics.yaw_rig import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from tank2sim.identification.yaw.energy import energy_balance, fit_energy
 from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
 from tank2sim.identification.yaw.intervals import Speeds, intervals
 from tank2sim.records.yaw import Medium, YawRecord, read_yaw_record, yaw_record_text
+from tank2sim.records.yaw_programme import (
+    PAPER_PROGRAMME,
+    Similarity,
+    YawProgramme,
+    dissipation_from_work,
+    full_turns,
+    inertia_from_work,
+)
 from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig, simulated_record, yaw_record
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller, TunedController
 

@@ -85,7 +85,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("tests/identification/trials/test_other_ship.py", "tests/records/test_same_record.py"),
     ),
     "simulator rules": (
-        ("fmu/simulator_rules.py",),
+        ("fmu/passport.py",),
         ("tests/fmu/test_simulator_rules.py", "tests/fmu/test_passport.py"),
     ),
     "lanes": (

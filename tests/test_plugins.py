@@ -173,7 +173,7 @@ from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.fmu.interface import interface
-from tank2sim.fmu.terminals import terminals
+from tank2sim.fmu.export import terminals
 model = build(read_card("thruster.toml"))
 (terminal,) = [each for each in terminals(interface(model)) if each.name == "bow_thruster"]
 print(terminal.description, undisturbed_inputs(model))

@@ -22,8 +22,8 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tank2sim import __version__
 from tank2sim.errors import InputError
+from tank2sim.version import __version__
 
 if TYPE_CHECKING:
     from distributed import Client

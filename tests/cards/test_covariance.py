@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
-from tank2sim.cards.covariance import Covariance, carried, covariance_file, not_referring, read_covariance, referring
+from tank2sim.cards.covariance import Covariance, covariance_file, not_referring, referring
+from tank2sim.cards.covariance_reading import carried, read_covariance
 from tank2sim.cards.reading import changed_text
 from tank2sim.errors import InputError
 

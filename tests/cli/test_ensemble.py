@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import read_card
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tests.cli.command_line import refused, tank2sim
 
 TURN = ("simulate", "mariner", "--manoeuvre", "turn:20", "--duration", "300")

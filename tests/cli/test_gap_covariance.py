@@ -6,7 +6,8 @@ import numpy as np
 
 from tank2sim.api.gap import improved_files
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
-from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
+from tank2sim.cards.covariance import Covariance, covariance_file, referring
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text
 
 NAMES = ("derivatives.Yv", "derivatives.Nv")

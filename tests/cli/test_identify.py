@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.identification.trials.assessment.evaluation import predicted_figures
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.identification.trials.made_up_ship import CARD, LENGTH, TRUTH, trial, turn, zigzag

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import read_card
-from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
+from tank2sim.cards.covariance import Covariance, covariance_file, referring
+from tank2sim.cards.covariance_reading import read_covariance
 from tests.cli.command_line import refused, tank2sim
 
 

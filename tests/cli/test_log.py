@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
-from tank2sim.logs.channel_file import channels_text, read_channels
+from tank2sim.logs.channels import channels_text, read_channels
 from tank2sim.report.logs.page import log_page
 from tests.cli.command_line import refused, tank2sim
 from tests.logs.made_logs import T0, frame, nmea_lines

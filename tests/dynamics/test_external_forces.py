@@ -12,8 +12,8 @@ from fmpy.model_description import read_model_description
 
 import tank2sim as t2s
 from tank2sim.analysis.linearisation import OperatingPoint, state_space
-from tank2sim.dynamics.external_forces import external_inputs, with_external_forces
 from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.simulator_interface import external_inputs, with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.fmu.running import running
 from tank2sim.fmu.unpacking import FmuType, UnpackedFmu

@@ -18,9 +18,9 @@ from tank2sim.cards import parse_card
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics import build
-from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.roll import natural_period_s, roll_fault
+from tank2sim.dynamics.simulator_interface import with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Manoeuvre, Orders, Turn, Zigzag
 from tank2sim.simulation.run import simulate

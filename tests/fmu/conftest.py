@@ -19,8 +19,8 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.files import write_whole
-from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import ExportedFmu, write_fmu
+from tank2sim.fmu.provenance import documents_of
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.ssp import ship_with_autopilot
 from tank2sim.fmu.unpacking import UnpackedFmu

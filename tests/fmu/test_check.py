@@ -19,8 +19,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
-from tank2sim.fmu.check import LIMITS, compare_with_model
-from tank2sim.fmu.comparison import description_differences
+from tank2sim.fmu.check import LIMITS, compare_with_model, description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors

@@ -10,8 +10,8 @@ import pytest
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.fmu.check import compare_with_model
-from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import write_fmu
+from tank2sim.fmu.provenance import documents_of
 
 PROBE = read_card("kulikovsky-velikanov")
 

@@ -22,10 +22,9 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.acceptance import passport_files, replay_in_fmu
 from tank2sim.fmu.check import compare_with_model
-from tank2sim.fmu.documents import Documents, documents_of
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.passport import PASSPORT_FILE, PASSPORT_PAGE, Replay, passport
-from tank2sim.fmu.provenance import ABSENT, ASSUMED_ERROR, NOT_STATED, STATED_ERROR, origins
+from tank2sim.fmu.provenance import ABSENT, ASSUMED_ERROR, NOT_STATED, STATED_ERROR, Documents, documents_of, origins
 from tank2sim.fmu.reference import by_scheme, reference_errors
 from tank2sim.fmu.reference_run import INPUTS_FILE, OUTPUTS_FILE, ReferenceRun, read_reference, reference_run
 from tank2sim.simulation.manoeuvres import parse_manoeuvre

@@ -22,11 +22,11 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu import libraries as fmu_libraries
 from tank2sim.fmu.export import make_fmu
+from tank2sim.fmu.libraries import universal
 from tank2sim.fmu.platforms import PLATFORMS, named_platforms
 from tank2sim.native import cross
 from tank2sim.native.compiler import require_compiler
 from tank2sim.native.cross import CompileTarget
-from tank2sim.native.universal import universal
 from tests.cli.command_line import refused, tank2sim
 
 from .driver import build, runner, zigzag

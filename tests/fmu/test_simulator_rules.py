@@ -6,9 +6,9 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.external_forces import with_external_forces
 from tank2sim.dynamics.model import Model
-from tank2sim.fmu.simulator_rules import Shown, simulator_rules
+from tank2sim.dynamics.simulator_interface import with_external_forces
+from tank2sim.fmu.passport import Shown, simulator_rules
 from tests.dynamics.effects.ships import TYPICAL, ship
 
 ALWAYS = {

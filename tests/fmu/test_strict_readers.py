@@ -22,10 +22,9 @@ from lxml import etree
 from tank2sim.bundled import bundled_cards
 from tank2sim.dynamics import Model
 from tank2sim.fmu.acceptance import passport_files
-from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import description_text, write_fmu
 from tank2sim.fmu.passport import PASSPORT_PAGE, Replay
-from tank2sim.fmu.provenance import ValueOrigin
+from tank2sim.fmu.provenance import Documents, ValueOrigin
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu
 from tank2sim.simulation.card_range import CardRangeReading

@@ -19,8 +19,8 @@ from PIL import Image
 import tank2sim as t2s
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model
+from tank2sim.fmu.export import terminals
 from tank2sim.fmu.interface import interface
-from tank2sim.fmu.terminals import terminals
 from tank2sim.units import UNITS
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])

@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.api.gap import identified_from, improved_files
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics import build
 from tank2sim.gap.inference.fit import CoefficientEstimates

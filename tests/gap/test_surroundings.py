@@ -21,10 +21,9 @@ from tank2sim.gap.inference.batch import batch_trials
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis, TrialSurroundings
 from tank2sim.gap.inference.prior import likelihood_from_card
-from tank2sim.gap.outcome.common_surroundings import fit_common_surroundings
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surroundings
-from tank2sim.gap.proof.judge_surroundings import probabilities_by_simulation
+from tank2sim.gap.proof.judge_surroundings import fit_common_surroundings, probabilities_by_simulation
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import MISSING, Gap, Surroundings
 from tank2sim.gap.search.explanations import search

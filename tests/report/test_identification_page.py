@@ -20,8 +20,9 @@ from tank2sim.cli.identify import command
 from tank2sim.files import plain_json
 from tank2sim.identification.trials.as_json import replays_as_json
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
-from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
+from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.records.trials import Trial

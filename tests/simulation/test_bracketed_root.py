@@ -7,7 +7,7 @@ import math
 import pytest
 from scipy.optimize import brentq
 
-from tank2sim.simulation.bracketed_root import bracketed_root
+from tank2sim.simulation.trajectory import bracketed_root
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from tank2sim import __version__
 from tank2sim.answer.charts.picture import VEGALITE_VERSION, chart_specification
 from tank2sim.answer.charts.theme import DARK, LIGHT, LOCALE
 from tank2sim.answer.numbers import NO_VALUE, format_column, format_number, is_number_text
@@ -25,6 +24,7 @@ from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, S
 from tank2sim.escaping import json_in_html
 from tank2sim.marks import marked
 from tank2sim.native.library import kept
+from tank2sim.version import __version__
 
 _SHORT = 24
 """Characters of text in a table that are not broken into lines."""

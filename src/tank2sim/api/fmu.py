@@ -14,10 +14,10 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
-from tank2sim.fmu.documents import documents_of, documents_without_card
 from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
 from tank2sim.fmu.osp import osp_notices, osp_system
 from tank2sim.fmu.platforms import named_platforms
+from tank2sim.fmu.provenance import documents_of, documents_without_card
 from tank2sim.fmu.unpacking import embedded_card
 from tank2sim.marks import marked
 

@@ -20,7 +20,7 @@ from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import not_referring
-from tank2sim.cards.derived import derived_card
+from tank2sim.cards.covariance_reading import derived_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin

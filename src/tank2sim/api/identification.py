@@ -34,15 +34,9 @@ from tank2sim.identification.trials.as_json import (
     structure_rows,
 )
 from tank2sim.identification.trials.assessment.notices import remarks
-from tank2sim.identification.trials.identify import (
-    BY_RESIDUALS,
-    TRIAL_METHODS,
-    Identification,
-    IdentificationOptions,
-    identify_trials,
-    undetermined_notice,
-)
+from tank2sim.identification.trials.identify import Identification, identify_trials, undetermined_notice
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN
+from tank2sim.identification.trials.options import BY_RESIDUALS, TRIAL_METHODS, IdentificationOptions
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured

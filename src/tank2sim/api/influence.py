@@ -22,7 +22,7 @@ from tank2sim.api.ensemble import FEW_IN_LANES, EnsembleOptions, band_table
 from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, CraftCard
-from tank2sim.cards.derived import derived_card
+from tank2sim.cards.covariance_reading import derived_card
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER

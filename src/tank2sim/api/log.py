@@ -21,8 +21,7 @@ from tank2sim.api.trial import TrialRecord
 from tank2sim.cards import CraftCard
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
-from tank2sim.logs.channel_file import CHANNELS_FILE, channels_text, read_channels
-from tank2sim.logs.channels import ChannelSet
+from tank2sim.logs.channels import CHANNELS_FILE, ChannelSet, channels_text, read_channels
 from tank2sim.logs.clock import utc_text
 from tank2sim.logs.current import DriftCurrent, drift_current
 from tank2sim.logs.quantities import QUANTITIES

@@ -13,7 +13,7 @@ import numpy as np
 from tank2sim.answer.parts import Table
 from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
 from tank2sim.api.result import PagedResult, screen_table
-from tank2sim.dynamics.external_forces import external_inputs, with_external_forces
+from tank2sim.dynamics.simulator_interface import external_inputs, with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.marks import CHECK

@@ -14,7 +14,7 @@ from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
 from tank2sim.cards.card import MmgCard
-from tank2sim.cards.derived import derived_card
+from tank2sim.cards.covariance_reading import derived_card
 from tank2sim.cards.reading import revised
 from tank2sim.errors import InputError
 

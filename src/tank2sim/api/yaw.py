@@ -13,7 +13,6 @@ from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument, 
 from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, YawRigCard, parse_card
-from tank2sim.dynamics.yaw_programme import Similarity, YawProgramme, programme_of
 from tank2sim.dynamics.yaw_theory import FloatingBody, TheoryValue, theory_values
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -35,6 +34,7 @@ from tank2sim.identification.yaw.identify import (
     torque_constant,
 )
 from tank2sim.records.yaw import Medium, read_yaw_record, yaw_record_text
+from tank2sim.records.yaw_programme import Similarity, YawProgramme, programme_of
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller
 
 if TYPE_CHECKING:

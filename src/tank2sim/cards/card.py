@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from tank2sim.cards.covariance import Covariance, covariance_file, not_referring, referring
 from tank2sim.cards.form import (
     BodySection,
     CraftModel,
@@ -39,9 +39,6 @@ from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.units import from_si
 
-if TYPE_CHECKING:
-    from tank2sim.cards.covariance import Covariance
-
 DEFAULT_RELATIVE_ERROR = 0.02
 """Standard error of a derivative without ``[uncertainty]``, relative to its value (card format)."""
 
@@ -65,7 +62,7 @@ class Card:
         Kind of equations.
     covariance : Covariance, optional
         Of the card's numbers, where they were estimated here; a card that was read refers to a file of it
-        (:func:`tank2sim.cards.covariance.read_covariance`).
+        (:func:`tank2sim.cards.covariance_reading.read_covariance`).
     """
 
     source: str
@@ -80,8 +77,6 @@ class Card:
 
         What is not a regular file (a pipe) takes the card alone.
         """
-        from tank2sim.cards.covariance import covariance_file, not_referring, referring
-
         if self.covariance is None:
             return {path: self.text}
         if path.exists() and not path.is_file():
@@ -291,7 +286,7 @@ class CraftCard(Card):
         return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
 
     def in_file(self, place: str, value: float) -> tuple[str, float]:
-        """As of :class:`ManoeuvringCard`."""
+        """Place and value as the file has them, as in :class:`ManoeuvringCard`."""
         spelling = self.spelt.get(place, place)
         return spelling, from_si(spelling, value)
 

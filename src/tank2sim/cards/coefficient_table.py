@@ -45,8 +45,8 @@ _SIZES = {
 """Known sizes of a ship and their bounds: wider than any ship or model of one."""
 
 _LENGTH_TO_BEAM, _BEAM_TO_DRAUGHT, _BLOCK = 6.5, 2.7, 0.7
-"""Of an ordinary merchant ship, where a table has no beam, draught or displacement. Project choices: the bundled ships
-have 5.5 to 6.9, 2.4 to 3.1 and 0.56 to 0.83."""
+"""Proportions of an ordinary merchant ship, used where a table has no beam, draught or displacement. Project choices:
+the bundled ships have 5.5 to 6.9, 2.4 to 3.1 and 0.56 to 0.83."""
 
 _BODY = {"mass": "mass", "m": "mass", "xG": "x_G"}
 _BODY |= dict.fromkeys(("yawinertia", "Iz", "Izz", "Jzz"), "yaw_inertia")

@@ -41,13 +41,7 @@ ASTERN_THRUST = 0.765
 
 
 def _rising_pair(value: object) -> object:
-    """TOML has lists, the form has pairs.
-
-    Raises
-    ------
-    ValueError
-        It is not a list of two plausible speeds, the lower first.
-    """
+    """Pair of two plausible speeds, the lower first, from a list (TOML has no pairs); else ValueError."""
     if not isinstance(value, list):
         return value
     numbers = all(isinstance(speed, int | float) and not isinstance(speed, bool) for speed in value)

@@ -129,13 +129,7 @@ def _torque(section: MmgPropeller, source: str) -> dict[str, float]:
 def _one_form(
     section: MmgPropeller | MmgRudder, name: str, forms: tuple[tuple[str, ...], tuple[str, ...]], source: str
 ) -> bool:
-    """True if a section has the second form of two, whose keys `forms` has.
-
-    Raises
-    ------
-    InputError
-        It has keys of both.
-    """
+    """True if a section has the second form of two, whose keys `forms` has; keys of both are refused."""
     first, second = ([key for key in keys if getattr(section, key) is not None] for keys in forms)
     if first and second:
         remedy = f"give {', '.join(forms[0])} or {', '.join(forms[1])}"

@@ -42,17 +42,13 @@ from tank2sim.cards.form import (
 )
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
-from tank2sim.cards.scaling import FileScales, file_factor
+from tank2sim.cards.scaling import LARGEST_PRIME, FileScales, file_factor
 from tank2sim.cards.small_craft import body_scales, craft_card, craft_scale, craft_scales
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text, refuse_deep
 from tank2sim.units import to_si
-
-LARGEST_PRIME = 1e4
-"""Largest derivative or standard error in the prime system. Published ones are below 10; with a thousand times that
-every force of the model stays a number. Project choice: what is beyond is a slip of the pen or of the scaling."""
 
 # Sections whose keys may give an angle in degrees or radians.
 _SECTIONS_WITH_ANGLES = ("model", "steering_gear", "propulsion", "yaw_rig", "programme")

@@ -12,6 +12,10 @@ from typing import Any
 
 from tank2sim.cards.terms import Term
 
+LARGEST_PRIME = 1e4
+"""Largest derivative or standard error in the prime system. Published ones are below 10; with a thousand times that
+every force of the model stays a number. Project choice: what is beyond is a slip of the pen or of the scaling."""
+
 
 @dataclass(frozen=True)
 class Scales:

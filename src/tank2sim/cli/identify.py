@@ -19,8 +19,8 @@ from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
 from tank2sim.files import CARD
-from tank2sim.identification.trials.identify import BY_RESIDUALS, TRIAL_METHODS
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
+from tank2sim.identification.trials.options import BY_RESIDUALS, TRIAL_METHODS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 
 _SHIP_OPTIONS = {

@@ -15,8 +15,8 @@ from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 from tank2sim.fmu.check import CheckReport, compare_with_model
-from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import write_fmu
+from tank2sim.fmu.provenance import documents_of
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from tank2sim.demo.fmu_helpers import DemoOutcome, Workshop, demo_output_errors,
 from tank2sim.dynamics import Model, build
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import InputSequence
-from tank2sim.fmu.replay import replay
+from tank2sim.fmu.running import replay
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trial_file import trial_csv

@@ -17,7 +17,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import InputSequence
-from tank2sim.fmu.replay import replay
+from tank2sim.fmu.running import replay
 from tank2sim.identification.tow.identify import TowIdentification, identify_tow, tow_card_text
 from tank2sim.records.tows import Tows, read_tows
 

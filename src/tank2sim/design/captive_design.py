@@ -301,8 +301,7 @@ class CaptiveDesigner:
         return Allocation(tuple(blocks), np.array([time_of([group]) for group in self.groups]))
 
     def _over_usual(self, counts: Array) -> Allocation:
-        """Targets: each figure of the card's ship, and of the drawn ships on average, over their variance by the usual
-        matrix with these counts."""
+        """Variance by the usual matrix over that with these counts: card's ship, and mean of drawn ships."""
         by_card = self._at_card.variances(counts)
         drawn = self.slopes.drawn
         relative = []

@@ -26,8 +26,8 @@ from tank2sim.identification.captive.equations import (
     term_history,
 )
 from tank2sim.identification.captive.harmonics import ReducedRun, reduced_run
-from tank2sim.identification.captive.prior import RATIOS
 from tank2sim.identification.captive.regression import Spread, scatters
+from tank2sim.identification.captive.selection import RATIOS
 from tank2sim.records.campaign_form import ModelSection, RunSheet, TankSection, TankTest, UncertaintySection
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
 

@@ -308,8 +308,7 @@ class TankRuns:
         return tuple(groups)
 
     def _oscillating_checks(self, kind: RunType, runs: Sequence[PlannedRun], largest: float) -> list[RunGroup]:
-        """Runs at half the largest velocity, at the highest and the lowest frequency, unless `runs` have two of them
-        and a velocity between."""
+        """Runs at half the largest velocity, highest and lowest frequency, unless `runs` have such ones."""
         motion = "sway" if kind == "pure_sway" else "yaw"
         used = {run.frequency_radps for run in runs}
         between = any(_between(run.velocity, largest) for run in runs)

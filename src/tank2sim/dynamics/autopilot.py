@@ -1,4 +1,4 @@
-"""A heading autopilot: PID on the heading error, with limits and anti-windup, as a model of its own.
+"""Heading autopilots as models of their own: PID on the heading error, or any linear law (:class:`LinearLaw`).
 
     e      = heading.command - motion.psi, brought within half a turn
     order  = Kp e - Kd r + z
@@ -20,7 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
 
 
@@ -233,3 +235,95 @@ def _angle(name: str, description: str, value: ca.SX) -> Quantity:
 def within(value: ca.SX, bound: ca.SX) -> ca.SX:
     """The value, no further from 0 than the bound."""
     return ca.fmax(-bound, ca.fmin(bound, value))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearLaw:
+    """A linear controller of heading, rudder positive to starboard, with the integral and limits of every autopilot.
+
+        dx/dt  = R [x; e; r; rudder]
+        order  = d [x; e; r] + z
+        rudder = order, within the limit
+        dz/dt  = g [x; e; r], within its own limit, + (rudder - order, within -z and 0)/Tt
+
+    e is the heading error and r the yaw rate. The states x see the rudder as it was limited, so that an observer among
+    them is not misled by an order that the ship never got: Astrom & Hagglund (2006), Advanced PID Control, 3.5.
+
+    Parameters
+    ----------
+    rates : array (n, n + 3)
+        R: rates of the states by the states, heading error (rad), yaw rate (rad/s) and limited rudder order (rad).
+    demand : array (n + 2,)
+        d: rudder (rad) by the states, heading error and yaw rate.
+    growth : array (n + 2,)
+        g: growth of the integral (rad/s) by the same.
+    growth_limit_radps : float
+        The integral grows no faster than this, so that a change of course does not fill it.
+    anti_windup_time_s, largest_rudder_rad : float
+        Tt, s; and the limit of the order, rad.
+    """
+
+    rates: Array
+    demand: Array
+    growth: Array
+    growth_limit_radps: float
+    anti_windup_time_s: float
+    largest_rudder_rad: float
+
+
+def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: float) -> Model:
+    """The autopilot of a law: inputs and outputs as :func:`autopilot_model`.
+
+    Raises
+    ------
+    ValueError
+        The shapes of the law do not fit.
+    """
+    count = len(law.rates)
+    if law.rates.shape != (count, count + 3) or law.demand.shape != (count + 2,) or law.growth.shape != (count + 2,):
+        raise ValueError(f"{count} states do not fit {law.rates.shape}, {law.demand.shape}, {law.growth.shape}")
+    psi, r, command = inputs = heading_signals()
+    error = heading_error(psi, command)
+    states = [_state_of_law(place) for place in range(1, count + 1)]
+    seen = ca.vcat([*(state.symbol for state in states), error.symbol, r.symbol])
+    most = Parameter(
+        name="autopilot.integral_limit",
+        unit="rad/s",
+        description="The integral grows no faster than this",
+        display_unit="deg/s",
+        minimum=0.0,
+        nominal=law.growth_limit_radps,
+        start=law.growth_limit_radps,
+    )
+    held = IntegralState(law.anti_windup_time_s, law.largest_rudder_rad).variables(
+        _dot(law.demand, seen), within(_dot(law.growth, seen), most.symbol)
+    )
+    order = next(variable for variable in held if variable.name == "rudder.command")
+    rates = [
+        _rate_of_law(place, _dot(row, ca.vertcat(seen, order.symbol))) for place, row in enumerate(law.rates, start=1)
+    ]
+    given: tuple[Variable, ...] = (*inputs, most, *states, *rates, error)
+    return steered_by(name, description, given, held, step_s)
+
+
+def _dot(coefficients: Array, of: ca.SX) -> ca.SX:
+    return ca.dot(ca.DM(np.asarray(coefficients)), of)
+
+
+def _state_of_law(place: int) -> State:
+    return State(
+        name=f"autopilot.state_{place}",
+        unit="1",
+        description=f"State {place} of the controller",
+        derivative=f"autopilot.rate_{place}",
+        start=0.0,
+    )
+
+
+def _rate_of_law(place: int, value: ca.SX) -> Quantity:
+    return Quantity(
+        name=f"autopilot.rate_{place}",
+        unit="1/s",
+        description=f"Rate of state {place} of the controller",
+        value=value,
+    )

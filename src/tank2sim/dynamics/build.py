@@ -43,9 +43,7 @@ def build(card: Card) -> Model:
 
 @dataclass(frozen=True)
 class _Described:
-    """A card by its content, and the effects that it names by their identity: they hold mappings, which have no hash.
-
-    The effects are held, so that no other one gets their identity."""
+    """A card by its content, with the effects it names: held and compared by identity, for they have no hash."""
 
     content: bytes
     identities: tuple[int, ...]

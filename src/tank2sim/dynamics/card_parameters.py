@@ -16,7 +16,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, MmgCard, SteeredCard
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.small_craft import body_scales, craft_scale, craft_scales
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS

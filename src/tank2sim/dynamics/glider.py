@@ -191,10 +191,7 @@ def _usual_speed(card: GliderCard) -> float:
 
 
 def _step(card: GliderCard) -> float:
-    """Step of integration, s: 1, 2 or 5 times a power of ten, 0.05 s for the probe of the paper.
-
-    The fastest motion is that of the incidence, rho S v C_L' / (2 (m + A33)), 2.5 1/s for the probe, or a control.
-    """
+    """Step of integration, s: 1, 2, 5 times a power of ten; fastest is rho S v C_L'/(2 (m + A33)) or a control."""
     glider = card.glider
     grip = (
         0.5 * card.environment.water_density_kgpm3 * glider.reference_area_m2 * _usual_speed(card) * glider.lift_slope

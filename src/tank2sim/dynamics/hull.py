@@ -119,10 +119,7 @@ def _terms(hull: Hull, force: str, with_rudder: bool) -> list[str]:
 
 
 def _polynomials(hull: Hull, with_rudder: bool) -> Forces:
-    """X, Y, N of the terms of (3.5) or (3.8) that hold the rudder's angle, or of those that do not; N, N and N m.
-
-    They fade out below the lowest speed of the polynomial.
-    """
+    """X, Y, N (N, N m) of the terms of (3.5) or (3.8) with the rudder's angle, or without; faded out at low speed."""
     speed, scales = _scales_of_forces(hull)
     v, r, du = prime_motion(hull, speed)
     primes = {"v": v, "r": r, "d": hull["rudder.effective"], "u": du}

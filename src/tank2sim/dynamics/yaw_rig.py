@@ -28,7 +28,7 @@ _KNEE_RADPS = 2.5e-4
 
 
 _TORQUE_CONSTANT_NMPA = 0.051
-"""Of the paper's motor."""
+"""Torque constant of the paper's motor, N m/A."""
 
 ELLIPSOID_T1 = YawRig(
     inertia_kgm2=204.3e-4,

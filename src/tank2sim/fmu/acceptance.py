@@ -11,11 +11,11 @@ from typing import Any
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.passport import PASSPORT_FILE, PASSPORT_PAGE, Replay, passport
 from tank2sim.fmu.passport_pictures import passport_pictures
 from tank2sim.fmu.platforms import host_platform
 from tank2sim.fmu.process import Drive, drive_apart
+from tank2sim.fmu.provenance import Documents
 from tank2sim.fmu.reference import reference_errors
 from tank2sim.fmu.reference_run import ReferenceRun, reference_run
 from tank2sim.fmu.templates import render

@@ -16,11 +16,10 @@ from tank2sim.analysis.heading.runs import HeadingLoop
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu
 from tank2sim.fmu.libraries import ProgressReport
 from tank2sim.fmu.platforms import Platform
-from tank2sim.fmu.provenance import ValueOrigin
+from tank2sim.fmu.provenance import Documents, ValueOrigin
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import unpack
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.dynamics.model import Model
-from tank2sim.fmu.equations import other_values
 from tank2sim.fmu.interface import Interface
+from tank2sim.fmu.sources import other_values
 
 Pattern = NDArray[np.bool_]
 """Rows are unknowns, columns are knowns; True where a row may depend on a column."""

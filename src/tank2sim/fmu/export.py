@@ -16,18 +16,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tank2sim.bundled import bundled
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import fmu_structure
-from tank2sim.fmu.documents import Documents
-from tank2sim.fmu.interface import Interface, interface
+from tank2sim.fmu.interface import FmuVariable, Interface, interface
 from tank2sim.fmu.libraries import ProgressReport, libraries, require_compilers
 from tank2sim.fmu.osp import osp_groups
 from tank2sim.fmu.platforms import Platform
+from tank2sim.fmu.provenance import Documents
 from tank2sim.fmu.sources import c_sources, headers_notice
 from tank2sim.fmu.templates import c_identifier, render
-from tank2sim.fmu.terminals import terminals
 from tank2sim.fmu.unpacking import CARD_IN_FMU
 from tank2sim.units import UNITS
 
@@ -44,6 +44,25 @@ _ICON_FILES = ("icon.png", "icon.svg")
 _OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
 
 _FIRST_TIME_OF_ZIP = 315532800  # 1980-01-01T00:00:00Z
+
+_TERMINALS = {
+    "motion": "Motion of the ship: position and heading, velocities through the water and over the ground",
+    "position": "Geographic position (WGS 84)",
+    "steering": "Steering gear: rudder order and angle, failure",
+    "thrusters": "Thrusters: orders, revolutions and thrust of each",
+    "propulsion": "Propulsion: ordered and actual revolutions",
+    "force": "Hydrodynamic forces and moment on the ship",
+    "validity_by": "Factors of validity, one for each cause",
+    "squat": "Largest sinkage by squat, by two formulas",
+    "external": "External force and moment: X and Y at a point x, y, and N",
+    "heading": "Heading order",
+    "buoyancy": "Net buoyancy: order and actual",
+    "pitch": "Pitch: order and actual",
+    "roll": "Roll: order and actual",
+}
+
+_TERMINAL_OF = {"rudder": "steering", "propeller": "propulsion"}
+"""First part of a variable's name to the terminal it belongs to, where that has another name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,3 +272,47 @@ def zipped(contents: Mapping[str, bytes], *, first: str) -> bytes:
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             archive.writestr(entry, contents[name])
     return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """A terminal.
+
+    Parameters
+    ----------
+    name, description : str
+        What it is.
+    members : tuple of pair
+        Name of each member in the terminal, and the variable.
+    """
+
+    name: str
+    description: str
+    members: tuple[tuple[str, FmuVariable], ...]
+
+
+def terminals(interface: Interface) -> tuple[Terminal, ...]:
+    """The terminals: inputs and outputs with the same first part of their structured name, in the order of outputs.
+
+    A variable whose name has one part (``validity``) belongs to none. Members are called by the rest of the name; where
+    two groups share a terminal and a member's name, the later keeps its whole name.
+    """
+    grouped: dict[str, dict[str, FmuVariable]] = {}
+    for variable in (*interface.with_causality("output"), *interface.with_causality("input")):
+        first, _, member = variable.name.partition(".")
+        if not member:
+            continue
+        members = grouped.setdefault(_TERMINAL_OF.get(first, first), {})
+        members[variable.name if member in members else member] = variable
+    descriptions = _TERMINALS | _terminals_of_effects()
+    return tuple(
+        Terminal(name, descriptions.get(name, f"Signals {name}.*"), tuple(members.items()))
+        for name, members in grouped.items()
+    )
+
+
+def _terminals_of_effects() -> dict[str, str]:
+    """First part of the names of an effect's inputs to what the effect says that they are together."""
+    described = [effect for effect in EFFECTS.values() if effect.terminal]
+    named = [(parameter.input_name, effect.terminal) for effect in described for parameter in effect.parameters]
+    return {name.partition(".")[0]: description for name, description in named if name}

@@ -177,10 +177,7 @@ def other_outputs(model: Model) -> tuple[str, ...]:
 
 
 def _rate_names(model: Model) -> list[str]:
-    """Name of the variable that is the rate of each state: its quantity, or ``der(state)`` where that has another use.
-
-    A variable of FMI can be the derivative of one state only.
-    """
+    """Name of the variable that is the rate of each state: its quantity, or ``der(state)`` if that is taken."""
     names: list[str] = []
     for state in model.states:
         taken = state.derivative in names or state.derivative in model.state_names

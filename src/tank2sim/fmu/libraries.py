@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -11,7 +12,6 @@ from tank2sim.fmu.sources import SELDOM
 from tank2sim.native.compiler import SHARED_SUFFIX, require_compiler
 from tank2sim.native.cross import cross_compiled, has_compiled, require_cross_compiler
 from tank2sim.native.library import cached_library
-from tank2sim.native.universal import universal
 
 ProgressReport = Callable[[str], None]
 """Hears, in a few words, what is being done."""
@@ -25,6 +25,16 @@ _LINK_FLAGS = {
     "darwin": ("-Wl,-install_name,@rpath/model.dylib",),
     "win32": ("-Wl,--no-insert-timestamp",),
 }
+
+# <mach-o/fat.h> and <mach-o/loader.h> of macOS. A library begins with its magic number, processor and model of
+# processor in the order of its own bytes (both of today's Macs: little end first); the header of a universal file is
+# written big end first. Each library begins on a page: 2**14 bytes are a page on ARM, and whole pages on x86-64.
+_UNIVERSAL_MAGIC = 0xCAFEBABE
+_LIBRARY_MAGIC = 0xFEEDFACF
+_HEAD = struct.Struct(">II")
+_ENTRY = struct.Struct(">IIIII")
+_BEGIN = struct.Struct("<III")
+_PAGE_BITS = 14
 
 
 def require_compilers(platforms: Sequence[Platform] | None) -> None:
@@ -100,3 +110,25 @@ def _compiled(
 def _patience(platform: Platform) -> str:
     long = "2 to 3 minutes" if platform.target.suffix == ".dll" else "some 10 s"
     return f" (the first time: {long})"
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """A universal Mach-O file of the 64-bit Mach-O `libraries`; the loader takes the one for its processor.
+
+    Raises
+    ------
+    ValueError
+        One of them is not such a library, or two are for the same processor.
+    """
+    page = 1 << _PAGE_BITS
+    heads = [_BEGIN.unpack_from(library) for library in libraries]
+    if any(magic != _LIBRARY_MAGIC for magic, _, _ in heads):
+        raise ValueError("only 64-bit Mach-O libraries can be joined")
+    if len({processor for _, processor, _ in heads}) < len(heads):
+        raise ValueError("two libraries are for the same processor")
+    table, body = _HEAD.pack(_UNIVERSAL_MAGIC, len(libraries)), b""
+    for (_, processor, model), library in zip(heads, libraries, strict=True):
+        begin = page + len(body)
+        table += _ENTRY.pack(processor, model, begin, len(library), _PAGE_BITS)
+        body += library + bytes(-len(library) % page)
+    return table.ljust(page, b"\0") + body

@@ -76,13 +76,7 @@ def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> ProcessResult:
 
 
 def _run_alone(command: list[str], environment: dict[str, str]) -> int:
-    """Run a command in a process group of its own; whatever processes it started end with it.
-
-    Raises
-    ------
-    subprocess.TimeoutExpired
-        It took longer than allowed.
-    """
+    """Run a command in its own process group, which ends with it; TimeoutExpired if it takes longer than allowed."""
     nothing = subprocess.DEVNULL  # a pipe would be held open by a process that the library has started
     new_session = os.name == "posix"
     with subprocess.Popen(

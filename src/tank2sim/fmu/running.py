@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import fmpy.fmi2
@@ -13,8 +17,9 @@ import numpy as np
 from fmpy.sundials import CVodeSolver
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.fmu.manoeuvre import InputSequence
-from tank2sim.fmu.unpacking import FmuType, UnpackedFmu
+from tank2sim.fmu.unpacking import FmuType, UnpackedFmu, unpack
 
 _TOLERANCE = 1e-10
 _MOST_SOLVER_STEPS = 1_000_000
@@ -170,3 +175,18 @@ def _solver(fmu: RunningFmu) -> Any:
         relativeTolerance=_TOLERANCE,
         maxNumSteps=_MOST_SOLVER_STEPS,
     )
+
+
+def replay(path: Path, run: InputSequence, model: Model) -> dict[str, Array]:
+    """Outputs (K + 1,) by name, at the communication points of a run, in Co-Simulation.
+
+    Raises
+    ------
+    InputError
+        The file is not an FMU for this machine.
+    """
+    with contextlib.redirect_stdout(io.StringIO()), tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
+        unpacked = unpack(Path(path), Path(folder))
+        with running(unpacked, "CoSimulation") as fmu:
+            rows = co_simulate(fmu, run, model.input_names, model.outputs)
+    return dict(zip(model.outputs, rows.T, strict=True))

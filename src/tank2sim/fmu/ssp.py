@@ -9,12 +9,11 @@ from importlib.metadata import version
 from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_autopilot
 from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.dynamics.model import Model
-from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu, zipped
 from tank2sim.fmu.interface import FmuVariable, interface
 from tank2sim.fmu.libraries import ProgressReport
 from tank2sim.fmu.platforms import Platform
-from tank2sim.fmu.provenance import ValueOrigin
+from tank2sim.fmu.provenance import Documents, ValueOrigin
 from tank2sim.fmu.templates import render
 from tank2sim.units import UNITS
 

@@ -172,11 +172,7 @@ def run_gap_workflow(
 
 
 def _without_heel(group: Measured) -> Measured:
-    """Trials of a ship that rolls, without the heel that they measured.
-
-    Roll follows from the measured motion, whose errors excite it; the filter corrects the motion alone, and heel would
-    show an oscillation that is not the ship's.
-    """
+    """Trials without measured heel, whose roll the motion's errors would excite."""
     if not any("phi_rad" in trial.signals for trial in group.trials):
         return group
     trials = tuple(
@@ -195,10 +191,7 @@ def _search_once(
     pool: Executor | None,
     without: ManoeuvringCard | None = None,
 ) -> tuple[Gap, tuple[Measured, Measured]]:
-    """One search, the decision and its proof; and the trials with the winds and currents that were found.
-
-    `without` is the card without the effects that an earlier search found.
-    """
+    """One search, decision and proof, and the trials in the surroundings found; `without` lacks earlier effects."""
     names = _names(card, trials[0], options)
     found = search(likelihood_from_card(card, trials[0], without), progress, pool, names, most=options.max_effects)
     decision = decide(found, options.false_discovery)
@@ -212,8 +205,7 @@ def _search_once(
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
-    """Whether effects of the ship were named, also as one of several that look alike, and the fitted trials are still
-    missed."""
+    """Whether effects of the ship were named, also one of several alike, and the fitted trials are still missed."""
     if gap.verdict not in (MISSING, AMBIGUOUS) or not all(gap.alternatives):
         return False
     if not 0 < len(gap.effects) < options.max_effects:
@@ -344,8 +336,7 @@ def _with_verdict_of_coefficients(decision: Decision, proof: Proof) -> Decision:
 
 
 def _begin_black_box(card: ManoeuvringCard, proof: Proof, replays: TrialReplays) -> Callable[[], BlackBox] | None:
-    """A black box with as many coefficients as the named effects have parameters, fitted by another process if there is
-    one; none without effects."""
+    """A black box with as many coefficients as the effects have parameters, fitted apart if possible; else none."""
     if not proof.named.estimated:
         return None
     count = max(sum(len(errors) for *_, errors in proof.named.estimated), 1)

@@ -150,10 +150,7 @@ def _has_fix(table: Mapping[str, Array]) -> Array:
 
 
 def _shaft(field: str, instance: Any, table: Mapping[str, Array], instances: int) -> tuple[str, str]:
-    """Quantity of revolutions, and by what it is known: of the only one by the format, of two it is a guess.
-
-    ``rpm2`` of a single sensor is -1 throughout.
-    """
+    """Quantity of revolutions, and how it is known: a single one (``rpm2`` is -1) by the format, two by a guess."""
     second = table.get("rpm2")
     if field in ("rpm1", "rpm2") and second is not None and np.nanmax(np.abs(second), initial=0.0) <= 1:
         return ("rpm", "format") if field == "rpm1" else ("", "")
@@ -193,10 +190,7 @@ def _dataflash_tables(
 
 
 def _servo_orders(time: Array, table: Mapping[str, Array], params: Mapping[str, float]) -> list[LogStream]:
-    """Orders as shares of the range, positive to starboard and ahead, of the outputs with a known function.
-
-    Outputs of any other function are pulses, us, whose use is found by what the vessel does, or named.
-    """
+    """Orders as shares of the range, positive to starboard and ahead; pulses (us) of outputs with other functions."""
     streams = []
     for number in range(1, 17):
         quantity = _SERVO_FUNCTIONS.get(int(params.get(f"SERVO{number}_FUNCTION", 0)))

@@ -601,7 +601,7 @@ class _Search:
         self._rudder_shares()
 
     def _held_rudders(self) -> None:
-        """Of several streams that are a rudder by their names, one that holds its values is the order."""
+        """If several streams are a rudder by their names, the one that holds its values is the order."""
         angles = self.named("rudder_angle")
         held = [stream for stream in angles if stream.stated_by == "name" and _held_share(stream) > _HOLDS]
         if not self.named("rudder_order") and len(held) == 1 and any(_held_share(other) < _MOVES for other in angles):
@@ -618,10 +618,7 @@ class _Search:
             self._doubt((angle.stream, order.stream), "order and angle seem exchanged")
 
     def _zero(self, stream: LogStream, evidence: ContentEvidence) -> float:
-        """What a rudder records on straight legs; 0 where that is near its zero, or nothing shows it.
-
-        Of a straight leg, the rate of turn is small, and so it was a time before: the rudder does not only cross.
-        """
+        """Rudder reading on straight legs (slow turn, also a time before); 0 if that is near its zero or unknown."""
         time, rate = self.rate
         if stream.unit == "1" or not len(rate) or (evidence.agreement or 0.0) < _SHOWN:
             return 0.0

@@ -159,10 +159,7 @@ def read_table_log(path: Path) -> VesselLog:
 
 
 def _by_signal(frame: pd.DataFrame, time: Array) -> list[LogStream]:
-    """Streams of a table whose rows are each a sample of the signal that they name; none of any other table.
-
-    Such a table has a column of names, each in :data:`_ROWS_OF_A_SIGNAL` rows or more, and one of numbers.
-    """
+    """Streams of a table with a column of signal names, :data:`_ROWS_OF_A_SIGNAL` rows of each or more; else none."""
     import pandas as pd
 
     numeric = [name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name])]
@@ -177,10 +174,7 @@ def _by_signal(frame: pd.DataFrame, time: Array) -> list[LogStream]:
 
 
 def _spread(time: Array, values: pd.DataFrame) -> tuple[Array, int] | None:
-    """Times (rows,) of a clock that is coarser than the rows, each row by its place among those of its time.
-
-    None where most times have one row, or the rows of a time are those of several instruments.
-    """
+    """Times (rows,) of a clock coarser than the rows, spread by place; None if unneeded or of several instruments."""
     begins = np.flatnonzero(np.diff(time, prepend=np.nan) != 0)
     counts = np.diff(np.append(begins, len(time)))
     each = int(np.median(counts[1:-1])) if len(counts) > 2 else 1
@@ -276,10 +270,7 @@ def _time(
 def _undated_time(
     path: Path, frame: pd.DataFrame, layout: TextLayout, columns: list[list[str]], findings: list[LogFinding]
 ) -> tuple[Array, bool, set[str]]:
-    """Times (rows,) of a table without a date: of the day, or a count from the beginning; else as :func:`_time`.
-
-    `columns` are those whose names, and those whose cells are of times.
-    """
+    """Times (rows,) without a date: of the day, or a count; else as :func:`_time`. `columns`: by names and by cells."""
     import pandas as pd
 
     named, clocks = columns
@@ -384,10 +375,7 @@ def _track_speed(values: Array, frame: pd.DataFrame) -> float | None:
 
 
 def _clock_of_numbers(values: Array) -> Array | None:
-    """Seconds of the day (rows,) of numbers hhmmss, hhmmsscc or hhmmssmmm, or fractions of a day; None of a count.
-
-    The digits of minutes and seconds of a clock stay below 60, where a count goes on to 99.
-    """
+    """Seconds of the day (rows,) of hhmmss[cc|mmm] or fractions of a day; None of a count, whose digits go on to 99."""
     known = values[np.isfinite(values)]
     if len(known) < _ROWS_OF_A_SIGNAL or known.min() < 0 or np.ptp(known) == 0:
         return None

@@ -128,11 +128,7 @@ def _cut(voyage: Voyage, stretch: Stretch, begin: float, number: int) -> TrialCu
 
 
 def _redundant(series: Mapping[str, QuantitySeries]) -> tuple[str, ...]:
-    """Velocities over the ground that positions hold already, next to velocities through the water.
-
-    Without a current in the card they would contradict those through the water, and a position is the better record of
-    the two: its errors do not add up.
-    """
+    """Velocities over the ground that the better record, the positions, holds already."""
     ground = ("u_ground", "v_ground")
     if "x" not in series or "y" not in series:
         return ()

@@ -15,11 +15,10 @@ from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
 from tank2sim.logs.missing import without_missing
-from tank2sim.logs.parts import joined_parts
 from tank2sim.logs.pulses import pulses_of
 from tank2sim.logs.quantities import QUANTITIES
 from tank2sim.logs.reference import HEADING_WINDOW_S, differenced, local_metres, rounded_origin
-from tank2sim.logs.streams import LogFinding, LogStream, VesselLog
+from tank2sim.logs.streams import LogFinding, LogStream, VesselLog, joined_parts
 from tank2sim.marks import UNCONFIRMED
 from tank2sim.records.signals.sampling import GAP_STEPS
 

@@ -164,10 +164,6 @@ class Campaign:
         """Scales of the prime system at the test speed."""
         return Scales(self.test.water_density_kgpm3, self.model.length_m, self.test.speed_mps)
 
-    def runs_of(self, *types: RunType) -> tuple[CaptiveRun, ...]:
-        """The runs of the given types."""
-        return tuple(run for run in self.runs if run.type in types)
-
     def without(self, names: set[str]) -> Campaign:
         """The campaign less some runs."""
         return replace(self, runs=tuple(run for run in self.runs if run.name not in names))

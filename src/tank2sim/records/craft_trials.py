@@ -72,15 +72,7 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
 
 
 def _azimuths(path: Path, thrusters: Sequence[ThrusterSection], columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Directions of the thrusters that turn: ``azimuth_<name>_rad``, or as ordered ``azimuth_order_<name>_rad``.
-
-    Of a single one the columns of a rudder do, positive where the craft turns to starboard.
-
-    Raises
-    ------
-    InputError
-        The direction of a thruster that turns is not there.
-    """
+    """Directions of the thrusters that turn, or as ordered; a single one may be a rudder; a missing one is refused."""
     found = {}
     turning = [thruster for thruster in thrusters if thruster.max_azimuth_rad is not None]
     for thruster in turning:

@@ -430,8 +430,7 @@ def _at(common: Array, time: Array, values: Array) -> Array:
 
 
 def _unit(values: Array) -> float:
-    """Coarsest unit to which a signal (n,) is rounded: by its steps, or as the greatest common divisor of its larger
-    values, which have the fewest decimals."""
+    """Coarsest unit of a signal (n,): by its steps, or the greatest common divisor of its larger values."""
     known = values[np.isfinite(values)]
     size = float(np.max(np.abs(known), initial=0.0))
     different = np.unique(known[np.abs(known) >= size / 2])

@@ -11,11 +11,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.errors import InputError
 from tank2sim.marks import CHECK
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
+from tank2sim.records.yaw_programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.units import to_si
 
 Medium = Literal["air", "water"]

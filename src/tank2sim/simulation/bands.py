@@ -154,11 +154,7 @@ def _leading(tracks: Array) -> Array:
 
 
 def _passed(tracks: Array, leading: Array) -> tuple[Array, Array]:
-    """Unit normals (n, 2) to starboard of the leading track, and the distance (members, n) of each track along them.
-
-    Each member is followed from normal to normal: it must pass each after the previous one, in the direction of the
-    leading track, and within :data:`FOLLOWED` of its steps. Otherwise it is lost (nan).
-    """
+    """Unit normals (n, 2) to starboard of the leading track, and distances (members, n) along them; nan where lost."""
     along = np.gradient(leading, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
     normals = np.column_stack([-along[:, 1], along[:, 0]])
@@ -174,9 +170,7 @@ def _passed(tracks: Array, leading: Array) -> tuple[Array, Array]:
 def _followed(
     tracks: Array, last: tuple[Array, NDArray[np.intp]], normal: tuple[Array, Array], step: float
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Positions where each track next passes the normal to a course at a point, and the preceding time index.
-
-    `last` has the same for the previous normal, nan for lost members."""
+    """Positions where each track next passes the normal to a course, and the time index before; nan if lost."""
     places, at = last[0].copy(), last[1].copy()
     point, along = normal
     ahead = (places - point) @ along

@@ -235,8 +235,7 @@ class LaneManoeuvres:
         figures: dict[str, Array],
         number: int,
     ) -> tuple[bool, float]:
-        """The figures of a single ship with more events than lanes keep; whether it could be run, and when it left the
-        card's range, s."""
+        """Figures of one ship with more events than lanes keep; if it could be run; when it left the range, s."""
         (manoeuvre, duration, inputs), model = asked, self.model
         parameters = dict(zip(model.parameter_names, p.tolist(), strict=True))
         count = len(next(iter(figures.values())))

@@ -104,8 +104,7 @@ class LaneSpirals:
 
 
 def _due(times: Array, since: Array, until: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Times (n, m), s after `since` (n,), that lie between it and `until` (n,), and their places among all; inf and -1
-    after the last of a ship."""
+    """Times (n, m), s after `since` (n,) up to `until` (n,), and their places among all; inf and -1 after the last."""
     first, last = np.searchsorted(times, since), np.searchsorted(times, until, side="right")
     places = first[:, None] + np.arange(int(np.max(last - first, initial=0)))
     inside = places < last[:, None]

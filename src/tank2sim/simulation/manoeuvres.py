@@ -78,13 +78,7 @@ def _degrees(angle: float) -> str:
 
 
 def _check_angles(name: str, **angles: float) -> None:
-    """Refuse an angle of 90 deg (in rad) or more.
-
-    Raises
-    ------
-    InputError
-        One of the angles is out of bounds, as one in degrees is.
-    """
+    """Refuse an angle of 90 deg (in rad) or more, as an angle in degrees is."""
     for key, angle in angles.items():
         if not abs(angle) < math.pi / 2:
             problem = f"is {angle:g} rad, and angles are below 90 deg (1.57 rad)"
@@ -470,8 +464,7 @@ def _parse_stop(text: str) -> Stop:
 
 
 def _spiral_rudders(largest: float) -> tuple[float, ...]:
-    """Rudder angles of a spiral to the opposite side and back, from `largest` (deg) by the steps of
-    :data:`SPIRAL_RUDDERS_DEG`."""
+    """Rudder angles of a spiral to the opposite side and back, from `largest` (deg) by :data:`SPIRAL_RUDDERS_DEG`."""
     inner = [angle for angle in SPIRAL_RUDDERS_DEG if abs(angle) < abs(largest)]
     outward = [largest, *(math.copysign(1.0, largest) * angle for angle in inner), -largest]
     return tuple(math.radians(angle) for angle in (*outward, *outward[-2::-1]))

@@ -220,10 +220,7 @@ def _turning(trial: Trial, first: HeldAngle, rates: Array, ship_time: float) -> 
 
 
 def _order_error(trial: Trial, held: HeldAngle) -> float:
-    """Standard error of the time of an order, s: half a row where only orders are known.
-
-    They were given at any time of a row (0.29 of it), or, in a record that a simulator wrote, at its end (0.5).
-    """
+    """Standard error of an order's time, s: 0.29 of a row, or half a row in records that a simulator wrote."""
     return 0.0 if held.rate is not None else ROWS_TO_SHOW_AN_ORDER * sampling_step(trial)
 
 
@@ -377,10 +374,7 @@ def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
 
 
 def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Array] | None:
-    """The smoothed signals of :data:`STATES` (n,); None if heading or positions were not measured.
-
-    Yaw rate and velocities that were not measured are slopes of the smoothed heading and positions.
-    """
+    """Smoothed signals of :data:`STATES` (n,), by slopes where not measured; None without heading or positions."""
     known = {name for name in STATES if name in trial.signals and not np.isnan(trial.signals[name]).all()}
     if not {"psi_rad", "x_m", "y_m"} <= known:
         return None

@@ -212,11 +212,7 @@ def _usual_largest(rudder: Array) -> float:
 
 
 def _held(rudder: Array) -> list[Places]:
-    """Samples of each held angle, with alternating sides.
-
-    The rudder of the approach may reach the angles of the manoeuvre, but is never constant: samples before the first
-    held angle belong to the approach.
-    """
+    """Samples of each held angle, with alternating sides; samples before the first belong to the approach."""
     size = _usual_largest(rudder)
     if size < _LEAST_RUDDER:
         return []

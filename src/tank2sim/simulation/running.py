@@ -9,10 +9,9 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.simulation.bracketed_root import bracketed_root
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.straight_course import straight_course
-from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.simulation.trajectory import Trajectory, bracketed_root
 
 RUNAWAY = "the motion leaves all bounds"
 """The message about a motion that is not finite."""

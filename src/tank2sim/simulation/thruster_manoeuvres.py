@@ -48,13 +48,7 @@ def thruster_sides(model: Model) -> dict[str, float]:
 
 
 def _opposed(model: Model, words: str) -> dict[str, float]:
-    """As :func:`thruster_sides`.
-
-    Raises
-    ------
-    InputError
-        The craft has no thruster at one of the sides.
-    """
+    """As :func:`thruster_sides`; a craft without a thruster at one of the sides is refused."""
     sides = thruster_sides(model)
     if not {1.0, -1.0} <= set(sides.values()):
         raise InputError(
@@ -64,13 +58,7 @@ def _opposed(model: Model, words: str) -> dict[str, float]:
 
 
 def _within(model: Model, orders: dict[str, float], words: str) -> dict[str, float]:
-    """The orders, checked.
-
-    Raises
-    ------
-    InputError
-        One is beyond the largest revolutions.
-    """
+    """The orders; one beyond the largest revolutions is refused."""
     for name, value in orders.items():
         low, high = model[name].minimum, model[name].maximum
         assert low is not None and high is not None

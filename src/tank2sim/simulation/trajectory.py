@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.simulation.bracketed_root import bracketed_root
 from tank2sim.units import UNITS
 
 TIMES_BEYOND = 10.0
 """Factor on the extent of a unit beyond which a state is meaningless. Project choice: no manoeuvre reaches the extent
 itself. FMUs use the same number."""
+
+_MOST_STEPS = 200
+"""Each step at least halves the interval; 200 steps exceed the number of bits of a double. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -108,3 +112,38 @@ def _hermite(times: list[float], values: list[float], slopes: list[float]) -> Ca
         return values[1] if time == times[1] else values[0] + s * (slopes[0] + s * (square + s * cube))
 
     return cubic
+
+
+def bracketed_root(function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-13) -> float:
+    """The x between `low` and `high` at which a continuous function is zero, to `tolerance` in x.
+
+    Method of Ridders (1979, IEEE Trans. Circuits Syst. 26, 979). ``scipy.optimize.ridder`` is equivalent, but its
+    import takes a third of a second, half of a short simulation.
+
+    Raises
+    ------
+    ValueError
+        The function has the same sign at both ends.
+    """
+    at_low, at_high = function(low), function(high)
+    for x, value in ((low, at_low), (high, at_high)):
+        if value == 0:
+            return x
+    if at_low * at_high > 0:
+        raise ValueError(f"no change of sign between {low:g} and {high:g}")
+    best = math.inf
+    for _ in range(_MOST_STEPS):
+        middle = (low + high) / 2
+        at_middle = function(middle)
+        root = math.sqrt(at_middle * at_middle - at_low * at_high)
+        if root == 0:
+            return middle
+        before, best = best, middle + (middle - low) * math.copysign(1.0, at_low - at_high) * at_middle / root
+        value = function(best)
+        if value == 0 or abs(best - before) <= tolerance:
+            return best
+        ends = sorted([(low, at_low), (middle, at_middle), (best, value), (high, at_high)])
+        (low, at_low), (high, at_high) = next(pair for pair in pairwise(ends) if pair[0][1] * pair[1][1] <= 0)
+        if abs(high - low) <= tolerance:
+            return (low + high) / 2
+    return best

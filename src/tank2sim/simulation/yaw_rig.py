@@ -15,10 +15,10 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import YawRigCard
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.yaw_programme import Reference, YawProgramme, programme_of
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
 from tank2sim.records.yaw import Medium, YawRecord
+from tank2sim.records.yaw_programme import Reference, YawProgramme, programme_of
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.yaw_rig_control import Controller, TunedController
 
@@ -186,10 +186,7 @@ def _humps(programme: YawProgramme, steps: int, h: float) -> list[tuple[int, int
 def _tuned(
     controller: TunedController, rig: YawRig, programme: YawProgramme, time: Array, current: Array
 ) -> tuple[float, float] | None:
-    """Gains from the last completed pair of intervals; None without one.
-
-    As in the paper for close tracking, the rates are those of the programme.
-    """
+    """Gains from the last completed pair of intervals, with the programme's rates; None without a pair."""
     done = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
     if not done:
         return None

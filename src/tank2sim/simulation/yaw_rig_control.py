@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
+from tank2sim.records.yaw_programme import dissipation_from_work, inertia_from_work
 
 
 class Law(NamedTuple):

@@ -104,8 +104,7 @@ def _degrees(held: list[HeldAngle]) -> float:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Course, nominal heading and lag; their standard errors (without that of a given nominal heading); the
-    weighted sum of squares, and the sum of squares of the reversals alone, rad2."""
+    """Course, nominal heading, lag; their standard errors; squares weighted, and of the reversals alone (rad2)."""
 
     course: float
     nominal: float

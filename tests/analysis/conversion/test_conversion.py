@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.analysis.conversion.origin import shifted_derivatives
+from tank2sim.analysis.conversion.conventions import shift_matrix
 from tank2sim.analysis.conversion.polynomial_fit import fit_polynomial
 from tank2sim.analysis.conversion.program_code import program_name
 from tank2sim.bundled import bundled_cards
@@ -44,7 +44,8 @@ def test_moving_the_origin_follows_the_formulas() -> None:
     old |= {"Nd": -0.13, "Yd": 0.28, "Yvdot": -0.7, "Yrdot": -0.01, "Nvdot": 0.02, "Nrdot": -0.04}
     old |= {"Xvv": -0.04, "Xvr": 0.8, "Xrr": 0.02, "Xu": -0.2}
     a = 0.07
-    new = shifted_derivatives(old, a)
+    names, matrix = shift_matrix(tuple(old), a)
+    new = dict(zip(names, matrix @ list(old.values()), strict=True))
     Y, N = {name[1:]: value for name, value in old.items() if name[0] == "Y"}, old
     assert new["Yv"] == pytest.approx(Y["v"])
     assert new["Yr"] == pytest.approx(Y["r"] - a * Y["v"])

@@ -12,7 +12,7 @@ from tank2sim.analysis.guess import conditioning
 from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, POSTER_MANOEUVRES, GivenFigure, PosterFigures, conditioned
 from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
 from tank2sim.analysis.guess.study import guess_ship, parse_figures
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.reading import read_card
 from tank2sim.dynamics import build

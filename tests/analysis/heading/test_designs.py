@@ -14,10 +14,12 @@ from scipy.linalg import solve_continuous_are
 
 from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_gains
 from tank2sim.analysis.heading.designs import (
+    POLE_SHIFT,
     LqrWeights,
     SteeringPlant,
     _without_integral,
     design_heading,
+    robust_design,
     steering_plant,
 )
 from tank2sim.analysis.heading.margins import loop_margins
@@ -94,8 +96,6 @@ def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str)
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
 @pytest.mark.parametrize("name", ["mariner", "kvlcc2-captive"])
 def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: str) -> None:
-    from tank2sim.analysis.heading.robust import POLE_SHIFT
-
     ship = build(read_card(name))
     design = design_heading(ship, "robust")
     margins = loop_margins(ship, design.autopilot)
@@ -107,8 +107,6 @@ def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: 
 
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
 def test_a_ship_without_a_robust_controller_is_refused_by_its_file(mariner: Model) -> None:
-    from tank2sim.analysis.heading.robust import robust_design
-
     plant = steering_plant(mariner)
     nothing = replace(plant, A=np.full((4, 4), np.nan))
     with pytest.raises(InputError, match=r"^hull\.toml \(Mariner\): no robust controller"):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tank2sim.analysis.stability.margin import Margin, stability_margin
+from tank2sim.analysis.stability.margin import Margin, stability_margin, trim_effect
 from tank2sim.analysis.stability.straight_line import stability
-from tank2sim.analysis.stability.trim import trim_effect
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tests.marks import first_fast

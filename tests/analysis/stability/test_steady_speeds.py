@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.analysis.stability.steady_speeds import steady_speeds
+from tank2sim.analysis.stability.study import steady_speeds
 from tank2sim.api.ship import Ship
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import ManoeuvringCard, read_card

@@ -7,7 +7,6 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.cards.plausibility import levers, unusual_signs, yaw_force
-from tank2sim.identification.captive.plausibility import force_convention, foreign_units
 from tank2sim.identification.captive.tank_conditions import (
     CarriedBody,
     FroudeScaling,
@@ -28,7 +27,13 @@ from tank2sim.identification.captive.tank_conditions import (
     tank_size,
     trim,
 )
-from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
+from tank2sim.identification.captive.warnings import (
+    OscillationMotion,
+    cautions_of_result,
+    cautions_of_test,
+    force_convention,
+    foreign_units,
+)
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
 

@@ -10,8 +10,9 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.identification.trials.as_json import identification_as_json
 from tank2sim.identification.trials.assessment.method_choice import choose_method, signal_residuals
-from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
+from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 from .made_up_ship import CARD, SPEED, gusts, problem, trial, turn, zigzag

@@ -9,7 +9,8 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.identification.trials.assessment.evaluation import pooled
-from tank2sim.identification.trials.identify import Identification, IdentificationOptions, identify_trials
+from tank2sim.identification.trials.identify import Identification, identify_trials
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import measured
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ import pytest
 
 from tank2sim.identification.trials.methods.kalman import kalman
 from tank2sim.identification.trials.methods.recursive import RecursiveSettings, recursive
-from tests.identification.trials.pushed_ship import NOISE, PUSH, TRUTH, VALUES, orders, pushed_problem, trial
+from tests.identification.trials.pushed_ship import TRUTH, VALUES, pushed_problem
 
 
 @pytest.fixture(scope="module")
@@ -48,16 +48,6 @@ def test_path_begins_near_the_prior_and_narrows(problem, found):
     np.testing.assert_allclose(found.path_errors[-1], found.standard_errors)
     scaled = (found.path - VALUES) / found.path_errors
     assert np.mean(np.abs(scaled) < 1.96) > 0.8  # at all times, not only at the end
-
-
-@pytest.mark.slow
-def test_what_the_trials_do_not_show_does_not_settle():
-    rng = np.random.default_rng(8)
-    small = tuple(trial(rng, orders(200, 0.03, 80.0), 0.1 * PUSH, NOISE)[0] for _ in range(3))
-    asked = pushed_problem(0)[0].with_runs(small)
-    settled = dict(zip(TRUTH, recursive(asked).settled_s, strict=True))
-    assert np.isnan(settled["Nrrr"])  # rudder angles of 1.7 deg do not show a cubic term
-    assert settled["Nd"] < 0.75 * 603
 
 
 @pytest.mark.slow

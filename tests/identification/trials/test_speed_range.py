@@ -9,7 +9,8 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
-from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
+from tank2sim.identification.trials.identify import identify_trials
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 

@@ -15,7 +15,7 @@ from tank2sim.dynamics import build
 from tank2sim.identification.trials.assessment import structure_choice
 from tank2sim.identification.trials.assessment.model_selection import Criteria
 from tank2sim.identification.trials.assessment.structure_choice import structure_by_evidence
-from tank2sim.identification.trials.identify import IdentificationOptions
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import (

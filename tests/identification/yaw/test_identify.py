@@ -8,7 +8,6 @@ import pytest
 
 from tank2sim.cards import parse_card
 from tank2sim.cards.form import TankWalls
-from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME
 from tank2sim.dynamics.yaw_rig import SHIP_T1, UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.card import rig_card_text
@@ -23,6 +22,7 @@ from tank2sim.identification.yaw.identify import (
 from tank2sim.identification.yaw.intervals import intervals, known_work
 from tank2sim.marks import marked
 from tank2sim.records.yaw import read_yaw_record, yaw_record_text
+from tank2sim.records.yaw_programme import PAPER_PROGRAMME
 from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig, yaw_record
 from tank2sim.simulation.yaw_rig_control import TunedController
 from tests.marks import first_fast

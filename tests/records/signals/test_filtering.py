@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.records.signals.filtering import FilterType, butterworth, decimate, savitzky_golay, smoothing_spline
+from tank2sim.records.signals.filtering import (
+    FilterType,
+    butterworth,
+    decimate,
+    detrend,
+    savitzky_golay,
+    smoothing_spline,
+)
 from tank2sim.records.signals.requests import parse_filter
-from tank2sim.records.signals.trends import detrend
 from tests.records.signals.made import series, white
 
 STEP = 0.05

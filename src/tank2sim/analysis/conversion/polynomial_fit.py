@@ -23,7 +23,8 @@ import tomlkit
 from tank2sim.analysis.conversion.conventions import roll_in_file
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
-from tank2sim.cards.covariance import Covariance, not_referring, read_covariance
+from tank2sim.cards.covariance import Covariance, not_referring
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import parse_card
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
@@ -234,8 +235,7 @@ def _force_slopes(card: MmgCard, model: Model, motions: Array, numbers: Sequence
 
 
 def _forces_at(model: Model, motions: Array, inputs: Array, numbers: Sequence[str] = ()) -> Array:
-    """``force.X``, ``.Y``, ``.N`` and of a ship that rolls ``.K``, with their slopes by k parameters `numbers`
-    (3 or 4, 1 + k, n), SI; upright."""
+    """Forces of an upright ship (X, Y, N, and K if it rolls), SI, and slopes by k parameters: (3 or 4, 1 + k, n)."""
     names = [name for name in ("force.X", "force.Y", "force.N", "force.K") if name in model]
     forces = model.expand(ca.vcat([model.symbol(name) for name in names]))
     slopes = ca.jacobian(forces, ca.vcat([model.symbol(number) for number in numbers]))

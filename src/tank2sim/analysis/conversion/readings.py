@@ -30,7 +30,7 @@ import tomlkit
 from scipy.linalg import expm
 from scipy.stats import t as student
 
-from tank2sim.analysis.conversion.origin import shift_matrix, shifted_body
+from tank2sim.analysis.conversion.conventions import shift_matrix, shifted_body
 from tank2sim.analysis.guess.prior import rudder_by_rules
 from tank2sim.cards.card import scales_of_file
 from tank2sim.cards.coefficient_table import STATED_CONVENTIONS, CoefficientTable
@@ -74,8 +74,8 @@ _MOST_VANISHED = 3
 _FAR = 2.5
 """Standard deviations from which a tactical diameter speaks against a reading. Project choice."""
 _RUDDER_ERROR, _LEVER, _LEVER_ERROR = 0.6, 0.45, 0.1
-"""Of the rudder's sway force: standard deviation of the logarithm about that of a rudder by the rules; of its moment,
-lever over L and its standard deviation: 0.34 to 0.50 on the bundled ships. Project choices."""
+"""Rudder's sway force: standard deviation of its logarithm about the force of a rudder by the rules. Its moment: lever
+over L, 0.34 to 0.50 on the bundled ships, and standard deviation. Project choices."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def possible_readings(table: CoefficientTable) -> list[Reading]:
 
 
 _SIGNATURE = {"v": (1.0,), "r": (1.0,), "d": (2.0, 1.0)}
-"""Of a force that goes with u v, u r, u^2 delta, scaled with u0: coefficients of Du', Du'^2 over that of the term."""
+"""Coefficients of Du', Du'^2 over the term's own, of a force that goes with u v, u r, u^2 delta, scaled with u0."""
 _LEAST_SIGNATURE = 3
 """Shares from which the scale is judged. Project choice: one or two may agree by chance."""
 _SAME_SHARE = 0.02

@@ -68,10 +68,7 @@ def by_file_name(
 
 
 def _root(covariance: Array) -> Array:
-    """The symmetric root of the correlations times the errors (k, k): numbers differ by orders of magnitude.
-
-    It is unique. Eigenvectors alone have no sign: they, and the members with them, would depend on the processor.
-    """
+    """The symmetric root of the correlations times the errors (k, k); unlike eigenvectors it is unique."""
     errors = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(errors, errors))
     root: Array = errors[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)

@@ -59,7 +59,7 @@ class SwingError:
 class _Swing:
     label: str
     amplitudes: tuple[float, float, float]
-    """Of buoyancy (kg), pitch and roll (rad)."""
+    """Amplitudes of buoyancy (kg), pitch and roll (rad)."""
     error: Callable[[Trajectory, slice], float]
 
 

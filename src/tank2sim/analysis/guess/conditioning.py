@@ -237,8 +237,7 @@ def _refuse_impossible(figure: GivenFigure, prior: Array) -> None:
 def _refuse_contradiction(
     given: Sequence[GivenFigure], before: Mapping[str, Array], *, only_beyond: float = 0.0
 ) -> None:
-    """Refuse the figure that the others expect least, by the joint distribution of figures of the prior, if it is
-    further off than so many standard deviations."""
+    """Refuse the figure that the others expect least, by the prior's joint distribution, if it is too far off."""
     if len(given) < 2 and only_beyond:
         return
     logs = np.log(np.column_stack([before[figure.key] for figure in given]))

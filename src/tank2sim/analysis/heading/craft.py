@@ -201,10 +201,7 @@ def _effectiveness(card: CraftCard) -> Array:
 
 
 def _largest_moments(card: CraftCard, gives: Array, speed_mps: float) -> tuple[float, float]:
-    """Largest yaw moments to port (negative) and to starboard, N m, at any surge force that the thrusters can give.
-
-    The share of the surge force is that of the least squares of the thrusts, as the autopilot shares it out.
-    """
+    """Largest yaw moments to port (negative) and to starboard, N m, with the surge share of the least squares."""
     bounds = [tuple(map(float, thrust_limits(thruster, speed_mps))) for thruster in card.thrusters]
     if any(high <= 0 for _, high in bounds):
         problem = f"give no thrust ahead at {speed_mps:.4g} m/s"

@@ -41,7 +41,8 @@ from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
 INTEGRAL_SHARE = 0.25
-"""Of the integral line of sight: critically damped (:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
+"""Share of the integral in the line of sight: critically damped
+(:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
 
 _CHANGE_TIMES = 60
 """Length of a course change in 1/w, w = sqrt(K/T): six times the slowest placed mode.
@@ -359,10 +360,7 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
 ) -> tuple[tuple[LoopMargins, ...], list[str]]:
-    """Margins at the speed of the design and at five across the card's range, and notices of speeds without any.
-
-    The forces of a linear card are defined at its own speed: other speeds would repeat its margins.
-    """
+    """Margins at the speed of the design and at five across the card's range, and notices of speeds without any."""
     values = {parameter.name: parameter.start for parameter in ship.parameters}
     design_speed = values["ship.speed"] if speed is None else speed
     found, notices = [loop_margins(ship, design.autopilot, design_speed)], []

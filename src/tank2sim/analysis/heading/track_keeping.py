@@ -87,7 +87,6 @@ class TrackRun:
     trajectory: Trajectory
     time_s: Array
     leg: Array
-    along_share: Array
     error_m: Array
     figures: TrackKeeping
 
@@ -257,4 +256,4 @@ class _Sailed:
             largest_error_on_legs_m=float(later.max()),
             mean_error_at_end_m=float(error[last].mean()),
         )
-        return TrackRun(trajectory, time, leg, along, error, figures)
+        return TrackRun(trajectory, time, leg, error, figures)

@@ -256,13 +256,7 @@ class _Craft:
         return None
 
     def _solved(self, rates: Callable[[Array], Array], start: Array) -> Array:
-        """Where the accelerations vanish.
-
-        Raises
-        ------
-        InputError
-            Nowhere near the start.
-        """
+        """Where the accelerations vanish; refused if nowhere near the start."""
         found = root(rates, start)
         if not found.success and np.abs(found.fun).max() > _SMALL:
             problem = "has no steady motion with these thrusters"

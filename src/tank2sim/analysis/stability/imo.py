@@ -153,10 +153,7 @@ class _Trial:
 
 @dataclass(frozen=True)
 class _Worse:
-    """The worse figure of trials, None if they do not show it; a remark, and True if they left the card's range first.
-
-    An existing figure has a remark only if it is outside the card's range.
-    """
+    """The worse figure of trials (or None), its remark if outside the card's range, and whether they left it first."""
 
     value: float | None
     remark: str

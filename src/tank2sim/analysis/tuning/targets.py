@@ -60,8 +60,7 @@ def parse_target(text: str) -> Target:
 
 
 def _possible(kind: FigureKind, value: float) -> bool:
-    """True for a possible value of a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all
-    of its speed does not turn."""
+    """True for a possible value of a figure: sizes, times and rates are positive; a ship keeps some speed in a turn."""
     if kind.family == STRAIGHT or kind.name == "transfer_m":
         return True
     if kind.name == "steady_drift_deg":

@@ -343,8 +343,7 @@ def _with(z: Array, free: Slice, part: Array) -> Array:
 def _ends(
     parameter: CardParameter, size: float, within: float, stated: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Lowest and highest move of a parameter: as stated in the file's unit, or `within` standard errors; always within
-    the parameter's bounds."""
+    """Lowest and highest move of a parameter: as stated, or `within` standard errors; always within its bounds."""
     low, high = parameter.value - within * size, parameter.value + within * size
     if stated is not None:
         low, high = sorted(end / parameter.factor for end in stated)

@@ -231,13 +231,7 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = MEMBERS) -> CardCom
 
 
 def _craft_of(cards: Sequence[SteeredCard]) -> list[CraftCard]:
-    """The cards, if they are of craft of one size; none of ships.
-
-    Raises
-    ------
-    InputError
-        Ships and craft are mixed, or craft are not of one size.
-    """
+    """The cards, if they are of craft of one size; none of ships; a mixture is refused."""
     craft = [card for card in cards if isinstance(card, CraftCard)]
     for card in cards if craft else ():
         if isinstance(card, ManoeuvringCard):

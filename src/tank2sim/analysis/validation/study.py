@@ -367,11 +367,7 @@ def _between_repeats(whats: Sequence[Recorded]) -> dict[tuple[str, str], float]:
 
 
 def _read_again(what: Recorded, engine: Integrator) -> Numbers:
-    """Standard deviation of each E with added noise of the trial's signals, and other lags of a zigzag's reversals.
-
-    It is that of the measured figure and that of the simulated one, which begins at the measured state with the
-    measured rudder.
-    """
+    """Standard deviation of each E with added noise of the signals and other lags of a zigzag's reversals."""
     noise = record_noise(what.trial)
     errors = []
     for number in range(READINGS):

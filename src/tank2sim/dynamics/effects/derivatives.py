@@ -76,8 +76,7 @@ def _magnified(names: Iterable[str]) -> EffectEquations:
 
 
 def _by_speed(names: Iterable[str]) -> tuple[str, ...]:
-    """Terms that are these derivatives times a change of speed: Nru of Nr. A polynomial in u - u_0 holds with them what
-    the same water does at another speed."""
+    """Terms that are these derivatives times a change of speed (Nru of Nr): the same water at other speeds."""
     return tuple(name for base in names for power in ("u", "uu") if (name := base + power) in ALL_TERMS)
 
 

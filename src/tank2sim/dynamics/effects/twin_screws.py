@@ -69,10 +69,7 @@ def _with_separate_orders(model: Model, given: EffectSymbols, card: ManoeuvringC
 
 
 def _with_rudders(model: Model, given: EffectSymbols) -> Model:
-    """The model with a rudder to each side, whose gear is that of the model with an order of its own.
-
-    Its state is the angle that it has in addition to ``rudder.angle``, which moves both.
-    """
+    """A rudder to each side, with a gear as the model's and its angle in addition to ``rudder.angle`` as state."""
     common, rate = model["rudder.angle"], model["rudder.rate"]
     assert isinstance(common, State) and isinstance(rate, Quantity) and common.trim is not None
     order, expanded = model.symbol("rudder.command"), model.expand(rate.symbol)

@@ -1,7 +1,9 @@
-"""The base model of Poznyakov & Yudin: equation (1) of paper 4, and the further terms that its Table 2 names.
+"""The base model of Poznyakov & Yudin, equation (1) of paper 4 with the further terms of Table 2, and models like it.
 
     Y = -C_y^b beta - C_y^bb beta |beta| + C_y^w r + C_y^d delta
     N =  C_m^b beta - (C_m^w + C_m^bbw beta^2) r + C_m^d delta
+
+The models of Pavlenko and of Sobolev are printed in the same form, without coefficients; a card may give them.
 
 Table 2 varies three more coefficients of N. Their terms are not printed; read after their superscripts, and with the
 signs that their influence has in Table 2, they are -C_m^ww r |r| and -C_m^wwb beta r^2. A term in C_m^bb has no
@@ -65,3 +67,30 @@ BASE = SteeringForm(
     ),
 )
 """The base model."""
+
+_NOT_PRINTED = (
+    "the paper prints neither coefficients nor results of it: they agree worse with the trials, it says",
+    'it has "another set of terms in the right-hand sides" of (1); which ones is not printed, and (1) as printed '
+    "is used here in their place",
+)
+
+PAVLENKO = SteeringForm(
+    name="pavlenko",
+    title="model of Pavlenko",
+    source=f"{PAPER_4}, which names Pavlenko, V. G. (1991), Khodkost i upravlyaemost sudov, Transport, Moscow",
+    coefficients=EQUATION_1,
+    rates=equation_1,
+    missing=_NOT_PRINTED,
+)
+"""The model of Pavlenko."""
+
+SOBOLEV = SteeringForm(
+    name="sobolev",
+    title="model of Sobolev",
+    source=f"{PAPER_4}, which names Sobolev, G. V. (1976), Upravlyaemost korablya i avtomatizatsiya sudovozhdeniya, "
+    "Sudostroenie, Leningrad",
+    coefficients=EQUATION_1,
+    rates=equation_1,
+    missing=_NOT_PRINTED,
+)
+"""The model of Sobolev."""

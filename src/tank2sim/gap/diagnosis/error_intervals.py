@@ -9,14 +9,13 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.diagnosis.exceedance_runs import exceedance_intervals
 from tank2sim.gap.diagnosis.kinematic_consistency import (
     CONTRADICTED,
     kinematic_consistency,
     readable,
     recorded_earth_velocity,
 )
-from tank2sim.gap.diagnosis.misfit_location import CLEAR, STATE_BINS, by_significance
+from tank2sim.gap.diagnosis.misfit_location import CLEAR, STATE_BINS, by_significance, exceedance_intervals
 from tank2sim.gap.result import Acting, Gap, MissingForce, MissingSignal, Passed
 
 SPAN = 84

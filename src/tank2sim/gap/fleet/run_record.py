@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tank2sim import __version__
 from tank2sim.errors import InputError
 from tank2sim.gap.fleet.ships import ShipFolder
 from tank2sim.gap.workflow import GapOptions
+from tank2sim.version import __version__
 
 RUN = "run.json"
 """File next to ``gap.json``."""

@@ -284,11 +284,7 @@ class Hypothesis:
         }
 
     def _states_behind(self, name: str) -> tuple[int, ...]:
-        """Indices of the states through which alone an input acts on the ship: these are delayed.
-
-        A gear at its largest rate responds to a step of the order at once or a whole sample later, never
-        between them; its angle can be delayed by any time.
-        """
+        """Indices of the states through which alone an input acts on the ship: these are delayed."""
         if name != "rudder.command" or "rudder.angle" not in self.unmeasured:
             return ()
         behind = {"rudder.angle"}

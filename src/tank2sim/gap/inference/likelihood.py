@@ -458,10 +458,7 @@ class Likelihood:
         return cost
 
     def _informative(self, fit: ExplanationFit, linear: Linear, columns: FilterColumns) -> FilterColumns:
-        """The columns with only those combinations of the coefficients that the trials determine better than the prior.
-
-        A rotation of the combinations leaves them as independent beforehand as the coefficients were.
-        """
+        """The columns with only the combinations of coefficients that the trials determine better than the prior."""
         seen, k = self._observer(linear, fit), columns.parameter_count
         flat = seen.whiten(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])[:, 1 + k :]
         gram, count = flat.T @ flat, columns.coefficient_count

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.files import plain_json
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.gap.outcome.lacking import missing_as_json
-from tank2sim.gap.outcome.usual_sizes import hidden_effects_caution
 from tank2sim.gap.proof.cross_check import proof_cautions
-from tank2sim.gap.result import Gap, Named, NextTest, Passed, Refitted
+from tank2sim.gap.result import NO_EFFECT_MISSING, Gap, Named, NextTest, Passed, Refitted
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
@@ -36,6 +36,10 @@ _REPLAY_SAMPLES = 140
 """Samples of a trial in the JSON, without extremes: as many as its line in a small panel has."""
 
 _IN_FILE = {"rad": "deg", "radps": "degps"}
+
+MANY_HIDDEN = 0.25
+"""Share of the effects that would not show at their usual size, from which "no missing effect" says little (project
+choice: of varied manoeuvres a tenth does not show, of the first 50 s of one turn two fifths, of 10 s nearly all)."""
 
 
 def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -318,8 +322,7 @@ def _replay(replay: Passed, file: str) -> dict[str, object]:
 
 
 def _drawn_rows(replay: Passed) -> Indices:
-    """Instants that are kept of a trial: evenly spread ones, as many of each signal that is measured seldom, and the
-    extremes of each signal and of simulated less measured."""
+    """Instants of a trial that are kept: evenly spread ones, those of seldom measured signals, and all extremes."""
     kept = even = thin_points([replay.time_s], _REPLAY_SAMPLES)
     for variable in measured_in(replay):
         measured = replay.measured[variable]
@@ -357,3 +360,22 @@ def _time(value: float) -> float | None:
 
 def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
+
+
+def hidden_effects_caution(gap: Gap) -> tuple[str, ...]:
+    """Number of effects that would not show at their usual size, if none is missing and these are many; else empty."""
+    if gap.verdict != NO_EFFECT_MISSING:
+        return ()
+    known = [
+        hidden for name, sizes in gap.could_hide.items() if (hidden := _is_hidden(gap.card, name, sizes)) is not None
+    ]
+    if not known or sum(known) <= MANY_HIDDEN * len(known):
+        return ()
+    return (f"{sum(known)} of {len(known)} effects would not show in these data at their usual size",)
+
+
+def _is_hidden(card: ManoeuvringCard, name: str, sizes: Mapping[str, float]) -> bool | None:
+    """Whether an effect would not show at its usual size in any of its amplitudes; None without a usual size."""
+    typical = {parameter.name: parameter.typical_values(card) for parameter in EFFECTS[name].parameters}
+    pairs = [(size, max(map(abs, typical[key]))) for key, size in sizes.items() if typical[key]]
+    return all(size >= usual for size, usual in pairs) if pairs else None

@@ -40,8 +40,8 @@ DECIDES = 10.0
 """Gain of the score that decides, as for naming an effect."""
 
 AS_GOOD = 0.9
-"""Of manoeuvres with this share of the best score the first in the list is chosen: standard ones are listed first
-(project choice)."""
+"""The first listed manoeuvre with this share of the best score is chosen: standard ones are listed first (project
+choice)."""
 
 READ_S = 1.0
 """Readings are compared this far apart, s; the errors of nearer ones are taken as equal (project choice)."""
@@ -397,11 +397,7 @@ class SailedShip:
         return states
 
     def _variations(self) -> tuple[list[dict[str, float]], Array, Array]:
-        """Changes of variables by name, shares of a standard deviation, changes of the first state (rows, nx).
-
-        First none, then the explanation's unknowns and the clock of the orders, then the window's: the instants of its
-        orders, its first motion and disturbances.
-        """
+        """Changes of variables (in standard deviations) and of the first state (rows, nx); none in the first row."""
         changes: list[dict[str, float]] = [{}]
         shares, first = [1.0], [np.zeros(len(self.model.states))]
         for axis in self.axes.T:

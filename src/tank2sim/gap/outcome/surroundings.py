@@ -107,8 +107,7 @@ def _slopes_in_errors(
 
 
 def _with_parts_as_states(model: Model, effects: Sequence[str], typical: Array) -> Model:
-    """The model with the parts (2 m,) along north and east of each of m winds or currents as its last states, which
-    never change and begin at 0, with their `typical` sizes; its inputs of them act on nothing."""
+    """The model with the parts (2 m,) north and east of m winds or currents as its last, constant states."""
     values: dict[str, ca.SX] = {}
     for effect, speed in zip(effects, typical[::2], strict=True):
         names = EFFECTS[effect].model_names()

@@ -68,7 +68,7 @@ class Proof:
 
     @property
     def misfit(self) -> float:
-        """Of the fitted trials with the improved card, noise units."""
+        """Misfit of the fitted trials with the improved card, noise units."""
         return misfit_of(self.results, "after", held_out=False)
 
     @property
@@ -142,8 +142,7 @@ class Prover:
     def _in_surroundings(
         self, card: ManoeuvringCard, named: NamedEffects
     ) -> tuple[tuple[Measured, Measured], NamedEffects]:
-        """The trials in the winds and currents that were found for them, and those, with the ones of the trials held
-        out."""
+        """The trials in the winds and currents found for them, and those, with the ones of the trials held out."""
         if not named.by_trial:
             return self.trials, named
         fitted, held = self.trials
@@ -160,7 +159,7 @@ def most_are_closer(before: Sequence[Passed], after: Sequence[Passed]) -> bool:
 
 
 def sensor_faults(estimated: Sequence[Found]) -> list[Found]:
-    """Those of some effects that falsify what is measured, not what the ship does."""
+    """The effects that falsify measurements, not the motion of the ship."""
     return [effect for effect in estimated if EFFECTS[effect[0]].acts_on == "sensor"]
 
 

@@ -163,8 +163,7 @@ class Judge:
         return proof.misfit < max((1 + BETTER) * self._of(search.none).misfit, NEAR_NOISE)
 
     def _coefficients_do_as_well(self, search: Search, judged: Judged) -> bool:
-        """Whether the trials are followed as closely without a name whose score is not far ahead, by a coefficient that
-        is far off."""
+        """Whether a coefficient far off follows the trials as closely as a name with a score not far ahead."""
         if search.none.score - judged.decision.best.score >= DECISIVE or search.none in judged.decision.alike:
             return False
         alone = self._of(search.none)

@@ -396,10 +396,7 @@ class Replayer:
     def _least_squares_start(
         self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None, *, wrong: bool
     ) -> tuple[Array, float]:
-        """Initial state by Gauss-Newton, and its misfit: inf where the motion exceeds all bounds.
-
-        Derivatives are differences: an effect need not be smooth.
-        """
+        """Initial state by Gauss-Newton with differences, and its misfit: inf where the motion exceeds all bounds."""
         guess, spread = self.guess_initial_state(record, sigma, p), _first_state(self, record, sigma, p)[1]
         known = ~np.isnan(record.readings)
         column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
@@ -542,11 +539,7 @@ def later(values: Array, steps: float) -> Array:
 
 
 def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array) -> tuple[Array, Array]:
-    """State read off the first seconds of a record, and how far to trust it (nx,) each.
-
-    A straight line through :data:`FIRST` L/u0 of each signal; a speed or heading that was not measured is that of the
-    track. States that were not measured have the model's start, within a nominal value.
-    """
+    """State read off the first :data:`FIRST` L/u0 of a record by straight lines, and how far to trust it (nx,) each."""
     model, step = replayer.model, record.every * record.step_s
     n = max(3, round(FIRST * INSTANTS))
     readings = zip(replayer.seen, record.readings[:n].T, sigma, strict=True)

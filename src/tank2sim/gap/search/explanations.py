@@ -152,8 +152,7 @@ def search(
 
 
 def _about_best(fitting: Fitting) -> Fitting:
-    """The explanations so far, fitted again about the motion of the best: its residual is small. "None" is scored about
-    the same motion."""
+    """All explanations, and "none", fitted again about the motion of the best, whose residual is small."""
     best, none = fitting.best(), fitting.found[()]
     kept = [fit for fit in fitting.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     likelihood = fitting.likelihood.about(best)
@@ -245,12 +244,7 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
 
 
 def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
-    """More effects on top of the best pair, one at a time, as long as the last one gained :data:`WORTH`; and the sets
-    without each of the others.
-
-    Without the further ones the coefficients of the card take their place: all are then believed to be wronger than
-    they are.
-    """
+    """More effects on the best pair while each gains :data:`WORTH`, and the sets without each of the others."""
     for count in range(2, most):
         best = fitting.best()
         if len(best.hypothesis.effects) < count:
@@ -265,11 +259,7 @@ def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
 
 
 def _fit_more(fitting: Fitting, best: ExplanationFit, every: Sequence[Variant]) -> None:
-    """The best with each of the effects that the screen proposes on top of it.
-
-    Where it needs coefficients that are off by more than their standard errors, the screen is asked again with narrow
-    ones: wide ones hide what acts as they do.
-    """
+    """The best with each effect that the screen proposes; asked again with narrow coefficients where those are off."""
     _fit_near(fitting, _on_top_of(fitting, best, every)[:WITH_THE_BEST], best)
     if best.width > 1.0:
         narrow = replace(best, logs=np.append(best.logs[:-1], np.log(NARROW)))
@@ -368,10 +358,7 @@ def _proposals(
     least: int = 0,
     limit: float = np.inf,
 ) -> list[Proposal]:
-    """Proposals with a sufficient gain that were not fitted yet; the first `least` of them in any case.
-
-    None holds two forms of one effect.
-    """
+    """Proposals not fitted yet with a sufficient gain, or among the first `least`; no two forms of one effect."""
     proposals: dict[tuple[str, ...], Proposal] = {}
     for place, proposed in enumerate(screened):
         if any(name in EFFECTS[other].includes for other in proposed.thetas for name in proposed.thetas):

@@ -308,8 +308,7 @@ def _is_within_the_card(larger: ExplanationFit, best: ExplanationFit) -> bool:
 
 
 def _share(larger: ExplanationFit, smaller: ExplanationFit) -> float:
-    """Share of the whole gain that effects which a smaller explanation lacks must have, where they look like others of
-    the larger one."""
+    """Share of the gain by effects that a smaller explanation lacks and that look like others of the larger one."""
     kinds = {name: EFFECTS[name].looks_like for name in larger.hypothesis.effects}
     alike = [
         kind
@@ -367,8 +366,7 @@ def _change(fit: ExplanationFit, name: str) -> float:
 
 
 def _change_of_gear(fit: ExplanationFit, name: str) -> float:
-    """Change of the card's steering-gear data for the worse, in their standard errors; infinite if the card states
-    none. A gear that is better than the card states is not a fault of the gear."""
+    """Change of the card's steering-gear data for the worse, in standard errors; infinite if the card states none."""
     ((_, values, _),) = [found for found in estimates(fit) if found[0] == name]
     ((key, value),) = values.items()
     worse = next((parameter.worse for parameter in EFFECTS[name].parameters if parameter.name == key), 0)

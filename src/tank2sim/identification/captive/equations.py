@@ -219,11 +219,7 @@ def _known_by(campaign: Campaign, names: Sequence[str]) -> list[Hashable]:
 def _projected_terms(
     campaign: Campaign, run: ReducedRun, force: str, names: Sequence[str], keys: Sequence[Hashable]
 ) -> Array:
-    """Mean and harmonics of each term whose prime value is 1, and of :func:`rigid_body_force`; N or N m.
-
-    They are (regressed, names + 1). A term of N has those of Y with a lever of L; what is known of the motion already
-    is not projected again.
-    """
+    """Mean and harmonics (regressed, names + 1) of each term of prime value 1 and of the rigid body; N or N m."""
     known = run.motion.projections
     *of_terms, body = keys
     histories = {

@@ -14,8 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.alignment import AlignmentEstimate, alignment_estimate
-from tank2sim.identification.captive.contradictions import contradicted
+from tank2sim.identification.captive.consistency import Asymmetry, asymmetry, contradicted
 from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import SPEED_RANGE
 from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
@@ -28,7 +27,7 @@ from tank2sim.identification.captive.oscillation import (
 )
 from tank2sim.identification.captive.regression import Solution, efficient_solution, solve
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
-from tank2sim.identification.captive.selection import Selection, select
+from tank2sim.identification.captive.selection import Selection, Trend, select, trends
 from tank2sim.identification.captive.stepwise import (
     Disagreement,
     Stepwise,
@@ -36,7 +35,6 @@ from tank2sim.identification.captive.stepwise import (
     scatter_within_tests,
     stepwise,
 )
-from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
 from tank2sim.identification.captive.systematic import (
     DelayEstimate,
     SystematicError,
@@ -46,8 +44,12 @@ from tank2sim.identification.captive.systematic import (
     gauge_gains,
 )
 from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
-from tank2sim.identification.captive.trends import Trend, trends
-from tank2sim.identification.captive.type_b import type_b_shifts, with_common_error
+from tank2sim.identification.captive.type_b import (
+    AlignmentEstimate,
+    alignment_estimate,
+    type_b_shifts,
+    with_common_error,
+)
 from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
@@ -279,10 +281,7 @@ def _refuse_impossible_body(campaign: Campaign) -> None:
 
 
 def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
-    """Refuse a towed model that the water pushes ahead: its X gauge is reversed.
-
-    With a negative added mass the signs of all forces are in doubt, and a warning states it.
-    """
+    """Refuse a towed model that the water pushes ahead: its X gauge is reversed."""
     found = derivatives.get("X0")
     reversed_forces = "Yvdot" in derivatives and derivatives["Yvdot"].value > 0
     if found is None or not is_resistance(campaign) or reversed_forces:

@@ -240,8 +240,7 @@ def fitted_spread(equations: CampaignEquations, *, by_type: bool = True) -> Spre
 
 
 def _best(equations: CampaignEquations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
-    """The likeliest spread without gain errors, with a zero variance for each type of run in `start` (one type, "":
-    all), and -2 log of its likelihood."""
+    """Likeliest spread without gain errors, zero variances by type in `start` ("": all), and -2 log likelihood."""
     kinds, variances = list(start), np.array([*start.values()])
     types = [run.run.type for run in equations.runs]
     of_run = np.array([kinds.index(kind) if kind in start else -1 for kind in types]) if "" not in start else None
@@ -302,7 +301,7 @@ class _ZeroLikelihood:
 
     @classmethod
     def of(cls, equations: CampaignEquations) -> _ZeroLikelihood:
-        """That of the equations of a campaign."""
+        """The likelihood of the equations of a campaign."""
         columns = np.column_stack([equations.design, equations.values])
         sizes = equations.zero_sizes
         along = equations.run_sums(equations.zero[:, None] * columns) / np.sqrt(sizes)[:, None]

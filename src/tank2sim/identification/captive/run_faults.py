@@ -223,10 +223,7 @@ def _usually_noisy(campaign: Campaign, force: str) -> bool:
 
 
 def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
-    """A plateau at the top or bottom of a record: many equal readings in a row, and none beyond.
-
-    A gauge with a few levels only is coarse, and its outermost level may be the usual one.
-    """
+    """A plateau at the top or bottom of a record: many equal readings and none beyond; no coarse gauge."""
     values = run.force(force)
     fewest = max(6, 0.01 * len(values))
     if all(np.count_nonzero(values == extreme) < fewest for extreme in (values.max(), values.min())):
@@ -253,12 +250,7 @@ def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
 
 
 def _step(run: ReducedRun, force: str, basis: Array) -> tuple[float, float, float] | None:
-    """Time, size and ratio to its standard error of a step in the mean of a residual; None if there is none.
-
-    `basis` is that of the fit of the forces.
-
-    A step must be significant with and without a fitted linear drift of the zero: slow noise seldom is in both.
-    """
+    """Time, size, ratio to its error of a step in a residual's mean, significant with and without drift; else None."""
     if len(basis) < 40:
         return None
     steady = [place for place, label in enumerate(run.labels) if label != "trend"]
@@ -270,10 +262,7 @@ def _step(run: ReducedRun, force: str, basis: Array) -> tuple[float, float, floa
 
 
 def _largest_step(record: Array, basis: Array) -> tuple[int, float, float]:
-    """Row, size and ratio of the likeliest step in addition to the columns of a basis.
-
-    It is fitted together with them, at the row of the largest cumulative sum of the residuals.
-    """
+    """Row, size and ratio of the likeliest step, fitted with the columns of a basis at the largest cumulative sum."""
     count = len(record)
     gram = basis.T @ basis
     residual = record - basis @ np.linalg.solve(gram, basis.T @ record)

@@ -1,17 +1,17 @@
 """Selection of the terms of (3.8) that a campaign determines, with the reason for every omitted term.
 
 Every term that the campaign excites and can distinguish is in the regression, third-order terms with a prior about zero
-(:mod:`tank2sim.identification.captive.prior`). The report of a term depends on the design of the tests and never on its
-value: omission of a term because it does not differ from zero would state that it is exactly zero, and would change
-every manoeuvre that needs it. Reported are the linear terms, the acceleration derivatives, X0, and every other term on
-which the tests have more information than the prior: at large angles with a small standard error, at small angles with
-a large one. A term that is not reported still contributes to the standard errors of the other terms.
+(:func:`with_prior`). The report of a term depends on the design of the tests and never on its value: omission of a term
+because it does not differ from zero would state that it is exactly zero, and would change every manoeuvre that needs
+it. Reported are the linear terms, the acceleration derivatives, X0, and every other term on which the tests have more
+information than the prior: at large angles with a small standard error, at small angles with a large one. A term that
+is not reported still contributes to the standard errors of the other terms.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 from tank2sim.cards.terms import Term, parse_term
 from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations, candidate_terms, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.prior import with_prior
+from tank2sim.identification.captive.oscillation import distinct
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.records.campaigns import Campaign
@@ -31,6 +31,27 @@ at least as much as the prior of known ships (1/s^2 - 1 >= 1) and determine the 
 
 _NORMAL = 1.959964
 """Standard errors of a two-sided 95 % interval of the normal distribution."""
+
+_SHOWN_SLOPE = 3.5
+"""Standard errors of a significant slope: with eight slopes in a campaign chance reaches it once in 250."""
+_FEWEST_FREQUENCIES = 3
+
+RATIOS: Mapping[str, tuple[str, float]] = {
+    "vvv": ("v", 10.0),
+    "vvr": ("v", 25.0),
+    "vrr": ("v", 10.0),
+    "rrr": ("v", 1.0),
+    "ddd": ("d", 1.0),
+    "vvd": ("d", 6.0),
+    "vdd": ("d", 2.0),
+    "rdd": ("d", 2.0),
+    "rrd": ("d", 2.0),
+    "vrd": ("d", 6.0),
+}
+"""Powers of a term of Y or N to the linear term of the ratio, and the standard deviation of the ratio (prime).
+
+Round figures, above the largest of the Mariner (Chislett & Strom-Tejsen 1965: Yvvv/Yv 7.0, Yvvr/Yv 13, Nvvr/Nv 21,
+Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Other terms are free."""
 
 
 @dataclass(frozen=True)
@@ -211,3 +232,112 @@ def _simplicity(name: str) -> tuple[int, ...]:
 def usual_zero(full: CampaignEquations) -> float:
     """Zero error that gives all means similar weights, so that only the tests determine the distinguishable terms."""
     return float(np.median([root[0, 0] for root in full.roots])) ** 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trend:
+    """Trend of one term with frequency.
+
+    Parameters
+    ----------
+    name : str
+        The term.
+    slope, standard_error : float
+        Change of its prime value by (omega L/U)^2.
+    at_zero, error_at_zero : float
+        Its value extrapolated to zero frequency, with this slope in the regression.
+    used : bool
+        True for a significant slope: the result's value is that at zero frequency.
+    """
+
+    name: str
+    slope: float
+    standard_error: float
+    at_zero: float
+    error_at_zero: float
+    used: bool
+
+
+def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[Trend, ...]]:
+    """The selection with the significant trends with frequency among its terms, and all trends that can be estimated.
+
+    For slow motions damping and added mass are even functions of the frequency: value at zero plus a slope times
+    (omega L/U)^2. A significant trend stays in the regression, so that the value of its term is the one at zero
+    frequency; static tests, which are at zero frequency, take part.
+    """
+    used = selection.equations
+    candidates = [
+        name
+        for motion, kind in (("v", "pure_sway"), ("r", "pure_yaw"))
+        if distinct([run.motion.frequency_radps for run in used.runs if run.run.type == kind]) >= _FEWEST_FREQUENCIES
+        for name in (f"{used.force}{motion}", f"{used.force}{motion}dot")
+        if name in used.names
+    ]
+    if not candidates:
+        return selection, ()
+    full = campaign_equations(campaign, used.runs, used.force, [*used.names, *map(_slope, candidates)]).held(used.prior)
+    names = list(used.names)
+    shown: list[str] = []
+    while True:
+        found = [_trend(full, names, name, selection) for name in candidates if name not in shown]
+        messages = [trend for trend in found if trend is not None]
+        best = max(messages, key=_ratio, default=None)
+        if best is None or _ratio(best) < _SHOWN_SLOPE:
+            break
+        shown.append(best.name)
+        names.append(_slope(best.name))
+    if not shown:
+        return selection, tuple(messages)
+    chosen = [
+        Choice(_slope(name), True, "trend", f"{name} changes with the frequency; its value is that at zero frequency")
+        for name in shown
+    ]
+    widened = full.of_terms(names)
+    result = replace(selection, equations=widened, spread=fitted_spread(widened), choices=(*selection.choices, *chosen))
+    kept = [_trend(full, [term for term in names if term != _slope(name)], name, result) for name in shown]
+    return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *messages)
+
+
+def _slope(name: str) -> str:
+    return f"{name} w2"
+
+
+def _trend(full: CampaignEquations, names: Sequence[str], name: str, selection: Selection) -> Trend | None:
+    """The trend of one term next to the named terms; None if the runs cannot distinguish it from them."""
+    part = full.of_terms([*names, _slope(name)])
+    solution = solve(part, selection.spread)
+    if solution.condition > COLLINEAR:
+        return None
+    return Trend(
+        name=name,
+        slope=float(solution.values[-1]),
+        standard_error=float(solution.standard_errors[-1]),
+        at_zero=solution.value(name),
+        error_at_zero=solution.error(name),
+        used=False,
+    )
+
+
+def _ratio(trend: Trend) -> float:
+    return abs(trend.slope) / max(trend.standard_error, 1e-300)
+
+
+def with_prior(equations: CampaignEquations, spread: Spread) -> CampaignEquations:
+    """The equations with the prior of third-order terms of Y and N, scaled by the estimated linear terms.
+
+    Small angles do not show the third order. Dropping a term that does not differ from zero would state that it is
+    zero, and would make its linear term look more accurate than it is (post-selection inference; Leeb & Pötscher 2005,
+    Econometric Theory 21). A free term would extrapolate noise at 10 degrees of rudder to 35. Therefore every term that
+    the campaign can distinguish stays in the regression with a wide prior about zero: its ratio to the linear term of
+    the same force has the standard deviation of the ratios of known ships. The prior does not move terms that the tests
+    determine; the card has no others.
+    """
+    found = solve(equations, spread)
+    held = {}
+    for name in equations.names:
+        reference, ratio = RATIOS.get(name[1:], ("", math.inf))
+        linear = name[0] + reference
+        if name[0] in "YN" and linear in equations.names:
+            size = max(abs(found.value(linear)), found.error(linear))
+            held[name] = ratio * size
+    return equations.held(held)

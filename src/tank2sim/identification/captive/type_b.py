@@ -7,10 +7,11 @@ Different errors are independent and add in squares.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations
 from tank2sim.identification.captive.harmonics import ReducedRun
@@ -18,6 +19,13 @@ from tank2sim.identification.captive.motion import CaptiveMotion
 from tank2sim.identification.captive.regression import Solution, solve
 from tank2sim.identification.captive.systematic import correct_delay
 from tank2sim.records.campaigns import Campaign
+
+_SHOWN = 4.0
+"""Standard errors of an angle that is shown: by chance once in 16 000 campaigns."""
+_SMALL_RAD = 1e-4
+"""Turn by which the slope is found: far below any angle that matters, far above rounding."""
+_ALIKE = 0.01
+"""Probability of the difference of the two angles below which they are not one angle. Project choice."""
 
 
 def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solution) -> dict[str, dict[str, float]]:
@@ -86,3 +94,63 @@ def _model(campaign: Campaign, key: str, factor: float) -> Campaign:
 def _scaled(run: ReducedRun, factor: float) -> ReducedRun:
     fits = {force: replace(fit, coefficients=fit.coefficients * factor) for force, fit in run.fits.items()}
     return replace(run, fits=fits)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlignmentEstimate:
+    """The angle by which the true drift exceeds the recorded one, rad.
+
+    Parameters
+    ----------
+    angle_rad, standard_error_rad : float
+        Weighted mean of that by Y0 and that by N0.
+    by_force : mapping
+        ``Y`` and ``N`` to angle and standard error.
+    chance : float
+        Probability of so large a difference of the two.
+    """
+
+    angle_rad: float
+    standard_error_rad: float
+    by_force: Mapping[str, tuple[float, float]]
+    chance: float
+
+    @property
+    def shown(self) -> bool:
+        """The angle is not zero, and Y0 and N0 agree on it."""
+        return abs(self.angle_rad) > _SHOWN * self.standard_error_rad and self.chance > _ALIKE
+
+
+def alignment_estimate(
+    campaign: Campaign, equations: Mapping[str, CampaignEquations], solutions: Mapping[str, Solution]
+) -> AlignmentEstimate | None:
+    """The zero of the drift angle by the side force and moment at zero drift; None without Y0, Yv, N0 or Nv.
+
+    A symmetric model that is turned by a small angle eps against the recorded drift has Y0 = -Yv eps and N0 = -Nv eps,
+    and terms such as Yvrr eps r^2 that the regression takes for more of both: their size is found by turning the
+    recorded drift and solving again. Y0 and N0 then give the same angle. A single screw or a bent hull has another
+    ratio of Y0 and N0, except by chance.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    equations, solutions : mapping
+        ``Y`` and ``N`` to the equations of that force and their solution.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for force in "YN":
+        solution, zero = solutions[force], f"{force}0"
+        if not {zero, f"{force}v"} <= set(solution.names):
+            return None
+        turned = with_common_error(campaign, equations[force], "alignment_rad", _SMALL_RAD)
+        slope = (solve(turned, solution.spread).value(zero) - solution.value(zero)) / _SMALL_RAD
+        if not slope:
+            return None
+        found[force] = (-solution.value(zero) / slope, solution.error(zero) / abs(slope))
+    weights = {force: error**-2.0 for force, (_, error) in found.items()}
+    total = sum(weights.values())
+    mean = sum(weights[force] * angle for force, (angle, _) in found.items()) / total
+    scatter = sum(weights[force] * (angle - mean) ** 2 for force, (angle, _) in found.items())
+    return AlignmentEstimate(
+        angle_rad=mean, standard_error_rad=total**-0.5, by_force=found, chance=float(chdtrc(1, scatter))
+    )

@@ -1,12 +1,17 @@
-"""All physics warnings on a captive campaign: on its test conditions, and on its derivatives."""
+"""All physics warnings on a captive campaign: on its test conditions, and on its derivatives (prime, starboard)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.plausibility import (
     ADDED_MASSES,
+    DEEP_ADDED_SHARES,
+    LEVERS,
+    YAW_DAMPING,
     Caution,
     added_masses,
     levers,
@@ -14,7 +19,6 @@ from tank2sim.cards.plausibility import (
     yaw_damping,
     yaw_force,
 )
-from tank2sim.identification.captive.plausibility import force_convention, foreign_units
 from tank2sim.identification.captive.tank_conditions import (
     LEAST_DEPTH_RATIO,
     CarriedBody,
@@ -34,6 +38,34 @@ from tank2sim.identification.captive.tank_conditions import (
 from tank2sim.records.campaigns import Campaign
 
 __all__ = ["Caution", "OscillationMotion", "body_of", "cautions_of_result", "cautions_of_test"]
+
+ADDED_SHARE = (0.1, 3.0)
+"""Range of added mass over mass, and of added yaw inertia over yaw inertia; about 0.9 and 0.7 are usual."""
+
+FORCE_UNITS = {"kgf": 9.80665, "lbf": 4.4482216, "kN": 1000.0, "gf": 9.80665e-3}
+"""Newtons in other units of force."""
+
+MOMENT_UNITS = {
+    "kgf m": 9.80665,
+    "lbf ft": 1.3558179,
+    "kN m": 1000.0,
+    "kgf cm": 9.80665e-2,
+    "lbf in": 0.11298483,
+    "N cm": 1e-2,
+    "N mm": 1e-3,
+    "gf cm": 9.80665e-5,
+}
+"""Newton metres in other units of moment."""
+
+SWAY_DAMPING = (0.4, 2.5)
+"""Range of Y_v' over the estimate of Clarke, Gedling and Hine (1983), -pi (d/L)^2 (1 + 0.4 C_B B/d): 0.8 (KVLCC2) and
+1.0 (Mariner). Project choice: lbf make it 0.2, kgf 0.1."""
+
+_USUAL = {"Yvdot": 0.9, "Yv": 1.0, "Nrdot": 0.8, "Nr": 0.3, "Nv": 0.3, "Nd": -0.47}
+"""Usual shares and levers, by which the likeliest of several units is chosen: the ships of the ranges above."""
+
+_USUAL_BLOCK = 0.7
+"""Block coefficient of the estimate of Y_v. Project choice: 0.5 to 0.85 change it by 20 %."""
 
 
 def cautions_of_test(
@@ -120,3 +152,121 @@ def _numbers(campaign: Campaign) -> dict[str, float | None]:
 def _card_numbers(ship: ManoeuvringCard) -> dict[str, float | None]:
     body = ship.rigid_body
     return {"m'": body.mass, "J_z'": body.yaw_inertia, "x_G'": body.x_G, "z_G'": None}
+
+
+def force_convention(
+    derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float, convention: str
+) -> Iterator[Caution]:
+    """Added masses that no body has, and whether the opposite sign of the forces would correct them.
+
+    Parameters
+    ----------
+    derivatives : mapping
+        Prime values; Yvdot and Nrdot are checked.
+    mass_prime, inertia_prime : float
+        m' and J_z'. With forces of the wrong sign Y_vdot comes out as 2 m' - Y_vdot and N_rdot as 2 J_z' - N_rdot,
+        by (4.4) of paper 2 and its equivalent for yaw.
+    convention : str
+        ``force_convention`` of the campaign.
+    """
+    inertias = ((mass_prime, "mass"), (inertia_prime, "yaw inertia"))
+    for name, (inertia, what) in zip(ADDED_MASSES, inertias, strict=True):
+        value = derivatives.get(name)
+        if value is not None and value > 0:
+            message = f"{name} is {value:.3g}: the added {what} is negative"
+            if value >= inertia:
+                message += f", and with that of the model ({inertia:.3g}) the whole is too"
+            yield Caution("force convention", f"{message}; {_likely_cause(value, inertia, convention)}.")
+
+
+def foreign_units(
+    derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float | None, removed: bool, body: CarriedBody
+) -> Iterator[Caution]:
+    """Other units of force and moment, with which derivatives that no ship has become those of one, in deep water.
+
+    Parameters
+    ----------
+    derivatives : mapping
+        Prime values; with a unit that is k newtons Y_v is k times as large, Y_vdot is m' - k (m' - Y_vdot).
+    mass_prime, inertia_prime : float
+        m' and J_z', None if unknown.
+    removed : bool
+        The forces were recorded without the inertia of the model.
+    body : CarriedBody
+        Its length, beam and draught scale the estimates.
+    """
+    length, beam, draught = body.length_m, body.beam_m, body.draught_m
+    slender = math.pi * (draught / length) ** 2 if draught else 0.0
+    sway = slender * (1.0 + 0.4 * _USUAL_BLOCK * beam / draught) if draught and beam else 0.0
+    inertias = {"Yvdot": mass_prime, "Nrdot": inertia_prime or 0.0}
+    carried = {} if removed else {**inertias, "Nr": mass_prime * body.x_G_m / length}
+    units = {**inertias, "Yv": sway, "Nr": slender}
+    ranges = {**DEEP_ADDED_SHARES, "Yv": SWAY_DAMPING, "Nr": YAW_DAMPING}
+
+    def sizes(names: Sequence[str], factor: float) -> dict[str, float]:
+        found = {}
+        for name in names:
+            if derivatives.get(name) and units[name]:
+                own = carried.get(name, 0.0)
+                found[name] = (factor * (own - derivatives[name]) - own) / units[name]
+        return found
+
+    def moments(factor: float, force: float) -> dict[str, float]:
+        found = sizes(("Nrdot", "Nr"), factor)
+        for moment, against, _, _ in LEVERS:
+            if derivatives.get(moment) and derivatives.get(against):
+                found[moment] = factor * derivatives[moment] / (force * derivatives[against])
+        return found
+
+    def of_a_ship(found: Mapping[str, float]) -> bool:
+        limits = {**ranges, **{moment: limit for moment, _, limit, _ in LEVERS}}
+        return all(limits[name][0] <= value <= limits[name][1] for name, value in found.items())
+
+    def nearest(candidates: Mapping[str, float], found: Callable[[float], Mapping[str, float]]) -> str:
+        fitting = {name: found(factor) for name, factor in candidates.items() if of_a_ship(found(factor))}
+        return min(
+            fitting,
+            key=lambda name: sum(math.log(value / _USUAL[each]) ** 2 for each, value in fitting[name].items()),
+            default="",
+        )
+
+    forces = partial(sizes, ("Yvdot", "Yv"))
+    force, moment = "", ""
+    if not of_a_ship(forces(1.0)):
+        force = nearest(FORCE_UNITS, forces)
+        if not force:
+            return
+    factor = FORCE_UNITS.get(force, 1.0)
+    if force or not of_a_ship(moments(1.0, factor)):
+        candidates = {"N m": 1.0, **MOMENT_UNITS} if force else MOMENT_UNITS
+        moment = nearest(candidates, lambda tried: moments(tried, factor))
+        moment = "" if moment == "N m" else moment
+    said = []
+    if force:
+        shares = ", ".join(f"{name} {value:.2g}" for name, value in forces(factor).items())
+        said.append(f"X and Y are in {force}, 1 {force} = {factor:.4g} N (then {shares} times those of usual hulls)")
+    if moment:
+        said.append(f"N is in {moment}, 1 {moment} = {MOMENT_UNITS[moment]:.4g} N m")
+    if said:
+        yield Caution(
+            "unit",
+            "the derivatives are of no ship if forces are in N and moments in N m, and of one if "
+            f"{' and '.join(said)}; convert the columns.",
+        )
+
+
+def _likely_cause(value: float, inertia: float, convention: str) -> str:
+    """Likely cause of a positive acceleration derivative."""
+    least, most = ADDED_SHARE
+    opposite = {"on_model": "on_gauge", "on_gauge": "on_model"}.get(convention)
+    if opposite is None:
+        return f"check that the model's inertia is indeed removed from the forces ({convention})"
+    for corrected, instead, cause in (
+        (2 * inertia - value, opposite, "the signs look reversed"),
+        (value - inertia, "hydrodynamic", "the inertia of the model looks removed already"),
+    ):
+        if -most * inertia <= corrected <= -least * inertia:
+            return f'force_convention = "{instead}" would give {corrected:.3g}, as of a ship: {cause}'
+    if abs(value - inertia) < least * inertia:
+        return "the forces hardly show the model's own inertia: check the unit of the gauges"
+    return "check force_convention, the mass and the unit of the gauges"

@@ -71,7 +71,7 @@ OPEN = 0.7
 """Standard error over that of ordinary ships from which a coefficient is called open. Project choice: the tests then
 halve the variance at best."""
 OFFSETS = ("Y0", "N0", "rudder_offset")
-"""Of a model that is not alike to both sides: force and moment straight ahead, and the angle of no rudder force."""
+"""Asymmetries of a model: force and moment straight ahead, and the angle of no rudder force."""
 KEPT_FROM = 3.0
 """Standard errors from which an offset is kept. Project choice: by chance in three of a thousand."""
 _QUANTITIES = {
@@ -143,8 +143,7 @@ class MmgFit:
 
     @property
     def curves_unexplained(self) -> dict[str, float]:
-        """Of the open-water K_T, and K_Q with torque: standard deviation from the fitted curve over the rms of the
-        points."""
+        """Standard deviation of open-water points from the fitted curve over their rms: K_T, and K_Q with torque."""
         points = np.sqrt(np.mean(self.tests.open_water[:, 1:] ** 2, axis=0))
         shares = self.sigmas[len(self.tests.channels) :] / points
         return dict(zip(("K_T", "K_Q"), map(float, shares), strict=False))
@@ -296,14 +295,7 @@ def _variable(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Regression:
-    """The regression of one set of coefficients.
-
-    Parameters
-    ----------
-    tests : SteadyTests
-    model : Model
-    names : tuple of str
-    """
+    """The regression of one set of coefficients `names` of a model on steady tests."""
 
     tests: SteadyTests
     model: Model
@@ -335,7 +327,7 @@ class _Regression:
 
     @cached_property
     def curve_slopes(self) -> Array:
-        """Of the open-water points by the coefficients, (points of K_T and K_Q, k)."""
+        """Slopes of the open-water points by the coefficients, (points of K_T and K_Q, k)."""
         blocks = []
         for first in ("k_0", "q_0")[: self.tests.open_water.shape[1] - 1]:
             place = self.names.index(first)
@@ -365,7 +357,7 @@ class _Regression:
         return np.concatenate([(self.tests.readings.T - forces).ravel(), curve])
 
     def slopes(self, theta: Array) -> Array:
-        """Of the misfit, (equations, k)."""
+        """Slopes of the misfit by the coefficients, (equations, k)."""
         _, jacobian = self._computed(theta.tobytes())
         by_condition = jacobian.reshape(len(self.tests.channels), len(self.tests.names), len(self.names))
         return -np.vstack([*by_condition, self.curve_slopes])

@@ -189,13 +189,7 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
 
 
 def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[str]]:
-    """The means of the steady runs of a campaign; runs that oscillate are left out, and named.
-
-    Raises
-    ------
-    InputError
-        Runs have faults, or lack thrust, normal force or revolutions; all such runs are reported.
-    """
+    """Means of the steady runs; oscillating ones are left out and named, all runs with faults are refused together."""
     campaign = read_campaign(path)
     steady = [run for run in campaign.runs if not run.oscillates]
     faults = []

@@ -94,7 +94,7 @@ class CraftFit:
 
     @property
     def verdicts(self) -> tuple[CoefficientVerdict, ...]:
-        """Of each free parameter (k,).
+        """Verdict on each free parameter (k,).
 
         Identified: the error is at most :data:`IDENTIFIED_SHARE` of the value. Bounded: the trials have narrowed it to
         :data:`TRIALS_SHARE` of what was known before. Else it is not determined.
@@ -141,13 +141,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
 
 
 def _first_estimate(problem: Problem, settings: KalmanSettings, progress: SearchReport) -> KalmanEstimate:
-    """The estimate from the card; from one with stronger damping of sway and yaw if that craft is too unstable.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The covariance of the filter is not a number whatever the damping.
-    """
+    """The estimate from the card, or with stronger damping of sway and yaw if that craft is too unstable."""
     damping = np.array([name in STABILISING for name in problem.free])
     task = task_of(problem, drifting=True)
     for factor in STRONGER:
@@ -162,10 +156,7 @@ def _first_estimate(problem: Problem, settings: KalmanSettings, progress: Search
 
 
 def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array, Array]:
-    """Mean and spread (5,) of the disturbances over the trials; the spread is within what is known without them.
-
-    `runs` are smoothed with the means 0 and the wide spreads of :func:`.craft_problem`.
-    """
+    """Mean and spread (5,) of the disturbances over the trials; the spread is within the known one."""
     places = [problem.model.state_names.index(name) for name in DISTURBANCES]
     wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
     if len(runs) < FEWEST_TRIALS:

@@ -13,12 +13,13 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import changed_text
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
-from tank2sim.identification.trials.assessment.comparison import Comparison, misfit
 from tank2sim.identification.trials.assessment.evaluation import (
+    Comparison,
     FigureComparison,
     Following,
     Passage,
     comparison_windows,
+    misfit,
     pooled,
 )
 from tank2sim.identification.trials.identify import Identification

@@ -16,8 +16,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
-from tank2sim.identification.trials.assessment.evaluation import replay_error
+from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
 from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
 from tank2sim.identification.trials.assessment.method_choice import (
     MethodChoice,
@@ -46,12 +45,12 @@ from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.posterior_sampling import (
-    DRAWS_OF_CHAIN,
     PosteriorSamples,
     check_sampler,
     sample_posterior,
 )
 from tank2sim.identification.trials.methods.recursive import recursive
+from tank2sim.identification.trials.options import BY_RESIDUALS, PIECE, IdentificationOptions
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.picklable import portable
@@ -77,10 +76,6 @@ from tank2sim.marks import CHECK
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
-PIECE = 5.0
-"""Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
-small against the motion; shorter pieces show less of the derivatives, longer ones diverge on unstable ships."""
-
 LEAST_PIECE = 0.5
 """Shortest piece, in L/u0: in less the state hardly responds to the rudder, and initial states outnumber the data."""
 
@@ -92,59 +87,8 @@ WHOLE_RUN_MISFIT = 3.0
 
 _NO_UNCERTAINTY = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
 
-BY_RESIDUALS = "residuals"
-"""Name of the choice between output error and the Kalman filter by the residuals of the former."""
-
-TRIAL_METHODS: tuple[str, ...] = (BY_RESIDUALS, "output_error", "equation_error", "kalman", "recursive")
-
-
 METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error": ("output error", "kalman")}
 """Method that a choice takes, to its name in words and the other method."""
-
-
-@dataclass(frozen=True)
-class IdentificationOptions:
-    """Options of a fit to trials.
-
-    Parameters
-    ----------
-    method : str
-        One of :data:`TRIAL_METHODS`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts
-        or waves, and all others by output error (:mod:`.method_choice`).
-    structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.BY_EVIDENCE`,
-        :data:`.structures.AUTO` or :data:`.structures.AVERAGE`.
-    inertia : bool
-        Estimate acceleration derivatives, too.
-    piece_s : float, optional
-        Length of the pieces of output error, s; by default :data:`PIECE`.
-    scale_prior : bool
-        Widen the card's standard errors as far as the trials require.
-    members : int
-        Simulations for the prediction intervals of the figures of held-out trials; 0 for none.
-    bootstrap : int
-        Members of a parametric bootstrap of the estimates; 0 for none.
-    hold : tuple of str
-        Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
-    force : bool
-        Fit trials even if they look like those of another ship (:mod:`.other_ship`).
-    posterior : str
-        One of :data:`.posterior_sampling.SAMPLERS`; "" for none.
-    draws : int
-        Draws of each chain of the posterior.
-    """
-
-    method: str = BY_RESIDUALS
-    structure: str = BY_EVIDENCE
-    inertia: bool = False
-    piece_s: float | None = None
-    scale_prior: bool = True
-    members: int = 100
-    bootstrap: int = 0
-    hold: tuple[str, ...] = ()
-    force: bool = False
-    posterior: str = ""
-    draws: int = DRAWS_OF_CHAIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -474,10 +418,7 @@ def _fitted(
     *,
     drifts: bool,
 ) -> _Fit:
-    """A fit in a structure; with a current of its own if the water `drifts`.
-
-    Output error and the Kalman filter estimate the current with the parameters; the other methods take the card's.
-    """
+    """A fit in a structure, with a current of its own if the water `drifts` and the method can estimate it."""
     started = STRUCTURES[structure].start(card)
     problem = posed_in(card, started, trials, options)
     unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may

@@ -19,11 +19,11 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.cards.form import YawRig
-from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms, scaled_condition
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS, Interval, motor_work, work_rows
 from tank2sim.records.yaw import YawRecord
+from tank2sim.records.yaw_programme import dissipation_from_work, inertia_from_work
 
 
 @dataclass(frozen=True, kw_only=True)

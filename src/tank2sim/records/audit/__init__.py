@@ -1,7 +1,89 @@
-"""The audit of trials: what is wrong with the data, found by consistency alone."""
+"""The audit of trials: faults of the data, found by consistency alone.
+
+Each group of checks sees the record as the safe corrections of those before it leave it.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.audit.run import audit_and_repair, audit_trial, repair_trial
+from tank2sim.records.audit.rudder import rudder_findings, rudder_unit_findings
+from tank2sim.records.audit.rudder_clock import rudder_clock_findings
+from tank2sim.records.audit.sensors import sensor_findings
+from tank2sim.records.audit.speed_unit import speed_unit_findings
+from tank2sim.records.audit.time_base import time_findings, time_unit_findings
+from tank2sim.records.audit.track import track_findings
+from tank2sim.records.audit.yaw import heading_unit_findings, rate_unit_findings, yaw_findings
+from tank2sim.records.trials import Trial, with_signals
 
 __all__ = ["Finding", "audit_and_repair", "audit_trial", "record_noise", "repair_trial"]
+
+CHECKS: tuple[Callable[[Trial], list[Finding]], ...] = (
+    time_findings,
+    time_unit_findings,
+    sensor_findings,
+    heading_unit_findings,
+    rate_unit_findings,
+    speed_unit_findings,
+    rudder_unit_findings,
+    yaw_findings,
+    track_findings,
+    rudder_findings,
+    rudder_clock_findings,
+)
+"""Checks in their order: signs are judged on values whose unit is repaired, the rudder on a rate of turn whose sign
+is repaired."""
+
+
+def audit_trial(trial: Trial) -> tuple[Finding, ...]:
+    """Faults of a trial, by its consistency alone, and the quantities that its columns look like instead.
+
+    Checked are the time base; each sensor by itself (missing, stuck, spikes); r against dpsi/dt; velocities against
+    positions in body and earth axes with both signs; the rudder against the turn and against its order. A column that
+    is found to be something else is taken for that in the checks that follow, so that one fault is reported once.
+    """
+    return audit_and_repair(trial)[1]
+
+
+def repair_trial(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
+    """The trial with every safe correction applied (frames, signs, units, time base, failed readings left out), and
+    the findings that they correct.
+
+    The notices of the trial state each change. Findings without a safe correction (:class:`Finding`) are not among
+    those returned: biases, scales and clocks stay as measured.
+    """
+    repaired, findings = audit_and_repair(trial)
+    return repaired, tuple(finding for finding in findings if finding.safe and finding.repair is not None)
+
+
+def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
+    """The trial as :func:`repair_trial` returns it, and all findings, as :func:`audit_trial` does.
+
+    After a fault that is not repaired (:attr:`.Finding.open`) nothing more is repaired: later findings may depend on it
+    and are reported only if they concern other columns. After a fault of the time nothing else can be judged.
+    """
+    findings: list[Finding] = []
+    for check in CHECKS:
+        doubtful = {column for finding in findings if finding.open for column in finding.columns}
+        if trial.heading("t_s") in doubtful:
+            break
+        found = [finding for finding in check(trial) if not doubtful.intersection(finding.columns)]
+        if doubtful:
+            found = [replace(finding, safe=False) for finding in found]
+        findings += found
+        for finding in found:
+            if finding.safe and finding.repair is not None:
+                trial = _without_empty(finding.repair(trial))
+    return trial, tuple(findings)
+
+
+def _without_empty(trial: Trial) -> Trial:
+    """The trial without signals whose only readings a repair has left out."""
+    empty = [name for name, values in trial.signals.items() if np.isnan(values).all()]
+    if not empty:
+        return trial
+    headings = ", ".join(trial.heading(name) for name in empty)
+    return with_signals(trial, dict.fromkeys(empty), f"{headings}: no reading is left")

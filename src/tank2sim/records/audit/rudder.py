@@ -116,10 +116,7 @@ def _too_large(trial: Trial, name: str, largest: float) -> Finding:
 
 
 def _too_small(trial: Trial, name: str, largest: float) -> bool:
-    """Whether the rudder, given in degrees, stays below 45 deg in radians while the heading changes 57 times as far.
-
-    Rightly read a zigzag changes the heading as far as the rudder, and a turn some tens of times as far.
-    """
+    """Whether a rudder in degrees stays below 45 deg in radians while the heading changes 57 times as far."""
     if "deg" not in trial.heading(name) or largest > np.deg2rad(np.pi / 4):
         return False
     if "psi_rad" in trial.signals:

@@ -178,10 +178,7 @@ def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
 
 
 def _exceptional(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:
-    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is not a spike.
-
-    Steps from and to other values far away do not count, for spikes may lie close together.
-    """
+    """Whether the steps into and out of a run are twice any step near it, spikes nearby left out."""
     near = slice(max(0, run.start - 2 * SPIKE_SAMPLES), run.stop + 2 * SPIKE_SAMPLES)
     steps = np.abs(np.diff(values[near]))
     touched = far[near][1:] | far[near][:-1]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.audit.time_unit import MISCALIBRATED
+from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.track import PAIRS, TRACK_READINGS, AuditedTrack, audited_track
 from tank2sim.records.audit.weak import Complex, WeakFit, fit
 from tank2sim.records.trials import Trial, with_signals
@@ -124,10 +124,7 @@ def _in_lengths(fault: Finding, places: tuple[str, ...], unit: float, name: str,
 
 
 def _scale(track: AuditedTrack, given: Complex, names: tuple[str, ...]) -> _Scale | None:
-    """By regression with a current left free, under the reading of the columns that leaves least; else by the speeds.
-
-    Speeds alone, of a record that hardly turns, do not distinguish a scale from a current.
-    """
+    """Scale by regression with a free current, under the reading that leaves least; by the speeds if hardly turning."""
     mean = track.windows.mean(np.abs(given))
     moving = mean > 0
     if not moving.any():

@@ -11,7 +11,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Repair
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.audit.time_unit import MISCALIBRATED
+from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.weak import AuditWindows, Complex, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, with_signals
 

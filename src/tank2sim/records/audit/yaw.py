@@ -11,7 +11,7 @@ from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Repair
 from tank2sim.records.audit.noise import record_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
-from tank2sim.records.audit.time_unit import MISCALIBRATED
+from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.weak import AuditWindows, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, unwrapped, with_signals
 

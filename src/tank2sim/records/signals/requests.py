@@ -7,9 +7,15 @@ from dataclasses import dataclass
 
 from tank2sim.errors import InputError
 from tank2sim.records.signals.effect import Filtered
-from tank2sim.records.signals.filtering import FilterType, butterworth, decimate, savitzky_golay, smoothing_spline
+from tank2sim.records.signals.filtering import (
+    FilterType,
+    butterworth,
+    decimate,
+    detrend,
+    savitzky_golay,
+    smoothing_spline,
+)
 from tank2sim.records.signals.sampling import Series
-from tank2sim.records.signals.trends import detrend
 
 REQUEST_FORMS = (
     "lowpass:HZ, highpass:HZ, bandpass:HZ,HZ (each also with ,causal), savgol:SAMPLES,DEGREE, spline:HZ, "

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import jinja2
 from markupsafe import Markup
 
-from tank2sim import __version__
 from tank2sim.analysis.validation.bridge_data import SHALLOW, Bridge
 from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.answer.page import resource_text
 from tank2sim.report.bridge import boxes
 from tank2sim.report.bridge.boxes import Box, Row
 from tank2sim.report.bridge.drawings import Drawing, circles_drawing, stops_drawing
+from tank2sim.version import __version__
 
 PANEL_MM = (88.0, 62.0)
 STOPS_MM = (113.0, 48.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.cards import ManoeuvringCard
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 

@@ -13,7 +13,6 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from tank2sim import __version__
 from tank2sim.answer.page import resource_text
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
@@ -32,6 +31,7 @@ from tank2sim.report.steering.ship import (
     telegraph_of,
     thrusters_of,
 )
+from tank2sim.version import __version__
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""

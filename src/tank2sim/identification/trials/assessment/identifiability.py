@@ -207,10 +207,7 @@ def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str,
 
 
 def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...], ...]:
-    """The parameters in each of the unseen directions (k, m), as few in each as possible.
-
-    Any mixture of unseen directions is unseen too: the chosen mixture gives each direction a parameter of its own.
-    """
+    """The parameters in each of the unseen directions (k, m), mixed so that each has as few as possible."""
     count = vectors.shape[1]
     if not count:
         return ()

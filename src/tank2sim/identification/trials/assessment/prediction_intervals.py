@@ -20,7 +20,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card
+from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card
 from tank2sim.identification.trials.assessment.model_selection import Criteria, criteria
 from tank2sim.identification.trials.assessment.residual_forces import (
     Disturbances,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from tank2sim.identification.trials.assessment.model_selection import (
     yaw_rate_error,
 )
 from tank2sim.identification.trials.methods.equation_error import equation_error
+from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -38,9 +38,6 @@ from tank2sim.marks import CHECK
 from tank2sim.records.trials import RUDDERS, Trial
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
-
-if TYPE_CHECKING:
-    from tank2sim.identification.trials.identify import IdentificationOptions
 
 STRONGLY = 1.0
 """Difference of the Bayesian information criterion for each independent sample by which the card's own terms must be

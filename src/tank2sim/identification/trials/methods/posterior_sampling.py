@@ -37,7 +37,7 @@ CHAINS = 4
 """Independent chains, the number for which the limit of R-hat is stated (Vehtari et al. 2021, Bayesian Analysis 16)."""
 
 LARGEST_R_HAT = 1.01
-"""Of converged chains (Vehtari et al. 2021)."""
+"""Largest R-hat of converged chains (Vehtari et al. 2021)."""
 
 FEWEST_EFFECTIVE = 400
 """Effective sample size from which R-hat and quantiles are reliable with four chains (Vehtari et al. 2021)."""
@@ -208,8 +208,7 @@ class LogPosterior:
         return -0.5 * cost, -0.5 * (self.root.T @ (signs * pull))
 
     def _curvature(self) -> Array:
-        """Negative second derivative (k, k) of the log density at the estimate, by z: with it as scale, the sampler
-        takes half as many steps as with that of the linearised model."""
+        """Negative second derivative (k, k) of the log density at the estimate, by z: the scale of the sampler."""
         steps = DIFFERENCE * np.eye(len(self.center))
         slopes = [self.with_gradient(step)[1] - self.with_gradient(-step)[1] for step in steps]
         curvature = -np.array(slopes) / (2 * DIFFERENCE)

@@ -30,15 +30,6 @@ from tank2sim.identification.trials.methods.kalman_search import SearchPoint, Se
 from tank2sim.identification.trials.methods.posterior import BLOCK, sandwich
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
-_SETTLED = 2.0
-"""Last standard errors about its last value within which a coefficient has settled (project choice)."""
-
-LEARNED = 0.5
-"""... and its standard error is below this share of the prior's (project choice)."""
-
-LATEST = 0.75
-"""Share of the time until which a coefficient must settle: at the end all do (project choice)."""
-
 LEVEL_ITERATIONS = 15
 """Most steps of the noise levels before each pass."""
 
@@ -99,24 +90,12 @@ class RecursiveEstimate(Estimate):
         Name of the run of each block.
     path, path_errors : arrays (n, k)
         Estimates and their standard errors.
-    prior_error : array (k,)
-        Standard errors before the trials.
     """
 
     times_s: Array = field(default_factory=lambda: np.zeros(0))
     runs: tuple[str, ...] = ()
     path: Array = field(default_factory=lambda: np.zeros((0, 0)))
     path_errors: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    prior_error: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def settled_s(self) -> Array:
-        """Time from which each coefficient has settled (k,), s; nan for one that did not settle or was not learnt."""
-        near = np.abs(self.path - self.values) <= _SETTLED * self.path_errors[-1]
-        close = near & (self.path_errors <= LEARNED * self.prior_error)
-        stays = np.logical_and.accumulate(close[::-1], axis=0)[::-1]
-        first = np.where(stays.any(axis=0), self.times_s[np.argmax(stays, axis=0)], np.nan)
-        return np.where(first <= LATEST * self.times_s[-1], first, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,7 +227,6 @@ def _estimate(
         runs=tuple(problem.runs[step.run].name for step in steps),
         path=np.stack([step.values for step in steps]),
         path_errors=np.sqrt(np.stack([np.diag(covariance) for covariance in covariances])),
-        prior_error=problem.prior_error,
     )
 
 

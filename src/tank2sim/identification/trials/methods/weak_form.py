@@ -110,8 +110,7 @@ class WeakForm:
         )
 
     def _hidden_states(self, run: _Prepared, inputs: Array, p: Array) -> tuple[Array, Array | None]:
-        """Simulated values of the unmeasured states in the middle of steps (n, nz), and their derivatives by the free
-        parameters (n, nz, k)."""
+        """Simulated unmeasured states in the middle of steps (n, nz), and slopes by the parameters (n, nz, k)."""
         if self._sensitivity is None:
             return np.zeros((len(inputs), 0)), None
         start = np.array(self.problem.model.initial(p)).ravel()

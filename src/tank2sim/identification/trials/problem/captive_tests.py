@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -26,9 +25,6 @@ from tank2sim.identification.captive.equations import axial_speed, rigid_body_fo
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
 
-if TYPE_CHECKING:
-    from tank2sim.identification.trials.problem.estimation_problem import Problem
-
 GAIN_ERROR = 0.05
 """Standard error of the gain of each force between tank and ship: Froude-scaled forces of one hull in different tanks
 differ by 5 to 10 % (SIMMAN 2008 and 2014, captive data of the KVLCC2). Project choice within that."""
@@ -41,14 +37,6 @@ RUDDER_GAIN_ERROR = 0.15
 """Relative standard error of the rudder's forces between tank and ship: they follow the square of the inflow, and the
 loading of the propeller differs (HMRI's revolutions are 4 to 5 % below HSVA's and MARIN's by Froude's law, which is 5 %
 of force). Project choice: three times that, for wakes differ, too."""
-
-LOOSE = 30.0
-"""Factor on the standard errors before the trials in the fit of the captive tests alone, from which their noise comes:
-the tests then determine all that they show (project choice)."""
-
-ROUNDS, STEPS = 6, 6
-"""Rounds of noise, and Gauss-Newton steps in each, of the fit of the captive tests alone: the noise of the KVLCC2's
-changes by less than 1 % in the last (project choice)."""
 
 REFERENCE_ERROR = 0.01
 """Standard error of the reference point of the moment, in ship lengths. Project choice: 7 cm of a 7 m model."""
@@ -125,9 +113,7 @@ class CaptiveTests:
         return residuals, slopes
 
     def _linearised(self, p: Array) -> tuple[Array, Array, Array]:
-        """Residuals (m,), their slopes (m, k), and the effects (m, 6) of the uncertain parameters between tank and
-        ship, each times its standard error.
-        """
+        """Residuals (m,), slopes (m, k), effects (m, 6) of the tank-to-ship parameters per standard error."""
         instants = self.motion.shape[1]
         values, slopes, rudder = map(np.array, self.forces.map(instants)(self.motion, p))
         slopes = slopes.reshape(3, instants, -1)[:, :, self.columns]
@@ -172,25 +158,6 @@ class CaptiveTests:
             least = LEAST_NOISE * float(np.std(self.measured[rows]))
             noise.append(max(least, float(np.sqrt(np.sum(residual[rows] ** 2) / max(rows.sum() - used, 1)))))
         return replace(self, noise=np.array(noise))
-
-
-def noise_alone(tests: CaptiveTests, problem: Problem) -> CaptiveTests:
-    """The equations with the noise that they have at the best fit of the captive tests alone.
-
-    Fitted together with trials, the noise must not grow until tank and trials agree: it is what the tank's own scatter
-    and the structure of the model leave, with standard errors before the trials :data:`LOOSE` times those of `problem`.
-    Within one tank the uncertain parameters between tank and ship are none.
-    """
-    values, prior = problem.prior_mean.copy(), problem.prior_precision(LOOSE * problem.prior_error)
-    for _ in range(ROUNDS):
-        for _ in range(STEPS):
-            residual, slopes = tests.residuals(problem.parameters(values))
-            weighted = slopes / tests.noise[tests.force][:, None] ** 2
-            gradient = weighted.T @ residual + prior @ (values - problem.prior_mean)
-            step = np.linalg.solve(weighted.T @ slopes + prior, gradient)
-            values = np.clip(values - step, *problem.bounds)
-        tests = tests.with_noise_at(problem.parameters(values))
-    return tests
 
 
 def captive_tests(card: ManoeuvringCard, model: Model, free: Sequence[str], source: CaptiveRuns) -> CaptiveTests:

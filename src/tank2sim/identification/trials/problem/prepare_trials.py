@@ -106,10 +106,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
 
 
 def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[str]:
-    """Notices of the findings of an audit by the names of files; of the same in several files, the truth in the first.
-
-    Faults are the same if they are of the same column, and were repaired alike.
-    """
+    """Notices of an audit's findings by file names; faults of one column that were repaired alike are one."""
     groups: dict[tuple[str, str, str, str], list[tuple[str, str]]] = {}
     for name, findings in audited.items():
         for finding in findings:

@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import TORQUE_COEFFICIENTS, ManoeuvringCard, MmgCard
-from tank2sim.cards.covariance import read_covariance
+from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
 from tank2sim.cards.terms import known_term
@@ -26,8 +26,8 @@ from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.model import Model, Quantity, same_symbol
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, noise_alone
 from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in

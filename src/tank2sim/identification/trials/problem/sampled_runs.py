@@ -260,11 +260,7 @@ def _means(time: Array, values: Array, grid: Array, step: float, *, held: bool) 
 
 
 def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int) -> Array:
-    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps.
-
-    A signal that has fewer samples than the grid has instants is known at those alone that are nearest to its samples:
-    between them it would be the same measurement again.
-    """
+    """Signal on the grid: mean of `stride` samples around, nan in long gaps and away from sparse samples."""
     known = np.flatnonzero(~np.isnan(values))
     if len(known) < 2:
         return np.full(len(grid), np.nan)

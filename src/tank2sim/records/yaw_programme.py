@@ -3,6 +3,13 @@
 One hump has seven segments and a rest. With t1 = t3/6, t2 = 5 t3/6, t4 = 2 t3 and t5 = t4 + t1, t6 = t4 + t2, t7 = t4 +
 t3 it takes 4 t3; between t1 and t2 the acceleration is constant, between t5 and t6 it is as large the other way, and
 w(t4 + x) = w_m - w(x): the braking is the accelerating run backwards.
+
+The energy method: with the work of the motor, W = int M w dt, of which any known part (walls, differences between the
+two intervals) has been taken off already, of an accelerating interval 1-2 and its mirror image 5-6
+
+    W12 = (J + lambda)/2 (w2^2 - w1^2) + (B + D),   W56 = -(J + lambda)/2 (w2^2 - w1^2) + (B + D)
+
+so that half their difference is kinetic energy, and half their sum is dissipated.
 """
 
 from __future__ import annotations
@@ -19,6 +26,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import YawRigCard
 
 PROGRAMME_KINDS = ("unidirectional", "reversing")
+
 ProgrammeKind = Literal["unidirectional", "reversing"]
 
 _REST = 4.0
@@ -220,3 +228,17 @@ class Similarity:
         """
         rise_s = ship_time_s / self.rate_ratio / 3
         return replace(like, max_rate_radps=ship_rate_radps * self.rate_ratio, rise_s=rise_s)
+
+
+def inertia_from_work(work_12_J: float, work_56_J: float, w1_radps: float, w2_radps: float) -> float:
+    """J + lambda661 in kg m2, (1): (W12 - W56) / (w2^2 - w1^2)."""
+    return (work_12_J - work_56_J) / (w2_radps**2 - w1_radps**2)
+
+
+def dissipation_from_work(work_12_J: float, work_56_J: float) -> float:
+    """B + D in J, (2): (W12 + W56) / 2.
+
+    The print divides the corrections for accelerating and braking and for the walls by (w2^2 - w1^2), which is not
+    energy; here they are part of the work, without a divisor.
+    """
+    return (work_12_J + work_56_J) / 2

@@ -1,22 +1,21 @@
-"""Detection of runs that contradict all others: a dead gauge with noise, or a wrong unit or sign in a single run.
-
-Such a run distorts the least squares of the whole campaign, and its small scatter may even give it the greatest weight.
-Therefore each run is compared with the others at equal weights, and the worst is removed before the next comparison.
-"""
+"""Consistency of a campaign: runs that contradict all others, and the symmetry of the hull."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
+from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
+from tank2sim.identification.captive.equations import campaign_equations, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.prior import with_prior
-from tank2sim.identification.captive.regression import Spread
-from tank2sim.identification.captive.selection import distinguishable_equations, usual_zero
+from tank2sim.identification.captive.regression import Spread, solve
+from tank2sim.identification.captive.selection import Selection, distinguishable_equations, usual_zero, with_prior
+from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaign_form import OSCILLATING
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
 
@@ -32,9 +31,16 @@ _SMALL = 0.05
 _FEWEST = 8
 """Least number of runs that define the usual misfit."""
 
+_EVEN = "vv rr dd vr vd rd".split()
+_OPPOSITE_PARITY = {"X": "v r d vvv rrr ddd".split(), "Y": _EVEN, "N": _EVEN}
+
 
 def contradicted(campaign: Campaign, runs: Sequence[ReducedRun]) -> dict[str, InputError]:
     """Name to fault of the runs that grossly contradict the others in some force.
+
+    A dead gauge with noise, or a wrong unit or sign in a single run, distorts the least squares of the whole campaign,
+    and its small scatter may even give it the greatest weight. Therefore each run is compared with the others at equal
+    weights, and the worst is removed before the next comparison.
 
     Parameters
     ----------
@@ -85,3 +91,53 @@ def _levelled(runs: Sequence[ReducedRun], force: str) -> list[ReducedRun]:
         )
         levelled.append(replace(run, fits={**run.fits, force: same}))
     return levelled
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asymmetry:
+    """Test of the symmetry of (3.8) for one force.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Terms of the opposite parity that the campaign excites.
+    values, standard_errors : tuple of float
+        Prime, with all of them in addition to the terms of the result.
+    chance : float
+        Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    standard_errors: tuple[float, ...]
+    chance: float
+
+
+def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
+    """Terms of the opposite parity in addition to those of the result.
+
+    By the symmetry of a hull to port and starboard X has even terms and Y, N odd ones, except for Y0, N0 and their
+    change with speed, which (3.8) has for a single screw. Terms of the opposite parity are not part of a card; the test
+    shows that they are small.
+    """
+    force, runs = selection.equations.force, selection.equations.runs
+    kept, prior = selection.equations.names, selection.equations.prior
+    excited_terms: list[str] = []
+    for powers in _OPPOSITE_PARITY[force]:
+        term = parse_term(force + powers)
+        assert term is not None
+        if not excited(campaign, runs, term):
+            continue
+        trial = campaign_equations(campaign, runs, force, [*kept, *excited_terms, term.name]).held(prior)
+        if solve(trial, selection.spread).condition <= COLLINEAR:
+            excited_terms.append(term.name)
+    if not excited_terms:
+        return Asymmetry(names=(), values=(), standard_errors=(), chance=1.0)
+    solution = solve(campaign_equations(campaign, runs, force, [*kept, *excited_terms]).held(prior), selection.spread)
+    values, covariance = solution.values[len(kept) :], solution.covariance[len(kept) :, len(kept) :]
+    return Asymmetry(
+        names=tuple(excited_terms),
+        values=tuple(float(value) for value in values),
+        standard_errors=tuple(float(error) for error in np.sqrt(np.diag(covariance))),
+        chance=float(chdtrc(len(excited_terms), values @ np.linalg.solve(covariance, values))),
+    )
