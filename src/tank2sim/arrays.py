@@ -8,12 +8,15 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+_DEEPEST = 2
+"""Lists within the list of an array, at most, in the JSON of results."""
+
 
 class _InJson:
     """Form of a number or array in JSON: lists for arrays, ``[real, imaginary]`` for complex numbers, null for NaN."""
 
-    def __init__(self, dtype: type[np.generic], scalar: bool = False) -> None:
-        self.dtype, self.scalar = dtype, scalar
+    def __init__(self, dtype: type[np.generic], scalar: bool = False, null: float = math.nan) -> None:
+        self.dtype, self.scalar, self.null = dtype, scalar, null
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         from pydantic_core import core_schema
@@ -25,7 +28,10 @@ class _InJson:
         if self.scalar and self.dtype is not np.complex128:
             return {"type": ["number", "null"]}
         number = "boolean" if self.dtype is np.bool_ else "number"
-        return {"type": "array", "items": {"type": [number, "null", "array"]}}
+        inner: dict[str, Any] = {"type": [number, "null"]}
+        for _ in range(_DEEPEST):
+            inner = {"anyOf": [{"type": [number, "null"]}, {"type": "array", "items": inner}]}
+        return {"type": "array", "items": inner}
 
     def write(self, value: Any) -> Any:
         """The value as JSON has it."""
@@ -55,7 +61,7 @@ class _InJson:
             return numbers
         if numbers.ndim:
             raise ValueError("should be a number")
-        return numbers.item()
+        return self.null if value is None else numbers.item()
 
 
 def _finite(value: Any) -> Any:
@@ -78,6 +84,9 @@ ComplexArray = Annotated[NDArray[np.complex128], _InJson(np.complex128)]
 
 Number = Annotated[float, _InJson(np.float64, scalar=True)]
 """A number that may be NaN (not known); in JSON null."""
+
+Unbounded = Annotated[float, _InJson(np.float64, scalar=True, null=math.inf)]
+"""A number that may be infinite (without a limit); in JSON null."""
 
 ComplexNumber = Annotated[complex, _InJson(np.complex128, scalar=True)]
 """A complex number; in JSON ``[real, imaginary]``."""

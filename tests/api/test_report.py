@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import tank2sim as t2s
+from tank2sim.api.results import RESULT_CLASSES
 from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
 from tests.cli.command_line import refused, tank2sim
 
@@ -57,7 +58,8 @@ def test_a_schema_that_is_not_known_is_refused(turn: t2s.ManoeuvreResult, schema
 def test_every_command_of_a_type_exists() -> None:
     from tank2sim.cli import COMMANDS
 
-    assert {command for kind in RESULT_TYPES for command in kind.commands.split()} == set(COMMANDS) - {"open", "report"}
+    types = {command for kind in RESULT_TYPES for command in kind.commands.split()} | set(RESULT_CLASSES)
+    assert types == set(COMMANDS) - {"open", "report"}
 
 
 def test_a_page_never_takes_the_place_of_its_json(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def test_project_choices_are_listed_with_value_place_and_reason(monkeypatch: pyt
     generated = importlib.import_module("generated")
     rows = [line.split(" | ") for line in generated.project_choices().splitlines() if line.startswith("| `")]
     assert len(rows) > 50 and all(len(row) == 5 for row in rows)
-    assert any("`api.result.REPR_ROWS`" in row[0] and row[1] == "`20`" for row in rows)
+    assert any("`answer.parts.REPR_ROWS`" in row[0] and row[1] == "`20`" for row in rows)
     names = {row[0].removeprefix("| ").strip("`") for row in rows}
     measured = json.loads((MANUAL / "static" / "project_choices.json").read_text(encoding="utf-8"))
     assert set(measured) <= names  # benchmarks/choices.py forgets what is no constant any more when it runs again

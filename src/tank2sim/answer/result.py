@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from tank2sim.answer.page import Page
 
 
-S = TypeVar("S")
+_S = TypeVar("_S")
 
 
-class Result(ABC, Generic[S]):
+class Result(ABC, Generic[_S]):
     """What a command found. A subclass declares title, headline, notices, key figures and sections.
 
     Screen, ``repr``, notebook view, :attr:`tables`, page, pictures, JSON and its schema are derived from these and
@@ -33,7 +33,7 @@ class Result(ABC, Generic[S]):
     command: ClassVar[str]
     """Command that gives the same result on the command line; its name is in :attr:`schema`."""
 
-    study: S
+    study: _S
     """Numbers with units in the names of their fields."""
 
     @property
@@ -82,10 +82,10 @@ class Result(ABC, Generic[S]):
         return cls(study=read_study(cls.study_type(), study, source))  # type: ignore[call-arg]
 
     @classmethod
-    def study_type(cls) -> type[S]:
+    def study_type(cls) -> type[_S]:
         """The dataclass of :attr:`study`, which the class names as its parameter: ``Result[TowStudy]``."""
         kinds = (base for parent in cls.__mro__ for base in getattr(parent, "__orig_bases__", ()))
-        found: type[S] = next(get_args(base)[0] for base in kinds if issubclass(get_origin(base) or object, Result))
+        found: type[_S] = next(get_args(base)[0] for base in kinds if issubclass(get_origin(base) or object, Result))
         return found
 
     @property

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from tank2sim.errors import InputError
 from tank2sim.files import plain_json
 
-S = TypeVar("S")
+_S = TypeVar("_S")
 
 
 _made = functools.cache(TypeAdapter)
@@ -37,7 +37,7 @@ def study_schema(kind: type[object]) -> dict[str, Any]:
     return schema
 
 
-def read_study(kind: type[S], values: dict[str, Any], source: str) -> S:
+def read_study(kind: type[_S], values: dict[str, Any], source: str) -> _S:
     """Return the study that JSON values hold.
 
     Raises
@@ -46,7 +46,7 @@ def read_study(kind: type[S], values: dict[str, Any], source: str) -> S:
         A key is missing or unknown, or its value is of another type than the command writes; the key is named.
     """
     try:
-        study: S = _adapter(kind).validate_json(json.dumps(values), strict=True)
+        study: _S = _adapter(kind).validate_json(json.dumps(values), strict=True)
     except ValidationError as fault:
         first = fault.errors(include_url=False, include_input=False)[0]
         raise not_as_written(source, _key(first)) from None

@@ -25,7 +25,13 @@ def screen_table(
     notes: Sequence[str] = (),
     wide: bool = False,
 ) -> Table:
-    """A table of a result that is not yet declared by sections."""
+    """A table of a result that is not yet declared by sections.
+
+    Parameters
+    ----------
+    title, columns, rows, notes, wide
+        As of :class:`.Table`, with heads as text.
+    """
     return replace(table(title, columns, rows, *notes), wide=wide)
 
 

@@ -14,11 +14,11 @@ from tank2sim.api.bounds import checked
 from tank2sim.api.results import RESULT_CLASSES, result_schema
 from tank2sim.files import schema_name
 
-Number = float | None
+JsonNumber = float | None
 """A number; null where it is not finite or not known."""
 
-Columns = dict[str, list[Number]]
-"""Columns (n,) by name with unit, all of one length."""
+JsonColumns = dict[str, list[JsonNumber]]
+"""JsonColumns (n,) by name with unit, all of one length."""
 
 FigureValues = dict[str, float | list[float] | None]
 """Manoeuvring figures by name with unit; null where the run was too short."""
@@ -39,25 +39,25 @@ class _Keys(_Part):
 class BandKeys(_Part):
     """Quantiles over the members of an ensemble, and how many members show the figure."""
 
-    p5: Number
-    p50: Number
-    p95: Number
+    p5: JsonNumber
+    p50: JsonNumber
+    p95: JsonNumber
     shown_by: int
-    standard_deviation: NotRequired[Number]
+    standard_deviation: NotRequired[JsonNumber]
 
 
 class ImoKeys(_Part):
     """A criterion of IMO MSC.137(76), the worse of starboard and port."""
 
     name: str
-    found: Number
+    found: JsonNumber
     allowed: float
     unit: str
     remark: str
     beyond_card: bool
     passed: bool | None
-    margin: Number
-    margin_percent: Number
+    margin: JsonNumber
+    margin_percent: JsonNumber
 
 
 class EnsembleKeys(_Part):
@@ -75,12 +75,12 @@ class ManoeuvreEnsembleKeys(EnsembleKeys):
     """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track; integration steps of
     the first members and of later ones, and whether these are in single precision."""
 
-    steps_s: list[Number]
+    steps_s: list[JsonNumber]
     single_precision: bool
 
-    t_s: list[Number]
-    histories: dict[str, Columns]
-    track: dict[str, list[list[Number]]] | None
+    t_s: list[JsonNumber]
+    histories: dict[str, JsonColumns]
+    track: dict[str, list[list[JsonNumber]]] | None
 
 
 class TailKeys(_Part):
@@ -89,11 +89,11 @@ class TailKeys(_Part):
     distance: float
     linear_probability: float
     linear_figure: float
-    figure: Number
+    figure: JsonNumber
     effective_size: float
     remark: str
-    probability: Number
-    standard_error: Number
+    probability: JsonNumber
+    standard_error: JsonNumber
     members: int
     failing: int
     not_shown: int
@@ -109,7 +109,7 @@ class ChanceKeys(_Part):
     name: str
     allowed: float
     unit: str
-    probability_met: Number
+    probability_met: JsonNumber
     interval_95: list[float] | None
     not_shown: int
     beyond_card: int
@@ -129,7 +129,7 @@ class ChanceOfAllKeys(_Part):
 class StabilityEnsembleKeys(EnsembleKeys):
     """Bands of the straight course, and the probability of each IMO criterion and of all together."""
 
-    probability_stable: Number
+    probability_stable: JsonNumber
     probability_stable_interval_95: list[float] | None
     imo: list[ChanceKeys]
     imo_all: ChanceOfAllKeys | None
@@ -143,15 +143,15 @@ class ComparedFigureKeys(_Part):
     manoeuvre: str
     name: str
     measured: float
-    simulated: Number
+    simulated: JsonNumber
     numerical: float
-    inputs: Number
+    inputs: JsonNumber
     data: float
     required_percent: float
     made_card: bool
-    error: Number
-    uncertainty: Number
-    level_percent: Number
+    error: JsonNumber
+    uncertainty: JsonNumber
+    level_percent: JsonNumber
     outcome: str
 
 
@@ -161,9 +161,9 @@ class VerifiedFigureKeys(_Part):
     trial: str
     name: str
     value: float
-    halving: Number
-    deviation: Number
-    U_num: Number
+    halving: JsonNumber
+    deviation: JsonNumber
+    U_num: JsonNumber
 
 
 class ReplayKeys(_Part):
@@ -171,31 +171,31 @@ class ReplayKeys(_Part):
 
     trial: str
     errors: list[dict[str, str | float | None]]
-    measured: Columns
-    simulated: Columns
+    measured: JsonColumns
+    simulated: JsonColumns
 
 
 class OtherSideKeys(_Part):
     """A pull-out from the other side."""
 
     figures: FigureValues
-    histories: Columns
+    histories: JsonColumns
 
 
 class SimulateKeys(_Keys):
     """A simulated manoeuvre; `limits` by name of figure, of IMO MSC.137(76)."""
 
     ship: str
-    length_m: Number
-    beam_m: Number
+    length_m: JsonNumber
+    beam_m: JsonNumber
     manoeuvre: str
     figures: FigureValues
     limits: dict[str, float]
-    left_card_range_s: Number
+    left_card_range_s: JsonNumber
     left_card_range_by: str
     outside_card_range: list[str]
     notices: list[str]
-    histories: Columns
+    histories: JsonColumns
     ensemble: NotRequired[ManoeuvreEnsembleKeys]
     other_side: NotRequired[OtherSideKeys]
 
@@ -211,7 +211,7 @@ class OperatingPointKeys(_Part):
 class SteadySpeedKeys(TypedDict):
     """A speed straight ahead that the engine holds."""
 
-    speed_mps: Number
+    speed_mps: JsonNumber
     stable: bool
 
 
@@ -220,9 +220,9 @@ class StabilityKeys(_Keys):
 
     ship: str
     operating_point: OperatingPointKeys
-    eigenvalues: list[list[Number]]
+    eigenvalues: list[list[JsonNumber]]
     stability_criterion: dict[str, bool | float | list[str] | None]
-    nomoto: dict[str, dict[str, Number]]
+    nomoto: dict[str, dict[str, JsonNumber]]
     margins: dict[str, Any]
     trim: dict[str, Any]
     responses: list[dict[str, Any]]
@@ -279,11 +279,11 @@ class CheckKeys(_Keys):
     validation: list[str]
     compared: bool
     differences: list[str]
-    errors: dict[str, dict[str, Number]]
-    max_error: dict[str, Number]
+    errors: dict[str, dict[str, JsonNumber]]
+    max_error: dict[str, JsonNumber]
     limits: dict[str, float]
     duration_s: float
-    reference_error: Number
+    reference_error: JsonNumber
     passed: bool
 
 
@@ -294,7 +294,7 @@ class DerivativeKeys(_Part):
     standard_error: float
     origin: str
     source: NotRequired[str]
-    type_a: NotRequired[Number]
+    type_a: NotRequired[JsonNumber]
     type_b: NotRequired[dict[str, Any]]
     paper_order: NotRequired[dict[str, Any] | None]
 
@@ -307,12 +307,12 @@ class FourierCoefficientKeys(_Part):
     order: int
     cosine: float
     sine: float
-    cosine_error: Number
-    sine_error: Number
+    cosine_error: JsonNumber
+    sine_error: JsonNumber
     amplitude: float
-    amplitude_error: Number
+    amplitude_error: JsonNumber
     phase_rad: float
-    phase_error_rad: Number
+    phase_error_rad: JsonNumber
 
 
 class SingleRunKeys(_Part):
@@ -325,10 +325,10 @@ class SingleRunKeys(_Part):
     periods: int
     readings: int
     coefficients: list[FourierCoefficientKeys]
-    cycles: dict[str, Columns]
-    residual_rms: dict[str, Number]
+    cycles: dict[str, JsonColumns]
+    residual_rms: dict[str, JsonNumber]
     derivatives: dict[str, Any] | None
-    history: Columns
+    history: JsonColumns
     faults: list[str]
 
 
@@ -339,11 +339,11 @@ class RepeatedCoefficientKeys(_Part):
     unit: str
     order: int
     part: str
-    values: list[Number]
+    values: list[JsonNumber]
     mean: float
     deviation: float
     expected: float
-    chance: Number
+    chance: JsonNumber
 
 
 class RunKeys(_Keys):
@@ -371,7 +371,7 @@ class BudgetKeys(_Part):
     coverage_factor: float
     sources: dict[str, str]
     not_stated: list[str]
-    blockage_speed_relative: Number
+    blockage_speed_relative: JsonNumber
     derivatives: dict[str, BudgetRowKeys]
 
 
@@ -382,7 +382,7 @@ class ReduceKeys(_Keys):
     model: dict[str, str | float | None]
     test: dict[str, str | float | None]
     conventions: dict[str, str | float | None]
-    rigid_body: dict[str, Number]
+    rigid_body: dict[str, JsonNumber]
     derivatives: dict[str, DerivativeKeys]
     uncertainty_budget: BudgetKeys
     missing: list[str]
@@ -427,7 +427,7 @@ class ReduceMmgKeys(_Keys):
     yaw_arm: dict[str, float]
     rudder_angle_of_no_force_deg: float | None
     channels: dict[str, dict[str, Any]]
-    open_water: dict[str, Number]
+    open_water: dict[str, JsonNumber]
     readings: dict[str, dict[str, Any]]
     conditions: list[str]
     not_excited: list[str]
@@ -438,11 +438,11 @@ class EstimateKeys(_Part):
     """A coefficient identified from trials, and what was known of it before."""
 
     value: float
-    standard_error: Number
-    before: Number
-    before_standard_error: Number
-    prior_standard_error: Number
-    share_from_trials: Number
+    standard_error: JsonNumber
+    before: JsonNumber
+    before_standard_error: JsonNumber
+    prior_standard_error: JsonNumber
+    share_from_trials: JsonNumber
 
 
 class CraftEstimateKeys(_Part):
@@ -485,7 +485,7 @@ class CraftIdentifyKeys(_Keys):
     trials: list[str]
     coefficients: dict[str, CraftEstimateKeys]
     noise: dict[str, float]
-    determination: dict[str, Number] | None
+    determination: dict[str, JsonNumber] | None
     driven_by: str
     order_responses: dict[str, OrderResponseKeys]
     held_out: list[str]
@@ -496,21 +496,21 @@ class CraftIdentifyKeys(_Keys):
 class CraftReplayKeys(_Part):
     """Free-running predictions of a trial: their number, rms errors of the motion, and of the pose at their ends."""
 
-    predictions: Number
-    rms_u_mps: Number
-    rms_v_mps: Number
-    rms_r_degps: Number
-    end_distance_m: Number
-    end_heading_deg: Number
+    predictions: JsonNumber
+    rms_u_mps: JsonNumber
+    rms_v_mps: JsonNumber
+    rms_r_degps: JsonNumber
+    end_distance_m: JsonNumber
+    end_heading_deg: JsonNumber
 
 
 class CraftValidateKeys(_Keys):
     """R^2 of u, v and r of free-running predictions of a craft, and rms errors at their ends next to measurements."""
 
     ship: str
-    determination: dict[str, Number]
-    end_distance_m: Number
-    end_heading_deg: Number
+    determination: dict[str, JsonNumber]
+    end_distance_m: JsonNumber
+    end_heading_deg: JsonNumber
     trials: dict[str, CraftReplayKeys]
     notices: list[str]
 
@@ -518,8 +518,8 @@ class CraftValidateKeys(_Keys):
 class WindowErrorKeys(_Part):
     """Root mean square of an error over windows, and of the measured signal."""
 
-    rms_error: Number
-    rms_signal: Number
+    rms_error: JsonNumber
+    rms_signal: JsonNumber
 
 
 class TrialErrorKeys(_Part):
@@ -536,19 +536,19 @@ class PredictedFigureKeys(_Part):
     trial: str
     figure: str
     measured: float
-    before: Number
-    predicted: Number
-    error: Number
-    interval_95: list[Number] | None
+    before: JsonNumber
+    predicted: JsonNumber
+    error: JsonNumber
+    interval_95: list[JsonNumber] | None
 
 
 class IdentifiabilityKeys(_Part):
     """How well the trials determine the parameters, in units of the prior's standard errors."""
 
     parameters: list[str]
-    condition: Number
-    singular_values: list[Number]
-    correlation: list[list[Number]]
+    condition: JsonNumber
+    singular_values: list[JsonNumber]
+    correlation: list[list[JsonNumber]]
     correlated_pairs: list[list[str | float]]
     unseen: list[list[str]]
     notices: list[str]
@@ -560,17 +560,17 @@ class CardReplayKeys(_Part):
     trial: str
     held_out: bool
     closed_loop: bool
-    measured: Columns
-    before: Columns
-    found: Columns
+    measured: JsonColumns
+    before: JsonColumns
+    found: JsonColumns
 
 
 class SampledKeys(_Part):
     """A sampled parameter: R-hat, effective sample size, and its values at the quantile levels."""
 
-    r_hat: Number
-    effective_sample_size: Number
-    quantiles: list[Number]
+    r_hat: JsonNumber
+    effective_sample_size: JsonNumber
+    quantiles: list[JsonNumber]
 
 
 class PosteriorKeys(_Part):
@@ -588,11 +588,11 @@ class PosteriorKeys(_Part):
 class EstimatedCurrentKeys(_Part):
     """The current of trials at sea, estimated with the coefficients; `determined` where the trials determine it."""
 
-    speed_mps: Number
-    direction_deg: Number
-    speed_standard_error_mps: Number
-    direction_standard_error_deg: Number
-    largest_standard_error_mps: Number
+    speed_mps: JsonNumber
+    direction_deg: JsonNumber
+    speed_standard_error_mps: JsonNumber
+    direction_standard_error_deg: JsonNumber
+    largest_standard_error_mps: JsonNumber
     determined: bool
 
 
@@ -610,17 +610,17 @@ class IdentifyKeys(_Keys):
     effects: dict[str, EstimateKeys]
     effects_of_card: list[str]
     misfit: dict[str, Any]
-    yaw_rate_error_over_windows: dict[str, dict[str, Number] | None]
+    yaw_rate_error_over_windows: dict[str, dict[str, JsonNumber] | None]
     errors_over_windows: dict[str, list[TrialErrorKeys]]
     figures_are: str
     figures: dict[str, list[PredictedFigureKeys]]
     structures: dict[str, Any]
-    criteria: dict[str, Number] | None
+    criteria: dict[str, JsonNumber] | None
     posterior: PosteriorKeys | None
     bootstrap: dict[str, Any] | None
-    residual_noise: dict[str, Number]
-    prior_scale: dict[str, Number]
-    cost: list[Number]
+    residual_noise: dict[str, JsonNumber]
+    prior_scale: dict[str, JsonNumber]
+    cost: list[JsonNumber]
     identifiability: IdentifiabilityKeys
     notices: list[str]
     warnings: list[str]
@@ -632,9 +632,9 @@ class GapReplayKeys(_Part):
 
     trial: str
     held_out: bool
-    measured: Columns
-    before: Columns
-    found: Columns
+    measured: JsonColumns
+    before: JsonColumns
+    found: JsonColumns
 
 
 class MissingKeys(_Part):
@@ -643,10 +643,10 @@ class MissingKeys(_Part):
     equation: NotRequired[str]
     quantity: NotRequired[str]
     explaining: str
-    explained: dict[str, Number]
-    points: dict[str, list[str] | list[Number]]
-    means: Columns
-    over_time: dict[str, list[str] | list[Number]]
+    explained: dict[str, JsonNumber]
+    points: dict[str, list[str] | list[JsonNumber]]
+    means: JsonColumns
+    over_time: dict[str, list[str] | list[JsonNumber]]
 
 
 class RefittedKeys(_Part):
@@ -654,10 +654,10 @@ class RefittedKeys(_Part):
     starboard."""
 
     name: str
-    value: Number
-    standard_error: Number
-    before: Number
-    standard_error_before: Number
+    value: JsonNumber
+    standard_error: JsonNumber
+    before: JsonNumber
+    standard_error_before: JsonNumber
 
 
 class GapKeys(_Keys):
@@ -672,7 +672,7 @@ class GapKeys(_Keys):
     acting: list[dict[str, Any]]
     equation: str
     misfit: dict[str, Any]
-    could_hide: dict[str, dict[str, Number]]
+    could_hide: dict[str, dict[str, JsonNumber]]
     could_hide_in_words: dict[str, str]
     next_test: dict[str, Any] | None
     rivals: list[dict[str, Any]]
@@ -715,12 +715,12 @@ class LogStretchKeys(_Part):
     begins_s: float
     duration_s: float
     steering: str | None
-    heading_change_deg: Number
+    heading_change_deg: JsonNumber
     reversals: int
-    speed_mps: Number
-    least_speed_mps: Number
-    largest_speed_mps: Number
-    yaw_rate_rms_degps: Number
+    speed_mps: JsonNumber
+    least_speed_mps: JsonNumber
+    largest_speed_mps: JsonNumber
+    yaw_rate_rms_degps: JsonNumber
     file: str | None
 
 
@@ -742,8 +742,8 @@ class LogKeys(_Keys):
     channels: list[LogChannelKeys]
     stretches: list[LogStretchKeys]
     current: dict[str, str | float] | None
-    track: Columns | None
-    time_line: dict[str, Columns]
+    track: JsonColumns | None
+    time_line: dict[str, JsonColumns]
     identified: NotRequired[LogIdentifiedKeys | None]
     findings: list[dict[str, Any]]
     notices: list[str]
@@ -776,15 +776,15 @@ class GlideKeys(_Keys):
     glider: str
     source: str
     buoyancy_kg: float
-    states: list[dict[str, bool | float | list[Number] | None]]
+    states: list[dict[str, bool | float | list[JsonNumber] | None]]
     design: dict[str, Any]
-    polar: Columns
-    as_printed: NotRequired[list[dict[str, bool | float | list[Number] | None]]]
-    path: NotRequired[list[dict[str, Number]]]
-    length_m: NotRequired[Number]
-    path_histories: NotRequired[Columns]
-    path_as_printed: NotRequired[list[dict[str, Number]]]
-    path_as_printed_histories: NotRequired[Columns]
+    polar: JsonColumns
+    as_printed: NotRequired[list[dict[str, bool | float | list[JsonNumber] | None]]]
+    path: NotRequired[list[dict[str, JsonNumber]]]
+    length_m: NotRequired[JsonNumber]
+    path_histories: NotRequired[JsonColumns]
+    path_as_printed: NotRequired[list[dict[str, JsonNumber]]]
+    path_as_printed_histories: NotRequired[JsonColumns]
     transient: NotRequired[dict[str, Any]]
     quasi_steady_error: NotRequired[dict[str, list[dict[str, Any]]]]
     notices: list[str]
@@ -810,17 +810,17 @@ class SteeringModelsKeys(_Keys):
     ship: str
     main_model: str
     rudder_deg: float
-    steady_turns: dict[str, list[dict[str, Number]]]
+    steady_turns: dict[str, list[dict[str, JsonNumber]]]
     influence: dict[str, dict[str, Any]]
     manoeuvres: dict[str, dict[str, FigureValues]]
     combined_predictions: dict[str, dict[str, Any]]
     printed_influence: dict[str, Any] | None
-    influence_over_draught: dict[str, list[Number]]
+    influence_over_draught: dict[str, list[JsonNumber]]
     two_point_tuning: dict[str, Any] | str | None
     missing: dict[str, list[str]]
     titles: dict[str, str]
     diagrams: dict[str, Any]
-    histories: dict[str, Columns]
+    histories: dict[str, JsonColumns]
 
 
 class TwoPointKeys(_Keys):
@@ -828,9 +828,9 @@ class TwoPointKeys(_Keys):
 
     hull_factor: float
     rudder_factor: float
-    parameters: dict[str, Number]
-    before: list[dict[str, Number]]
-    after: list[dict[str, Number]]
+    parameters: dict[str, JsonNumber]
+    before: list[dict[str, JsonNumber]]
+    after: list[dict[str, JsonNumber]]
     course_stable_before: bool
     course_stable_after: bool
     notices: list[str]
@@ -841,15 +841,15 @@ class BridgeKeys(_Keys):
 
     ship: str
     source: str
-    rudder_deg: Number
+    rudder_deg: JsonNumber
     turning_circles_deep: list[dict[str, Any]]
     turning_circles_shallow: list[dict[str, Any]]
     stops: list[dict[str, Any]]
     zigzags: dict[str, Any]
     telegraph: list[Any]
     full_astern_from: list[Any]
-    hard_over_to_hard_over_s: Number
-    rudder_neutral_deg: Number
+    hard_over_to_hard_over_s: JsonNumber
+    rudder_neutral_deg: JsonNumber
     squat: list[dict[str, float]]
     notices: list[str]
     ballast: dict[str, Any] | None
@@ -860,9 +860,9 @@ class ConvertedFigureKeys(_Part):
 
     manoeuvre: str
     figure: str
-    before: Number
-    after: Number
-    error_percent: Number
+    before: JsonNumber
+    after: JsonNumber
+    error_percent: JsonNumber
 
 
 class ConvertKeys(_Keys):
@@ -884,11 +884,11 @@ class ReadingKeys(_Part):
     yaw_rate_terms: str
     origin: str
     probability: float
-    C_prime: Number
-    turning_index: Number
-    advance_lengths: Number
-    tactical_diameter_lengths: Number
-    overshoot_1_deg: Number
+    C_prime: JsonNumber
+    turning_index: JsonNumber
+    advance_lengths: JsonNumber
+    tactical_diameter_lengths: JsonNumber
+    overshoot_1_deg: JsonNumber
     vanished: list[str]
     against: list[str]
 
@@ -926,7 +926,7 @@ class SteerKeys(_Keys):
     members: int
     autopilot: str | None
     scenario: str | None
-    page_kB: Number
+    page_kB: JsonNumber
     notices: list[str]
 
 
@@ -934,13 +934,13 @@ class TowMethodKeys(_Part):
     """Estimates of one method; ``estimated`` lists the unknowns that were free."""
 
     estimated: list[str]
-    estimates: dict[str, Number]
-    standard_errors: dict[str, Number]
+    estimates: dict[str, JsonNumber]
+    standard_errors: dict[str, JsonNumber]
     correlation: dict[str, Any] | None
-    condition: Number
-    condition_scaled: Number
-    J: Number
-    largest_speed_error_mps: Number
+    condition: JsonNumber
+    condition_scaled: JsonNumber
+    J: JsonNumber
+    largest_speed_error_mps: JsonNumber
 
 
 class TowKeys(_Keys):
@@ -952,7 +952,7 @@ class TowKeys(_Keys):
     mass_kg: float
     terms: list[str]
     start_delay: bool
-    given_total_mass_kg: Number
+    given_total_mass_kg: JsonNumber
     readings: int
     top_speed_mps: float
     speed_polynomial: list[float]
@@ -961,13 +961,13 @@ class TowKeys(_Keys):
     tows_of_the_paper: bool
     speed_polynomials: list[dict[str, Any]]
     models: list[dict[str, Any]]
-    mass_range_kg: list[Number] | None
+    mass_range_kg: list[JsonNumber] | None
     tow_by_tow: dict[str, dict[str, Any]]
     confidence_ellipses: list[dict[str, Any]]
     mass_by_theory: list[dict[str, str | float]]
     speeds: dict[str, Any]
-    body: NotRequired[dict[str, Number]]
-    drag_coefficients: NotRequired[dict[str, dict[str, dict[str, Number]]] | None]
+    body: NotRequired[dict[str, JsonNumber]]
+    drag_coefficients: NotRequired[dict[str, dict[str, dict[str, JsonNumber]]] | None]
 
 
 class ValidateKeys(_Keys):
@@ -995,17 +995,17 @@ class YawKeys(_Keys):
     records: list[str]
     medium: str
     torque_constant_NmpA: float
-    body_inertia_kgm2: Number
-    body_inertia_standard_error_kgm2: Number
+    body_inertia_kgm2: JsonNumber
+    body_inertia_standard_error_kgm2: JsonNumber
     body_inertia_source: str | None
-    added_inertia_kgm2: dict[str, Number] | None
-    dissipation_J: dict[str, Number]
+    added_inertia_kgm2: dict[str, JsonNumber] | None
+    dissipation_J: dict[str, JsonNumber]
     methods: dict[str, dict[str, Any]]
-    mirror_difference: list[Number]
+    mirror_difference: list[JsonNumber]
     histories: dict[str, dict[str, Any]]
     energy_balance: dict[str, Any]
     energy_residuals: list[dict[str, str | float]]
-    angle_residual: Columns | None
+    angle_residual: JsonColumns | None
     air: dict[str, Any] | None
     notes: list[str]
     theory: list[dict[str, str | float | None]]
@@ -1034,8 +1034,8 @@ class CertaintyKeys(_Part):
 
     hours: list[float]
     usual_hours: list[float]
-    design: dict[str, list[Number]]
-    usual: dict[str, list[Number]]
+    design: dict[str, list[JsonNumber]]
+    usual: dict[str, list[JsonNumber]]
 
 
 class PlannedRunKeys(_Part):
@@ -1047,12 +1047,12 @@ class PlannedRunKeys(_Part):
     speed_mps: float
     drift_deg: float
     rudder_deg: float
-    frequency_radps: Number
-    period_s: Number
+    frequency_radps: JsonNumber
+    period_s: JsonNumber
     cycles: int | None
-    sway_amplitude_m: Number
-    yaw_rate_amplitude_degps: Number
-    heading_amplitude_deg: Number
+    sway_amplitude_m: JsonNumber
+    yaw_rate_amplitude_degps: JsonNumber
+    heading_amplitude_deg: JsonNumber
     record_s: float
     tank_min: float
     purpose: str
@@ -1065,11 +1065,11 @@ class CampaignDesignKeys(_Keys):
     kind: str
     hours: float
     hours_used: float
-    hours_for_usual_certainty: Number
+    hours_for_usual_certainty: JsonNumber
     usual_matrix: dict[str, float]
     model: dict[str, float]
     range: dict[str, float]
-    gauges: dict[str, dict[str, Number]]
+    gauges: dict[str, dict[str, JsonNumber]]
     figures: dict[str, DesignFigureKeys]
     coefficients: dict[str, DesignCoefficientKeys]
     not_excited: list[str]
@@ -1092,8 +1092,8 @@ class TrialCertaintyKeys(_Part):
 
     minutes: list[float]
     usual_minutes: list[float]
-    design: dict[str, list[Number]]
-    usual: dict[str, list[Number]]
+    design: dict[str, list[JsonNumber]]
+    usual: dict[str, list[JsonNumber]]
 
 
 class UsualSetKeys(_Part):
@@ -1121,7 +1121,7 @@ class TrialDesignKeys(_Keys):
     kind: str
     minutes: float
     minutes_used: float
-    minutes_for_usual_certainty: Number
+    minutes_for_usual_certainty: JsonNumber
     usual_set: UsualSetKeys
     sensors: dict[str, float]
     figures: dict[str, TrialFigureKeys]
@@ -1143,8 +1143,8 @@ class GuessFigureKeys(_Part):
     """A figure of a guessed ship: given or not, by the dimensions alone, and with the figures given."""
 
     unit: str
-    given: Number
-    standard_error: Number
+    given: JsonNumber
+    standard_error: JsonNumber
     by_dimensions: QuantileKeys
     found: QuantileKeys
 

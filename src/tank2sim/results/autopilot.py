@@ -50,11 +50,11 @@ _SIGNALS = (
 )
 
 
-S = TypeVar("S", AutopilotStudy, CraftAutopilotStudy)
+_S = TypeVar("_S", AutopilotStudy, CraftAutopilotStudy)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ResultWithController(Result[S]):
+class ResultWithController(Result[_S]):
     """A result whose controller can be written as an FMU.
 
     Parameters
@@ -66,7 +66,7 @@ class ResultWithController(Result[S]):
         The FMU by its path, if one was made.
     """
 
-    study: S
+    study: _S
     piloted: Piloted | None = None
     files: Mapping[Path, bytes] = field(default_factory=dict)
     command: ClassVar[str] = "autopilot"

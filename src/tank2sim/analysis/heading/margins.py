@@ -10,7 +10,7 @@ import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
 from tank2sim.analysis.stability.straight_line import settled_states
-from tank2sim.arrays import Array, ComplexArray, ComplexNumber, Number
+from tank2sim.arrays import Array, ComplexArray, ComplexNumber, Number, Unbounded
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
@@ -50,14 +50,14 @@ class LoopMargins:
     """
 
     speed_mps: float
-    gain_margin_up: Number
+    gain_margin_up: Unbounded
     gain_margin_down: float
-    gain_margin_dB: Number
-    phase_margin_deg: Number
-    delay_margin_s: Number
+    gain_margin_dB: Unbounded
+    phase_margin_deg: Unbounded
+    delay_margin_s: Unbounded
     sensitivity_peak: Number
     crossover_radps: Number
-    bandwidth_radps: Number
+    bandwidth_radps: Unbounded
     stable: bool
     poles: tuple[ComplexNumber, ...]
 
@@ -69,8 +69,8 @@ class LargestSteps:
     inf without such a limit. The linear response to a step in ``heading.command`` is scaled until it meets it.
     """
 
-    within_rate_deg: Number
-    within_angle_deg: Number
+    within_rate_deg: Unbounded
+    within_angle_deg: Unbounded
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -34,7 +34,6 @@ from tank2sim.answer.charts.parts import (
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
 from tank2sim.records.thinning import thin_line
-from tank2sim.report.json_values import Json
 
 MOST_HULLS = 14
 """Outlines of the ship along a track at most: more would hide it. Project choice."""
@@ -97,7 +96,7 @@ class Motion:
         return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(self.ahead_m), np.diff(self.starboard_m)))])
 
 
-def motion_of(columns: Mapping[str, Json], length_m: float | None = None, beam_m: float | None = None) -> Motion:
+def motion_of(columns: Mapping[str, Any], length_m: float | None = None, beam_m: float | None = None) -> Motion:
     """Return the motion from columns of the trial format: ``t_s``, ``x_m``, ``y_m``, ``psi_deg``, ``u_mps``, ...
 
     Raises
@@ -123,7 +122,7 @@ def motion_of(columns: Mapping[str, Json], length_m: float | None = None, beam_m
     )
 
 
-def along_course(columns: Mapping[str, Json], points_m: Array) -> Array:
+def along_course(columns: Mapping[str, Any], points_m: Array) -> Array:
     """Return points (n, 2), north and east in m, as distances ahead and to starboard of the begin of a motion."""
     begin = np.array([columns["x_m"][0], columns["y_m"][0]], dtype=float)
     course = math.radians(float(columns["psi_deg"][0] or 0.0))

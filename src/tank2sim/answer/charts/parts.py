@@ -89,7 +89,7 @@ def shown_unit(unit: str, display_unit: str | None = None) -> tuple[str, float]:
     Parameters
     ----------
     unit : str
-        Unit of the value; one that is no key of :data:`tank2sim.units.UNITS` is shown as it is.
+        Unit of the value; a unit that :data:`tank2sim.units.UNITS` lacks is shown as it is.
     display_unit : str, optional
         The unit to show it in instead, one of ``UNITS[unit].displays``.
     """
