@@ -130,7 +130,9 @@ def in_schema(node: Any, whole: Any) -> Iterator[tuple[str, Any]]:
         yield from part.get("properties", {}).items()
         if isinstance(part.get("additionalProperties"), dict):
             yield "*", part["additionalProperties"]
-        yield from (("[]", item) for item in [*part.get("prefixItems", []), part.get("items")] if item is not None)
+        array = "array" in part.get("type", [])  # of arrays, if nothing is said of its items
+        items = [*part.get("prefixItems", []), part.get("items")] if array else []
+        yield from (("[]", item or {}) for item in items)
 
 
 def in_value(value: Any, whole: Any = None) -> Iterator[tuple[str, Any]]:

@@ -4,8 +4,8 @@ The program is looked at from outside alone (:mod:`tests.inventory.outside`), so
 and after a change of its inside. A feature can be
 
 - added: ``python -m tests.inventory.collect`` writes it into the inventory;
-- renamed: by a line of ``renames`` in the inventory, kind to command (``*`` for all, and for kinds without a command)
-  to old and new, which belongs in the CHANGELOG, too. A renamed path in JSON renames all paths that begin with it;
+- renamed: by a line of ``renames`` in the inventory: kind, then command (``*`` for all and for kinds without), then
+  old to new; the CHANGELOG has it, too. A renamed path in JSON renames all paths that begin with it;
 - removed: only by taking it out of ``inventory.json`` by hand, which a reviewer sees.
 """
 
