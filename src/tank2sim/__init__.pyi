@@ -6,7 +6,6 @@ from .api.audit import AuditResult as AuditResult
 from .api.audit import audit as audit
 from .api.bridge import PilotCardResult as PilotCardResult
 from .api.bridge import PosterResult as PosterResult
-from .api.bundled_ships import ShipsResult as ShipsResult
 from .api.captive_run import CaptiveRunResult as CaptiveRunResult
 from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import ComparisonResult as ComparisonResult
@@ -35,8 +34,6 @@ from .api.design import (
 from .api.design import (
     design_trial as design_trial,
 )
-from .api.fmu import CheckResult as CheckResult
-from .api.fmu import ExportResult as ExportResult
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
@@ -83,5 +80,8 @@ from .api.yaw import yaw as yaw
 from .errors import InputError as InputError
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
+from .results.fmu import CheckResult as CheckResult
+from .results.fmu import ExportResult as ExportResult
+from .results.ships import ShipsResult as ShipsResult
 
 __version__: str

@@ -2,144 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import OldResult, screen_table
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
-from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.check import compare_with_model as check_against_model
-from tank2sim.fmu.export import ExportedFmu, make_fmu, without_coefficients
+from tank2sim.fmu.export import make_fmu, without_coefficients
 from tank2sim.fmu.osp import osp_notices, osp_system
 from tank2sim.fmu.platforms import named_platforms
 from tank2sim.fmu.provenance import documents_of, documents_without_card
 from tank2sim.fmu.unpacking import embedded_card
 from tank2sim.marks import marked
+from tank2sim.results.fmu import CheckResult, ExportResult, ExportStudy
 
 if TYPE_CHECKING:
     from tank2sim.api.ship import Ship
-
-Files = Mapping[Path, str | bytes]
-
-
-class ExportResult(OldResult):
-    """An FMU that was made.
-
-    Parameters
-    ----------
-    ship : Ship
-    path : Path
-        Where it is written.
-    exported : ExportedFmu
-    ssp : Path or None
-        SSP package in which a heading autopilot steers the ship.
-    files : mapping
-        Paths and bytes of both.
-    notices : sequence of str
-        Notices in addition to those of the model.
-    """
-
-    command = "export"
-
-    def __init__(
-        self,
-        ship: Ship,
-        path: Path,
-        exported: ExportedFmu,
-        ssp: Path | None = None,
-        files: Files | None = None,
-        notices: Sequence[str] = (),
-    ) -> None:
-        self.ship, self.path, self.exported, self.ssp = ship, path, exported, ssp
-        self.files = files or {}
-        self.notices = (*ship.model.notices, *notices)
-
-    def content(self) -> Mapping[str, object]:
-        """As :meth:`.OldResult.content`."""
-        about = {"ship": self.ship.name, "fmu": self.path, "ssp": self.ssp}
-        return {**about, **self.exported.as_json(), "notices": self.notices}
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """File, version of FMI, platforms and size."""
-        return (
-            f"{self.path}: {self.ship.name}, FMI {self.exported.fmi}, Model Exchange and Co-Simulation, "
-            f"{', '.join(self.exported.platforms)}, {len(self.exported.content) / 1000:.0f} kB",
-        )
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """None."""
-        return ()
-
-
-class CheckResult(OldResult):
-    """The check of an FMU against its card.
-
-    Parameters
-    ----------
-    report : CheckReport
-
-    Examples
-    --------
-    >>> import tank2sim as t2s
-    >>> _ = t2s.load("mariner").to_fmu("mariner.fmu")
-    >>> t2s.check_fmu("mariner.fmu").passed
-    True
-    """
-
-    command = "check"
-
-    def __init__(self, report: CheckReport, notices: tuple[str, ...] = ()) -> None:
-        self.report = report
-        self.notices = notices + (
-            ()
-            if report.compared
-            else ("the FMU carries no card: only its description was validated; give --card to compare",)
-        )
-
-    @property
-    def passed(self) -> bool:
-        """True if the description is valid and no output differs from the model's by more than the limit."""
-        return self.report.passed
-
-    @property
-    def problems(self) -> tuple[str, ...]:
-        """What is wrong with the description or the outputs, one sentence each."""
-        return (*self.report.validation, *self.report.differences)
-
-    def content(self) -> Mapping[str, object]:
-        """As :meth:`.OldResult.content`."""
-        return self.report.as_json()
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """Verdict, version of FMI and kinds; the error against the FMU's own reference result."""
-        report = self.report
-        verdict = ("passed" if report.compared else "valid") if report.passed else "FAILED"
-        lines = [f"{report.path}: FMI {report.fmi}, {', '.join(report.kinds)}: {verdict}"]
-        if report.reference_error is not None:
-            error = f"largest error {report.reference_error:.1e} of a range"
-            lines.append(f"{report.path}: repeats the reference result that it carries; {error}")
-        return tuple(lines)
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """Largest error of each output, relative to its range."""
-        report = self.report
-        if not report.errors:
-            return ()
-        rows: list[list[object]] = [
-            [name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error
-        ]
-        rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
-        title = f"{report.path}: largest errors in {report.duration_s:g} s, relative to each output's range"
-        return (screen_table(title, ("output", *report.errors), rows),)
 
 
 def make_fmu_file(
@@ -185,7 +67,18 @@ def make_fmu_file(
         files[ssp] = ship_with_autopilot(model, made, every_input=ssp_inputs, platforms=chosen, report=report)
     if osp:
         files |= {path.parent / name: text for name, text in osp_system(model, path.name).items()}
-    return ExportResult(ship, path, made, ssp, files, osp_notices(model) if osp else ())
+    study = ExportStudy(
+        ship=ship.name,
+        fmu=str(path),
+        ssp=str(ssp) if ssp else None,
+        fmi=made.fmi,
+        model_identifier=made.model_identifier,
+        token=made.token,
+        platforms=made.platforms,
+        size_bytes=len(made.content),
+        notices=(*ship.model.notices, *(osp_notices(model) if osp else ())),
+    )
+    return ExportResult(study, made, files)
 
 
 @checked
@@ -210,4 +103,6 @@ def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else card.model
     report = check_against_model(Path(path), model=model and with_simulator_interface(model))
-    return CheckResult(report, tuple(marked(model.notices)) if model else ())
+    lacking = "the FMU carries no card: only its description was validated; give --card to compare"
+    doubts = marked(model.notices) if model else ()
+    return CheckResult(replace(report, notices=(*doubts, *(() if report.compared else (lacking,)))))

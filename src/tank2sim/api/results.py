@@ -13,6 +13,9 @@ from tank2sim.files import schema_command, schema_name
 
 RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
+    "check": ("results.fmu:CheckResult",),
+    "export": ("results.fmu:ExportResult",),
+    "ships": ("results.ships:ShipsResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

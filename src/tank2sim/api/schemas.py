@@ -256,37 +256,6 @@ class CraftStabilityKeys(_Keys):
     notices: list[str]
 
 
-class ExportKeys(_Keys):
-    """An FMU that was made."""
-
-    ship: str
-    fmu: str
-    ssp: str | None
-    fmi: int
-    model_identifier: str
-    token: str
-    platforms: list[str]
-    size_bytes: int
-    notices: list[str]
-
-
-class CheckKeys(_Keys):
-    """The check of an FMU; errors are relative to each output's range."""
-
-    path: str
-    fmi: int
-    kinds: list[str]
-    validation: list[str]
-    compared: bool
-    differences: list[str]
-    errors: dict[str, dict[str, JsonNumber]]
-    max_error: dict[str, JsonNumber]
-    limits: dict[str, float]
-    duration_s: float
-    reference_error: JsonNumber
-    passed: bool
-
-
 class DerivativeKeys(_Part):
     """A derivative (prime) from captive tests."""
 
@@ -904,12 +873,6 @@ class ConventionKeys(_Keys):
     notices: list[str]
 
 
-class ShipsKeys(_Keys):
-    """The bundled ships."""
-
-    ships: list[dict[str, str | float | None]]
-
-
 class SignalsKeys(_Keys):
     """Statistics, spectra and filters of records."""
 
@@ -1174,13 +1137,11 @@ class GuessKeys(_Keys):
 
 KEYS: dict[str, Any] = {
     "audit": AuditKeys,
-    "check": CheckKeys,
     "compare": CompareKeys,
     "convention": ConventionKeys,
     "convert": ConvertKeys,
     "demo": DemoKeys,
     "design": CampaignDesignKeys | TrialDesignKeys,
-    "export": ExportKeys,
     "gap": GapKeys,
     "glide": GlideKeys,
     "guess": GuessKeys,
@@ -1191,7 +1152,6 @@ KEYS: dict[str, Any] = {
     "poster": BridgeKeys,
     "reduce": ReduceKeys | ReduceMmgKeys,
     "run": RunKeys,
-    "ships": ShipsKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,
     "stability": StabilityKeys | CraftStabilityKeys,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import control
@@ -67,7 +68,7 @@ def mariner(workshop: Workshop) -> DemoOutcome:
         "figures": {name: {kind: entry.figures for kind, entry in run.items()} for name, run in runs.items()},
         "stability": {kind: entry.as_json() for kind, entry in judged.items()},
         "imo": [criterion.as_json() for criterion in criteria],
-        "checks": [report.as_json() for report in reports],
+        "checks": [asdict(report) for report in reports],
     }
     return DemoOutcome(figures, sections, result)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import altair as alt
@@ -52,7 +53,7 @@ def towed_vehicle(workshop: Workshop) -> DemoOutcome:
         "four_unknowns": paper.as_json(),
         "two_unknowns": chosen.as_json(),
         "tows": misses,
-        "checks": [report.as_json() for report in reports],
+        "checks": [asdict(report) for report in reports],
     }
     return DemoOutcome(_figures(chosen, misses, reports), [_section(paper, chosen, misses, chart)], result)
 

@@ -7,14 +7,14 @@ import io
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from fmpy.validation import validate_fmu
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.export import description_text, without_coefficients
@@ -54,6 +54,8 @@ class CheckReport:
         Output to the larger of its errors.
     reference_error : float, optional
         Largest error of an output when the FMU repeats the reference result that it carries, relative as above.
+    notices : tuple of str
+        Doubts about the card.
     compared : bool
         False if there was no model to compare with, and the file alone was validated.
     """
@@ -64,16 +66,13 @@ class CheckReport:
     validation: tuple[str, ...]
     compared: bool
     differences: tuple[str, ...] = ()
-    errors: dict[FmuType, dict[str, float]] = field(default_factory=dict)
-    max_error: dict[str, float] = field(default_factory=dict)
+    errors: dict[FmuType, dict[str, Number]] = field(default_factory=dict)
+    max_error: dict[str, Number] = field(default_factory=dict)
     limits: dict[FmuType, float] = field(default_factory=lambda: dict(LIMITS))
     duration_s: float = 0.0
     reference_error: float | None = None
     passed: bool = False
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain data for a JSON file."""
-        return asdict(self)
+    notices: tuple[str, ...] = ()
 
 
 def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport:

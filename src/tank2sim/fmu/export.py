@@ -75,16 +75,6 @@ class ExportedFmu:
     token: str
     platforms: tuple[str, ...]
 
-    def as_json(self) -> dict[str, object]:
-        """What it is, without its bytes."""
-        return {
-            "fmi": self.fmi,
-            "model_identifier": self.model_identifier,
-            "token": self.token,
-            "platforms": list(self.platforms),
-            "size_bytes": len(self.content),
-        }
-
 
 def write_fmu(model: Model, path: Path, *, fmi: int = 2, documents: Documents | None = None) -> ExportedFmu:
     """Write the FMU of :func:`make_fmu` to a file, whole or not at all. Raises also if it cannot be written."""

@@ -1,0 +1,174 @@
+"""Results of ``export`` and ``check``: an FMU that was made, and one that was compared with its card."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar
+
+from tank2sim.answer.charts.analysis import OutputError, error_chart
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, table
+from tank2sim.answer.result import Result
+from tank2sim.fmu.check import CheckReport
+from tank2sim.fmu.export import ExportedFmu
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportStudy:
+    """An FMU that was made.
+
+    Parameters
+    ----------
+    ship : str
+    fmu : str
+        Path of the FMU.
+    ssp : str, optional
+        Path of the SSP package in which a heading autopilot steers the ship.
+    fmi : int
+    model_identifier, token : str
+    platforms : tuple of str
+    size_bytes : int
+    notices : tuple of str
+    """
+
+    ship: str
+    fmu: str
+    ssp: str | None
+    fmi: int
+    model_identifier: str
+    token: str
+    platforms: tuple[str, ...]
+    size_bytes: int
+    notices: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportResult(Result[ExportStudy]):
+    """An FMU that was made.
+
+    Parameters
+    ----------
+    study : ExportStudy
+    exported : ExportedFmu, optional
+        The FMU with its bytes; None if the result was read from its JSON.
+    files : mapping
+        Paths and bytes of all files.
+    """
+
+    study: ExportStudy
+    exported: ExportedFmu | None = None
+    files: Mapping[Path, str | bytes] = field(default_factory=dict)
+    command: ClassVar[str] = "export"
+
+    @property
+    def path(self) -> Path:
+        """Where the FMU is written."""
+        return Path(self.study.fmu)
+
+    @property
+    def ssp(self) -> Path | None:
+        """The SSP package, if one was made."""
+        return Path(self.study.ssp) if self.study.ssp else None
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return f"{self.study.ship}: FMU"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """File, version of FMI, platforms and size."""
+        study = self.study
+        return (
+            f"{study.fmu}: {study.ship}, FMI {study.fmi}, Model Exchange and Co-Simulation, "
+            f"{', '.join(study.platforms)}, {study.size_bytes / 1000:.0f} kB",
+        )
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """What the FMU is."""
+        study = self.study
+        values: dict[str, Cell] = {"file": study.fmu, "ssp": study.ssp, "fmi": study.fmi}
+        values |= {"model_identifier": study.model_identifier, "token": study.token, "size_bytes": study.size_bytes}
+        return [Section(heading="FMU", tables=[quantities("The FMU", values, on_screen=False)])]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CheckResult(Result[CheckReport]):
+    """The check of an FMU against its card.
+
+    Parameters
+    ----------
+    study : CheckReport
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> _ = t2s.load("mariner").to_fmu("mariner.fmu")
+    >>> t2s.check_fmu("mariner.fmu").passed
+    True
+    """
+
+    study: CheckReport
+    command: ClassVar[str] = "check"
+
+    @property
+    def passed(self) -> bool:
+        """True if the description is valid and no output differs from the model's by more than the limit."""
+        return self.study.passed
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What is wrong with the description or the outputs, one sentence each."""
+        return (*self.study.validation, *self.study.differences)
+
+    @property
+    def title(self) -> str:
+        """The file."""
+        return f"{self.study.path}: check"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Verdict, version of FMI and kinds; the error against the FMU's own reference result."""
+        report = self.study
+        verdict = ("passed" if report.compared else "valid") if report.passed else "FAILED"
+        lines = [f"{report.path}: FMI {report.fmi}, {', '.join(report.kinds)}: {verdict}"]
+        if report.reference_error is not None:
+            error = f"largest error {report.reference_error:.1e} of a range"
+            lines.append(f"{report.path}: repeats the reference result that it carries; {error}")
+        return tuple(lines)
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The verdict, and the largest error of each kind."""
+        report = self.study
+        verdict = Verdict.PASSED if report.passed else Verdict.FAILED
+        largest = [
+            KeyFigure(label=kind, value=max(errors.values()), limit=report.limits[kind], note="largest relative error")
+            for kind, errors in report.errors.items()
+            if errors
+        ]
+        return [KeyFigure(label="Check", value=str(verdict), verdict=verdict), *largest]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Problems, and the largest error of each output, relative to its range."""
+        report, sections = self.study, []
+        if self.problems:
+            rows: list[list[Cell]] = [[problem] for problem in self.problems]
+            listed = table("Problems", ["problem"], rows, on_screen=False)
+            sections.append(Section(heading="Problems", tables=[listed]))
+        if not report.errors:
+            return sections
+        rows = [[name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error]
+        rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
+        caption = f"Largest errors in {report.duration_s:g} s, relative to each output's range"
+        drawn = [
+            OutputError(kind=kind, output=name, error=error, limit=report.limits[kind])
+            for kind, errors in report.errors.items()
+            for name, error in errors.items()
+        ]
+        chart = Illustration(chart=error_chart(drawn, title="Errors by output"))
+        tables = [table(caption, ("output", *report.errors), rows, digits=2)]
+        return [*sections, Section(heading="Outputs", tables=tables, charts=[chart])]
