@@ -67,16 +67,16 @@ def test_the_fmu_of_the_controller_is_written(pilot: t2s.AutopilotResult, tmp_pa
 @pytest.mark.parametrize(
     ("options", "source", "place"),
     [
-        ({"course_change_deg": 0}, "--course-change", ""),
-        ({"course_change_deg": 171}, "--course-change", ""),
-        ({"design": "fuzzy"}, "--design", ""),
+        ({"course_change_deg": 0}, "course_change_deg", ""),
+        ({"course_change_deg": 171}, "course_change_deg", ""),
+        ({"design": "fuzzy"}, "design", ""),
         ({"speed_mps": -1.0}, "speed_mps", ""),
         ({"wind_mps": -1.0}, "wind_mps", ""),
         ({"seed": -1}, "seed", ""),
-        ({"track": [[0, 0]]}, "--track", ""),
-        ({"track": [0, 1]}, "--track", ""),
-        ({"track": [[0, 0], [0, 0]]}, "--track", "waypoint 2"),
-        ({"track": [[0, 0], [float("nan"), 0]]}, "--track", "waypoint 2"),
+        ({"track": [[0, 0]]}, "track", ""),
+        ({"track": [0, 1]}, "track", ""),
+        ({"track": [[0, 0], [0, 0]]}, "track", "waypoint 2"),
+        ({"track": [[0, 0], [float("nan"), 0]]}, "track", "waypoint 2"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_at_its_place(options, source: str, place: str) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim import memory
-from tank2sim.api.bounds import AngleArgument, ArgumentBounds, Count, Effects, Seed, SpeedArgument, bounds_of, checked
+from tank2sim.arguments import AngleArgument, ArgumentBounds, Count, Effects, Seed, SpeedArgument, bounds_of, checked
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
 from tank2sim.cli.options import number

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 import re
 import subprocess
@@ -246,12 +245,6 @@ def test_a_source_date_epoch_that_is_no_time_is_reported(
     with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
         write_fmu(hull, tmp_path / "x.fmu")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_was_written_is_plain_data(hull: Model, tmp_path: Path) -> None:
-    exported = write_fmu(hull, tmp_path / "x.fmu", fmi=3).as_json()
-    assert json.loads(json.dumps(exported))["model_identifier"] == "Test_hull"
-    assert len(exported["platforms"]) == 1
 
 
 def test_an_fmu_bounds_its_states_by_the_number_of_the_simulation(hull: Model, monkeypatch: pytest.MonkeyPatch) -> None:

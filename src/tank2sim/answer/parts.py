@@ -269,17 +269,17 @@ def records_table(
     return table(caption, heads, rows, **options)
 
 
-def cell_text(value: object) -> str:
-    """A value as the screen shows it: numbers with five digits, ``-`` for None."""
+def cell_text(value: object, digits: int = 5) -> str:
+    """A value as the screen shows it: numbers with `digits` significant digits, ``-`` for None."""
     match value:
         case None:
             return "-"
         case bool():
             return "yes" if value else "no"
         case float():
-            return f"{value:.5g}"
+            return f"{value:.{digits}g}"
         case list() | tuple():
-            return ", ".join(cell_text(item) for item in value)
+            return ", ".join(cell_text(item, digits) for item in value)
         case _:
             return str(value)
 

@@ -6,97 +6,165 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
-
-from tank2sim.analysis.heading.craft import study_craft_autopilot
-from tank2sim.analysis.heading.study import StudySettings, check_course_change, check_settings, study_autopilot
-from tank2sim.analysis.heading.track_keeping import check_waypoints, read_waypoints
-from tank2sim.api.ship import Ship
-from tank2sim.arrays import Array
-from tank2sim.cards import CraftCard, ManoeuvringCard
-from tank2sim.errors import InputError
-from tank2sim.native.compiler import find_compiler
-from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
-from tank2sim.simulation.integrator import NO_COMPILER
+from tank2sim.arguments import ArgumentBounds, NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
+from tank2sim.errors import ArgumentError, InputError
+from tank2sim.files import FMU
+from tank2sim.verbs import Output, Progress, verb
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tank2sim.api.ship import Ship
+    from tank2sim.arrays import Array
+    from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
 
-def pilot_ship(
+LARGEST_CHANGE_DEG = 170.0
+"""Largest change of course. Project choice: well below 180 deg, where port and starboard are equivalent."""
+
+CourseAngle = Annotated[float, ArgumentBounds(-LARGEST_CHANGE_DEG, LARGEST_CHANGE_DEG)]
+
+
+def write_controller(
+    result: AutopilotResult | CraftAutopilotResult,
+    path: Path,
+    *,
+    fmi: Literal[2, 3] = 3,
+    verify: bool = False,
+    report: Progress = lambda _: None,
+) -> AutopilotResult | CraftAutopilotResult:
+    """Make the FMU of a controller.
+
+    Parameters
+    ----------
+    result : AutopilotResult or CraftAutopilotResult
+    path : Path
+        Where it goes.
+    fmi : int
+        Version of FMI.
+    verify : bool
+        With --export: co-simulate the FMU with the ship's FMU, and compare with one model of both.
+    report : callable
+        Called with the stage that begins.
+    """
+    return result.make_fmu(path, fmi=fmi, verify=verify, report=report)
+
+
+@verb(
+    "heading controllers, designed, simulated and exported",
+    Output("--export", FMU, "Write the controller as an FMU.", write_controller, "AP.fmu"),
+)
+def autopilot(
     ship: Ship,
-    settings: StudySettings,
-    track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None,
-) -> AutopilotResult:
-    """Design a heading controller and simulate it. Raises as :meth:`.Ship.autopilot`.
+    design: Literal["pd", "pid", "lqr", "robust"] = "pid",
+    *,
+    speed_mps: SpeedArgument | None = None,
+    heading_weight_deg: PositiveArgument = 5.0,
+    rudder_weight_deg: PositiveArgument = 5.0,
+    wave_filter_radps: PositiveArgument | None = None,
+    course_change_deg: CourseAngle = 20.0,
+    current_mps: NonNegativeArgument | None = None,
+    wind_mps: NonNegativeArgument | None = None,
+    wave_yaw_deg: NonNegativeArgument | None = None,
+    seed: Seed | None = None,
+    track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
+) -> AutopilotResult | CraftAutopilotResult:
+    """Design a heading controller for a ship, judge its loop and try it.
+
+    For a craft with thrusters it is a controller of heading and speed.
 
     Parameters
     ----------
     ship : Ship
-        It is steered.
-    settings : StudySettings
-        Of the design and its runs.
-    track : DataFrame, array, path or None
-        Waypoints, as of :meth:`.Ship.autopilot`.
+        A ship with a rudder, or a craft with thrusters. A craft takes the speed and the change of course alone.
+    design : str
+        Way of design.
+    speed_mps : float, optional
+        Speed of the design, m/s; by default the speed of the card.
+    heading_weight_deg : float
+        Heading error, deg, that costs the LQR as much as the rudder weight.
+    rudder_weight_deg : float
+        Rudder, deg, that costs the LQR as much as the heading weight.
+    wave_filter_radps : float, optional
+        Frequency, rad/s, at which the rudder of the PID rests.
+    course_change_deg : float
+        Change of course to try, deg, + to starboard.
+    current_mps : float, optional
+        Current towards east, m/s; by default that of a fresh breeze, by Froude's law.
+    wind_mps : float, optional
+        Wind from north-east, m/s; the ship steers north.
+    wave_yaw_deg : float, optional
+        Yawing by waves, deg, standard deviation.
+    seed : int, optional
+        Seed of the waves.
+    track : DataFrame, array (n, 2) or path, optional
+        Waypoints x_m (north) and y_m (east) of a track to keep, too; on the command line a CSV file.
+
+    Raises
+    ------
+    InputError
+        The ship has neither rudder nor fixed thrusters, a value is out of bounds, or no controller holds the ship.
     """
-    card = ship.card
-    if not isinstance(card, ManoeuvringCard):
-        raise InputError(
-            card.source,
-            "model.kind",
-            "has no rudder",
-            "an autopilot needs a ship with a rudder, or a craft with thrusters",
-        )
-    check_settings(settings)
+    from tank2sim.analysis.heading.designs import LqrWeights
+    from tank2sim.analysis.heading.study import StudySettings, study_autopilot
+    from tank2sim.analysis.heading.track_keeping import waypoints_of
+    from tank2sim.cards import CraftCard, ManoeuvringCard
+    from tank2sim.results.autopilot import AutopilotResult
+
+    if course_change_deg == 0:
+        raise ArgumentError("course_change_deg", "", "is 0", "give the angle to turn by")
+    if isinstance(ship.card, CraftCard):
+        rest: dict[str, Any] = {"heading_weight_deg": heading_weight_deg, "rudder_weight_deg": rudder_weight_deg}
+        rest |= {"wave_filter_radps": wave_filter_radps, "current_mps": current_mps, "wind_mps": wind_mps}
+        rest |= {"wave_yaw_deg": wave_yaw_deg, "seed": seed, "track": track, "design": design}
+        return _pilot_craft(ship, speed_mps, course_change_deg, rest)
+    if not isinstance(ship.card, ManoeuvringCard):
+        remedy = "an autopilot needs a ship with a rudder, or a craft with thrusters"
+        raise InputError(ship.card.source, "model.kind", "has no rudder", remedy)
+    weights = LqrWeights(heading_rad=math.radians(heading_weight_deg), rudder_rad=math.radians(rudder_weight_deg))
+    settings = StudySettings(
+        kind=design,
+        speed_mps=speed_mps,
+        weights=weights,
+        wave_filter_radps=wave_filter_radps,
+        course_change_rad=math.radians(course_change_deg),
+        weather={
+            "current_mps": current_mps,
+            "wind_mps": wind_mps,
+            "wave_yaw_rad": None if wave_yaw_deg is None else math.radians(wave_yaw_deg),
+            "seed": seed,
+        },
+        waypoints=None if track is None else waypoints_of(track),
+    )
     try:
-        study, piloted = study_autopilot(card, ship.model, replace(settings, waypoints=_waypoints(track)))
-    except InputError as fault:
-        if not isinstance(track, str | Path) or fault.source != "--track":
+        study, piloted = study_autopilot(ship.card, ship.model, settings)
+    except ArgumentError as fault:
+        if fault.source != "track" or not isinstance(track, str | Path):
             raise
-        raise InputError(track, fault.place, fault.problem, fault.remedy) from None  # the library knows no file
+        raise InputError(track, fault.place, fault.problem, fault.remedy) from None  # named by the file
     return AutopilotResult(replace(study, notices=(*study.notices, *_no_compiler())), piloted)
 
 
-def _waypoints(track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None) -> Array | None:
-    if track is None:
-        return None
-    if isinstance(track, str | Path):
-        return read_waypoints(track)
-    import pandas as pd
+def _pilot_craft(
+    ship: Ship, speed_mps: float | None, course_change_deg: float, rest: dict[str, Any]
+) -> CraftAutopilotResult:
+    """The autopilot of a craft; `rest` are the arguments that only a ship takes."""
+    from tank2sim.analysis.heading.craft import study_craft_autopilot
+    from tank2sim.cards import CraftCard
+    from tank2sim.results.autopilot import CraftAutopilotResult
 
-    try:
-        table = track[["x_m", "y_m"]] if isinstance(track, pd.DataFrame) else track
-        points = np.asarray(table, dtype=float)
-    except (KeyError, TypeError, ValueError):
-        points = np.zeros(0)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise InputError("--track", "", "is not a table of x_m and y_m", "give waypoints (n, 2), m north and east")
-    check_waypoints(points, "--track", lambda row: f"waypoint {row + 1}")
-    return points
-
-
-def pilot_craft(ship: Ship, *, speed_mps: float | None, course_change_deg: float) -> CraftAutopilotResult:
-    """Design the autopilot of a craft and try it. Raises as :meth:`.Ship.autopilot`.
-
-    Parameters
-    ----------
-    ship : Ship
-        With the card of a craft.
-    speed_mps : float, optional
-        Of the design and of its runs; by default that of the card.
-    course_change_deg : float
-        To try, + to starboard.
-    """
+    usual = {"heading_weight_deg": 5.0, "rudder_weight_deg": 5.0, "design": "pid"}
+    if given := next((name for name, value in rest.items() if value is not None and value != usual.get(name)), ""):
+        raise ArgumentError(given, "", "is not for a craft with thrusters", "leave it out")
     assert isinstance(ship.card, CraftCard)
     change = math.radians(course_change_deg)
-    check_course_change(change)
-    if speed_mps is not None and not 0 < speed_mps < math.inf:
-        raise InputError("--speed", "", f"{speed_mps:g} m/s is not a speed ahead", "give a positive one")
     study, piloted = study_craft_autopilot(ship.card, ship.model, speed_mps=speed_mps, course_change_rad=change)
     return CraftAutopilotResult(replace(study, notices=_no_compiler()), piloted)
 
 
 def _no_compiler() -> tuple[str, ...]:
+    from tank2sim.native.compiler import find_compiler
+    from tank2sim.simulation.integrator import NO_COMPILER
+
     return () if find_compiler() else (NO_COMPILER,)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from tank2sim.analysis.ensemble.results import Members
     from tank2sim.simulation.bands import Band
 
-DEFAULT_MEMBERS = 2000
-"""Size of an ensemble where none is given: the share below a quantile of 5 % is known to 0.5 %. Project choice."""
 
 FEW = 64
 """Members that are computed in this process: fewer are done before others have started. Project choice."""

@@ -10,9 +10,9 @@ from tank2sim.analysis.guess.prior import ShipDimensions
 from tank2sim.analysis.guess.study import Guess, figure_unit, guess_ship, parse_figures
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import GuessedShips, PositiveArgument, Seed, checked
-from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
+from tank2sim.arguments import DEFAULT_MEMBERS
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.memory import refuse_beyond_memory

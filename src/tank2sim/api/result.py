@@ -32,7 +32,7 @@ def screen_table(
     title, columns, rows, notes, wide
         As of :class:`.Table`, with heads as text.
     """
-    return replace(table(title, columns, rows, *notes), wide=wide)
+    return replace(table(title, columns, rows, *notes, digits=5), wide=wide)
 
 
 class OldResult(Result[Any]):

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
+from tank2sim.api.autopilot import autopilot
 from tank2sim.api.bounds import (
     AngleArgument,
     EnsembleSize,
-    NonNegativeArgument,
     NumberArgument,
     PositiveArgument,
     Seed,
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from tank2sim.api.steering_page import SteeringPageResult
     from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.dynamics.model import Model
-    from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
     from tank2sim.results.fmu import ExportResult
     from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
@@ -537,87 +536,7 @@ class Ship:
 
         return tune_ship_through(self, first, second)
 
-    @checked
-    def autopilot(
-        self,
-        design: str = "pid",
-        *,
-        speed_mps: SpeedArgument | None = None,
-        heading_weight_deg: PositiveArgument = 5.0,
-        rudder_weight_deg: PositiveArgument = 5.0,
-        wave_filter_radps: PositiveArgument | None = None,
-        course_change_deg: AngleArgument = 20.0,
-        current_mps: NonNegativeArgument | None = None,
-        wind_mps: NonNegativeArgument | None = None,
-        wave_yaw_deg: NonNegativeArgument | None = None,
-        seed: Seed | None = None,
-        track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
-    ) -> AutopilotResult | CraftAutopilotResult:
-        """Design a heading controller, judge its loop and try it; of a craft with thrusters, one of heading and speed.
-
-        Parameters
-        ----------
-        design : str
-            ``pd``, ``pid``, ``lqr`` or ``robust``.
-        speed_mps : float, optional
-            Of the design; by default the speed of the card. A craft takes this and the change of course alone.
-        heading_weight_deg, rudder_weight_deg : float
-            Heading error and rudder that are equally bad for the LQR.
-        wave_filter_radps : float, optional
-            Frequency at which the rudder of the PID rests.
-        course_change_deg : float
-            To try, up to 170 either way, + to starboard.
-        current_mps, wind_mps, wave_yaw_deg : float, optional
-            Current towards east, wind from north-east, standard deviation of the yaw by waves; the ship steers north.
-            By default those of a fresh breeze, by Froude's law.
-        seed : int, optional
-            Of the waves.
-        track : DataFrame, array (n, 2) or path, optional
-            Waypoints ``x_m`` (north) and ``y_m`` (east) of a track to keep, too.
-
-        Raises
-        ------
-        InputError
-            The ship has neither rudder nor fixed thrusters, a value is out of bounds, or no controller holds the ship.
-        """
-        if isinstance(self.card, CraftCard):
-            from tank2sim.api.autopilot import pilot_craft
-
-            given = {
-                "--design": design != "pid",
-                "--heading-weight": heading_weight_deg != 5.0,
-                "--rudder-weight": rudder_weight_deg != 5.0,
-                "--wave-filter": wave_filter_radps is not None,
-                "--current": current_mps is not None,
-                "--wind": wind_mps is not None,
-                "--wave-yaw": wave_yaw_deg is not None,
-                "--seed": seed is not None,
-                "--track": track is not None,
-            }
-            for option, there in given.items():
-                if there:
-                    raise InputError(option, "", "is not for a craft with thrusters", "leave it out")
-            return pilot_craft(self, speed_mps=speed_mps, course_change_deg=course_change_deg)
-        from tank2sim.analysis.heading.designs import LqrWeights
-        from tank2sim.analysis.heading.study import StudySettings
-        from tank2sim.api.autopilot import pilot_ship
-
-        settings = StudySettings(
-            kind=design,
-            speed_mps=speed_mps,
-            weights=LqrWeights(
-                heading_rad=math.radians(heading_weight_deg), rudder_rad=math.radians(rudder_weight_deg)
-            ),
-            wave_filter_radps=wave_filter_radps,
-            course_change_rad=math.radians(course_change_deg),
-            weather={
-                "current_mps": current_mps,
-                "wind_mps": wind_mps,
-                "wave_yaw_rad": None if wave_yaw_deg is None else math.radians(wave_yaw_deg),
-                "seed": seed,
-            },
-        )
-        return pilot_ship(self, settings, track)
+    autopilot = autopilot
 
     @checked
     def glide(

@@ -73,6 +73,10 @@ GROUPS = {
 COMMANDS = {name: words for group in GROUPS.values() for name, words in group.items()}
 
 
+VERBS = {"autopilot": "api.autopilot:autopilot"}
+"""Commands that are derived from their function."""
+
+
 class _Commands(click.Group):
     """Commands are imported when they are called, so that ``tank2sim ships`` does not wait for CasADi."""
 
@@ -88,6 +92,12 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
+        if cmd_name in VERBS:
+            module, _, function = VERBS[cmd_name].partition(":")
+            declared = getattr(importlib.import_module(f"tank2sim.{module}"), function)
+            from tank2sim.cli.derived import command_of
+
+            return command_of(cmd_name, declared.verb)
         command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
         return command
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 from rich.console import Console
 from rich.markup import escape
 from rich.measure import Measurement
-from rich.table import Table
+from rich.table import Table as Grid
 
-from tank2sim.answer.parts import cell_text
+from tank2sim.answer.parts import Table, cell_text
 from tank2sim.answer.result import Result
 from tank2sim.errors import InputError
 from tank2sim.escaping import file_name, one_line
-from tank2sim.files import JSON, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
+from tank2sim.files import JSON, PICTURE, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
 from tank2sim.marks import marked
 
 screen = Console(highlight=False)
@@ -49,18 +49,21 @@ json_option = click.option(
 """``--json FILE``, the same on every command."""
 
 
-def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]], *, wide: bool = False) -> None:
-    """Print a table; numbers are rounded to five digits and aligned right. A wide one breaks no cell."""
-    table = Table(header_style="bold", pad_edge=False)
-    rows = [list(row) for row in rows]
-    for place, head in enumerate(heads):
-        numeric = all(isinstance(row[place], int | float) or row[place] is None for row in rows)
-        table.add_column(escape(head), justify="right" if numeric else "left", overflow="fold", no_wrap=wide)
-    for row in rows:
-        table.add_row(*(escape(one_line(cell_text(value))) for value in row))
-    screen.print(escape(one_line(title)), style="italic", soft_wrap=True)
-    needed = Measurement.get(screen, screen.options.update(width=_WIDEST), table).maximum if wide else 0
-    Console(width=max(needed, screen.width), highlight=False, stderr=screen.stderr).print(table)
+def show_table(shown: Table) -> None:
+    """Print a table with its notes; numbers are aligned right. A wide one breaks no cell."""
+    grid = Grid(header_style="bold", pad_edge=False)
+    for place, head in enumerate(shown.heads):
+        numeric = all(isinstance(row[place], int | float) or row[place] is None for row in shown.rows)
+        justify: Literal["left", "right"] = "right" if numeric else "left"
+        grid.add_column(escape(head), justify=justify, overflow="fold", no_wrap=shown.wide)
+    digits = [column.digits for column in shown.columns]
+    for row in shown.rows:
+        grid.add_row(*(escape(one_line(cell_text(*cell))) for cell in zip(row, digits, strict=True)))
+    screen.print(escape(one_line(shown.caption)), style="italic", soft_wrap=True)
+    needed = Measurement.get(screen, screen.options.update(width=_WIDEST), grid).maximum if shown.wide else 0
+    Console(width=max(needed, screen.width), highlight=False, stderr=screen.stderr).print(grid)
+    for note in shown.notes:
+        screen.print(escape(one_line(note)), soft_wrap=True)
 
 
 def show_notices(notices: Iterable[str]) -> None:
@@ -78,16 +81,74 @@ def show_marked(notices: Iterable[str]) -> list[str]:
     return [notice for notice in notices if notice not in first]
 
 
-def show_result(result: Result[Any]) -> None:
-    """Print a result: its marks first, then the main findings, tables and notices."""
+def show_result(
+    result: Result[Any], written: Iterable[Path] = (), *, quiet: bool = False, verbose: bool = False
+) -> None:
+    """Print a result: its marks first, then the main findings, tables, files and notices.
+
+    Parameters
+    ----------
+    result : Result
+    written : paths
+        Files that were written.
+    quiet : bool
+        Only marks.
+    verbose : bool
+        All tables, not only those for the screen.
+    """
     others = show_marked(result.notices)
+    if quiet:
+        return
     for line in result.headline:
         screen.print(escape(one_line(line)), soft_wrap=True)
-    for table in result.screen_tables:
-        show_table(table.caption, table.heads, table.rows, wide=table.wide)
-        for note in table.notes:
-            screen.print(escape(one_line(note)), soft_wrap=True)
+    for table in result.tables if verbose else result.screen_tables:
+        show_table(table)
+    for path in written:
+        screen.print(f"wrote {escape(one_line(str(path)))}", soft_wrap=True)
     show_notices(others)
+
+
+def write_outputs(
+    result: Result[Any],
+    files: Mapping[Path, str | bytes],
+    inputs: Iterable[Path],
+    *,
+    page: Path | None,
+    plot: Path | None,
+    json: Path | None,
+) -> list[Path]:
+    """Write what of a result was asked for, all files or none, and return their paths.
+
+    Parameters
+    ----------
+    result : Result
+    files : mapping
+        Paths and contents of the files that only this command writes.
+    inputs : paths
+        Files that were read and must not be overwritten.
+    page, json : Path, optional
+    plot : Path, optional
+        Picture of the main chart, if its name ends like a picture; else a folder for all charts and the page.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written, is an input or is given twice.
+    """
+    contents = dict(files)
+    if json:
+        screen.stderr = json is STANDARD_OUTPUT  # then standard output is JSON and nothing else
+        contents[json] = result.to_json()
+    if page:
+        contents[page] = result.page()
+    if plot and plot.suffix.lower() in PICTURE:
+        contents[plot] = result.picture(ending=plot.suffix)
+    elif plot:
+        writable_folder(plot)
+        contents |= {plot / f"{file_name(name)}.png": result.picture(name) for name in result.charts()}
+        contents[plot / "report.html"] = result.page()
+    write_together(contents, inputs=inputs, outputs=[path for path in (*files, page, plot, json) if path in contents])
+    return [path for path in contents if path is not STANDARD_OUTPUT]
 
 
 def write_result(

@@ -13,6 +13,7 @@ from pathlib import Path
 from tank2sim.answer.page import render_page
 from tank2sim.api.gap import GapResult, misfit_text
 from tank2sim.api.gap_files import folder_made, put, refuse_early
+from tank2sim.api.result import screen_table
 from tank2sim.api.trial import fitted_and_held
 from tank2sim.cards import read_card
 from tank2sim.cli.console import screen, show_notices, show_table
@@ -199,7 +200,7 @@ def _show(summary: FleetSummary, course: _Course, output: Path) -> None:
         rows.append([ship.folder, ship.verdict or "no result", names, *misfits, course.done.get(ship.folder, "-")])
     heads = ["ship", "verdict", "effect", "before", "after", "result"]
     title = "Misfit in units of the noise (1 is noise), of trials held out where there are some"
-    show_table(title, heads, rows, wide=True)
+    show_table(screen_table(title, heads, rows, wide=True))
     show_notices([*summary.notices, *course.notices, *_without_ship(summary, output)])
     written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(summary.ships)} ships"
     screen.print(written, soft_wrap=True, markup=False)

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from tank2sim.api.bounds import GuessedShips, Seed
-from tank2sim.api.ensemble import DEFAULT_MEMBERS
 from tank2sim.api.guess import guess as guess_a_ship
+from tank2sim.arguments import DEFAULT_MEMBERS
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option
 from tank2sim.files import CARD

@@ -9,11 +9,10 @@ from typing import Any
 
 import click
 
-from tank2sim.api.bounds import ENSEMBLE, Seed, bounds_of
-from tank2sim.api.ensemble import DEFAULT_MEMBERS
+from tank2sim.arguments import DEFAULT_MEMBERS, ENSEMBLE, Seed, bounds_of
 from tank2sim.cli.overrides import parse_changes
 from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
-from tank2sim.files import PAGE, PICTURE, refuse_other_ending
+from tank2sim.files import JSON, PAGE, PICTURE, STANDARD_OUTPUT, refuse_other_ending
 
 Command = Callable[..., Any]
 
@@ -52,6 +51,8 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """As of any parameter. Raises InputError if the name ends as files of another kind do."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if self.endings == JSON and str(path) == "-":
+            return STANDARD_OUTPUT
         refuse_other_ending(path, self.endings)
         return path
 

@@ -35,7 +35,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.marks import CHECK
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
@@ -51,9 +51,6 @@ Project choice: the change has settled then.
 """
 _KEEPING_TIMES = 120
 """Length of course keeping in 1/w; figures are those of its later half."""
-
-LARGEST_CHANGE_DEG = 170.0
-"""Largest change of course. Project choice: well below 180 deg, where port and starboard are equivalent."""
 
 _WAVES_SHOWN = 40
 """Interval of the histories of course keeping. Project choice: it shows single waves."""
@@ -204,35 +201,6 @@ def _histories(runs: Mapping[str, Trajectory], weather: Weather) -> dict[str, Co
     return {name: histories(run, last if name == "keeping" else 0.0) for name, run in runs.items()}
 
 
-def check_settings(settings: StudySettings) -> None:
-    """Refuse values outside their bounds.
-
-    Raises
-    ------
-    InputError
-        One is.
-    """
-    check_course_change(settings.course_change_rad)
-    positive = {
-        "--speed": settings.speed_mps,
-        "--heading-weight": settings.weights.heading_rad,
-        "--rudder-weight": settings.weights.rudder_rad,
-        "--wave-filter": settings.wave_filter_radps,
-    }
-    weather = {"--current": "current_mps", "--wind": "wind_mps", "--wave-yaw": "wave_yaw_rad", "--seed": "seed"}
-    for option, value in (positive | {option: settings.weather.get(name) for option, name in weather.items()}).items():
-        if value is not None and not (0 <= value < math.inf and (value or option in weather)):
-            raise InputError(option, "", f"is {value:g}", "a positive number was expected")
-
-
-def check_course_change(change_rad: float) -> None:
-    """Refuse a change of course that is none, or further than :data:`LARGEST_CHANGE_DEG` either way."""
-    change = math.degrees(change_rad)
-    if not 0 < abs(change) <= LARGEST_CHANGE_DEG * (1 + 1e-12):
-        remedy = f"give the angle to turn by, up to {LARGEST_CHANGE_DEG:g} deg either way"
-        raise InputError("--course-change", "", f"is {change:g}", remedy)
-
-
 def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> tuple[AutopilotStudy, Piloted]:
     """Design a heading controller and test it.
 
@@ -336,7 +304,7 @@ def _refuse_fixed_speed(card: ManoeuvringCard, speed: float | None) -> None:
     card_speed = card.model.speed_mps
     if speed is not None and abs(speed / card_speed - 1) > 1e-6:
         problem = f"{speed:g} m/s is not the speed of {card.ship.name}, whose forces are linear"
-        raise InputError("--speed", "", problem, f"leave it out: a linear card holds at {card_speed:g} m/s alone")
+        raise ArgumentError("speed_mps", "", problem, f"leave it out: a linear card holds at {card_speed:g} m/s alone")
 
 
 def _not_stable(ship: Model, design: HeadingDesign, speed: float | None) -> InputError:

@@ -11,18 +11,22 @@ which removes the error by a current. A leg ends within the circle of acceptance
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tank2sim.analysis.heading.runs import HeadingLoop
 from tank2sim.arrays import Array, Columns
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GUIDANCE_STEP_S = 1.0
 """Interval of heading orders: that of positions from satellite navigation."""
@@ -116,6 +120,34 @@ def read_waypoints(path: Path | str) -> Array:
     return np.asarray(points)
 
 
+def waypoints_of(track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path) -> Array:
+    """Waypoints (n, 2), x north and y east in m, from a table, an array or a CSV file.
+
+    Parameters
+    ----------
+    track : DataFrame, array (n, 2) or path
+        Columns ``x_m`` and ``y_m``.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_waypoints`.
+    """
+    if isinstance(track, str | Path):
+        return read_waypoints(track)
+    import pandas as pd
+
+    try:
+        table = track[["x_m", "y_m"]] if isinstance(track, pd.DataFrame) else track
+        points = np.asarray(table, dtype=float)
+    except (KeyError, TypeError, ValueError):
+        points = np.zeros(0)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ArgumentError("track", "", "is not a table of x_m and y_m", "give waypoints (n, 2), m north and east")
+    check_waypoints(points, "track", lambda row: f"waypoint {row + 1}")
+    return points
+
+
 def check_waypoints(points: Array, source: Path | str, place: Callable[[int], str]) -> None:
     """Refuse waypoints (n, 2) that do not form a track; `place` gives the location of a waypoint by its number, from 0.
 
@@ -203,7 +235,7 @@ def _refuse_short_legs(waypoints: Array, radius: float) -> None:
     if short.size:
         where = f"leg {short[0] + 1}"
         problem = f"is {legs[short[0]]:.4g} m, and the next begins {radius:.4g} m before its end"
-        raise InputError("--track", where, problem, "place its waypoints further apart")
+        raise ArgumentError("track", where, problem, "place its waypoints further apart")
 
 
 class _Sailed:

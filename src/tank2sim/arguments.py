@@ -1,0 +1,206 @@
+"""Bounds of numbers that a user gives, stated once for functions of the API and options of the command line."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+
+from tank2sim.errors import ArgumentError, close_name
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class ArgumentBounds:
+    """Lowest and highest value of a number; without one there is none.
+
+    Parameters
+    ----------
+    low, high : float, optional
+    above : bool
+        The lowest value itself is out of bounds.
+    whole : bool
+        It is a whole number.
+    """
+
+    low: float | None = None
+    high: float | None = None
+    above: bool = False
+    whole: bool = False
+
+    @property
+    def words(self) -> str:
+        """What is expected: ``a number above 0``."""
+        kind = "a whole number" if self.whole else "a finite number"
+        lowest = "" if self.low is None else f" above {self.low:g}" if self.above else f" from {self.low:,.10g}"
+        highest = "" if self.high is None else f" up to {self.high:,.10g}"
+        return f"{kind}{lowest}{highest}"
+
+    def checked(self, name: str, value: object) -> float | int:
+        """The number as Python has it; numbers of NumPy are taken, text, truth values and arrays are not.
+
+        Raises
+        ------
+        InputError
+            It is not such a number.
+        """
+        number: Any = value
+        if hasattr(number, "dtype") and not number.shape:  # a number of NumPy
+            number = number.item()
+        if isinstance(number, float) and self.whole and number.is_integer():
+            number = int(number)
+        if not isinstance(number, int if self.whole else int | float) or isinstance(number, bool):
+            raise ArgumentError(name, "", f"is {_short(value)}", f"give {self.words}")
+        assert isinstance(number, int | float)
+        low, high = self.low, self.high
+        too_low = low is not None and (number <= low if self.above else number < low)
+        if too_low or (high is not None and number > high) or not _finite(number):
+            raise ArgumentError(name, "", f"is {_short(value)}", f"give {self.words}")
+        return number
+
+
+def _finite(number: float) -> bool:
+    try:
+        return math.isfinite(number)
+    except OverflowError:  # an integer beyond all floats
+        return False
+
+
+def _short(value: object) -> str:
+    """A value in a few words."""
+    if isinstance(value, int | float | str) or value is None:
+        text = "an integer of many digits" if isinstance(value, int) and abs(value) >= 10**20 else repr(value)
+    else:
+        text = f"of the type {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+# What a number is, in the annotations of functions; its unit is that of the parameter's name.
+NumberArgument = Annotated[float, ArgumentBounds()]
+PositiveArgument = Annotated[float, ArgumentBounds(0, above=True)]
+NonNegativeArgument = Annotated[float, ArgumentBounds(0)]
+AngleArgument = Annotated[float, ArgumentBounds(-360, 360)]
+SpeedArgument = Annotated[float, ArgumentBounds(0, 100, above=True)]
+"""m/s; as a card has it."""
+TuningRange = Annotated[float, ArgumentBounds(0, 100, above=True)]
+"""Standard errors."""
+Percent = Annotated[float, ArgumentBounds(0, 1000)]
+Scatter = Annotated[float, ArgumentBounds(0, 10, above=True)]
+DrawsArgument = Annotated[int, ArgumentBounds(0, 1000, whole=True)]
+Seed = Annotated[int, ArgumentBounds(0, whole=True)]
+Effects = Annotated[int, ArgumentBounds(1, 4, whole=True)]
+"""That a search names at most: :data:`tank2sim.gap.workflow.MOST_EFFECTS`."""
+Count = Annotated[int, ArgumentBounds(1, whole=True)]
+ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
+"""Ships of an ensemble. Project choice: a day of computing."""
+EnsembleSize = Annotated[int, ENSEMBLE]
+SmallEnsemble = Annotated[int, ArgumentBounds(0, 100_000, whole=True)]
+"""Ships that are each simulated on trials. Project choice: a day of computing."""
+DEFAULT_MEMBERS = 2000
+"""Size of an ensemble where none is given: the share below a quantile of 5 % is known to 0.5 %. Project choice."""
+GuessedShips = Annotated[int, ArgumentBounds(100, 1_000_000, whole=True)]
+DrawsOfChain = Annotated[int, ArgumentBounds(10, 1_000_000, whole=True)]
+
+
+def bounds_of(kind: Any) -> ArgumentBounds | None:
+    """The bounds of a type of this module; None if it has none.
+
+    Parameters
+    ----------
+    kind : type
+        ``SpeedArgument``, for example.
+    """
+    return next((part for part in get_args(kind) if isinstance(part, ArgumentBounds)), None)
+
+
+def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """A function whose arguments are checked by their annotations: what they are, and the bounds of numbers.
+
+    An annotation with a name that is known to type checkers alone is not checked.
+
+    Raises
+    ------
+    InputError
+        When it is called with something else; it names the argument.
+    """
+    signature = inspect.signature(function)
+
+    @functools.cache
+    def kinds() -> dict[str, Any]:
+        return {name: _kind(one.annotation, function.__globals__) for name, one in signature.parameters.items()}
+
+    @functools.wraps(function)
+    def call(*args: _P.args, **options: _P.kwargs) -> _T:
+        bound = signature.bind(*args, **options)
+        for name, value in bound.arguments.items():
+            bound.arguments[name] = _as_kind(name, value, kinds()[name])
+        return function(*bound.args, **bound.kwargs)
+
+    return call
+
+
+def _kind(annotation: object, names: dict[str, Any]) -> Any:
+    """The type that an annotation names; Any where that is not known while the program runs."""
+    if not isinstance(annotation, str):
+        return Any
+    try:
+        return eval(annotation, {**globals(), **names})
+    except (NameError, AttributeError, TypeError):
+        return Any
+
+
+def _as_kind(name: str, value: Any, kind: Any) -> Any:
+    """A value as its kind has it. Raises InputError, which names it, if it is of another kind."""
+    if get_origin(kind) in (Union, UnionType):
+        faults = []
+        for part in get_args(kind):
+            try:
+                return _as_kind(name, value, part)
+            except ArgumentError as fault:
+                faults.append(fault)
+        raise next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
+    if (bounds := bounds_of(kind)) is not None and get_origin(kind) is Annotated:
+        return bounds.checked(name, value)
+    origin, parts = get_origin(kind) or kind, get_args(kind)
+    if origin is Literal:
+        if not isinstance(value, str | int) or value not in parts:
+            known = [str(part) for part in parts]
+            remedy = close_name(value, known) if isinstance(value, str) else f"known are: {', '.join(known)}"
+            raise ArgumentError(name, "", f"is {_short(value)}", remedy)
+        return value
+    if origin is float:
+        return ArgumentBounds().checked(name, value)
+    if not _is_a(value, origin):
+        called = getattr(origin, "__name__", str(origin))
+        words = {"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"}
+        raise ArgumentError(
+            name, "", f"is {_short(value)}", f"give {words.get(called, f'a value of the type {called}')}"
+        )
+    if origin is Sequence and parts and isinstance(value, list | tuple):
+        return type(value)(_as_kind(name, item, parts[0]) for item in value)
+    if origin is Mapping and parts:
+        keys, items = parts
+        return {_as_kind(name, key, keys): _as_kind(f"{name}: {key}", item, items) for key, item in value.items()}
+    return value
+
+
+def _is_a(value: Any, kind: Any) -> bool:
+    """Whether a value is of a kind; of one that cannot be asked for, everything is."""
+    if kind is Path:
+        return isinstance(value, os.PathLike)
+    if kind is Sequence:  # arrays, series, views and sets do as well
+        return isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    if kind is None:
+        return value is None
+    try:
+        return isinstance(value, kind)
+    except TypeError:
+        return True

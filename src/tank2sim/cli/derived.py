@@ -1,0 +1,261 @@
+"""The command of a verb: arguments, options, bounds, choices and help from its signature and its docstring."""
+
+from __future__ import annotations
+
+import builtins
+import inspect
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import click
+from docstring_parser import DocstringStyle, parse
+
+from tank2sim import arguments
+from tank2sim.cli.options import OutputFile
+from tank2sim.files import JSON, PAGE, PICTURE
+from tank2sim.units import in_words
+from tank2sim.verbs import Output, Verb
+
+
+class _Unknown(type):
+    """A type that only type checkers know, with whatever members it has."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return _Unknown(name, (), {})
+
+    def __getitem__(cls, parts: Any) -> Any:
+        return cls
+
+
+class _Names(dict[str, Any]):
+    """Names that annotations use."""
+
+    def __missing__(self, name: str) -> Any:
+        return _Unknown(name, (), {})
+
+
+class VerbCommand(click.Command):
+    """A command whose options that take several words take all up to the next option: ``--holdout A B -o C``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Give each of the words an option of its own, as click has it."""
+        several = {name for one in self.params if isinstance(one, click.Option) and one.multiple for name in one.opts}
+        spread: list[str] = []
+        taking = ""
+        for word, following in pairwise([*args, "-"]):
+            if word in several and following.startswith("--"):
+                raise click.UsageError(f"{word} is followed by nothing", ctx)
+            if word.startswith("-") and not _is_number(word):
+                taking = word if word in several else ""
+                spread += [] if taking else [word]
+            else:
+                spread += [taking, word] if taking else [word]
+        return super().parse_args(ctx, spread)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def command_of(name: str, verb: Verb) -> click.Command:
+    """Return the command of a verb.
+
+    Parameters
+    ----------
+    name : str
+        Name of the command.
+    verb : Verb
+    """
+    documented = parse(verb.function.__doc__ or "", style=DocstringStyle.NUMPYDOC)
+    helps = {names: " ".join((one.description or "").split()) for one in documented.params for names in [one.arg_name]}
+    helps = {single.strip(): text for names, text in helps.items() for single in names.split(",")}
+    own = [parameter for one in _arguments(verb.function) for parameter in _parameters(one, helps, verb)]
+    written = [parameter for output in verb.outputs for parameter in _output_parameters(output)]
+    main = [] if any(output.option == "-o" for output in verb.outputs) else ["-o"]
+    shared = [
+        _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page."),
+        _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, .pdf),"
+                " or each chart and the page into a folder."),
+        _option(["--json"], type=OutputFile(JSON), metavar="FILE", help="Write the full result; - is standard output."),
+        _option(["--quiet"], is_flag=True, help="Print doubts and errors alone."),
+        _option(["--verbose"], is_flag=True, help="Print every table."),
+    ]  # fmt: skip
+    text = "\n\n".join(part for part in (documented.short_description, documented.long_description) if part)
+
+    def run(**given: Any) -> int:
+        return _run(verb, given)
+
+    return VerbCommand(name, params=[*own, *written, *shared], callback=run, help=text.replace("``", ""))
+
+
+def _arguments(function: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Any]]:
+    """Parameters of a function with their types, None left out; progress reports are given by the command line."""
+    names = _Names(vars(builtins) | vars(arguments) | inspect.unwrap(function).__globals__)
+    for one in inspect.signature(function).parameters.values():
+        kind = eval(one.annotation, {}, names) if isinstance(one.annotation, str) else one.annotation
+        if one.annotation != "Progress":
+            yield one, kind
+
+
+def _parts(kind: Any) -> list[Any]:
+    """The alternatives of a type, without None."""
+    parts = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+    return [part for part in parts if part is not type(None)]
+
+
+def _several(kind: Any) -> Any:
+    """The sequence among the alternatives of a type that takes several words; None without one."""
+    parts = _parts(kind)
+    words = str in parts or Path in parts
+    sequences = [part for part in parts if get_origin(part) is Sequence]
+    return next((one for one in sequences if not words or {str, Path} & set(_parts(get_args(one)[0]))), None)
+
+
+def _is_of(name: str, kind: Any) -> bool:
+    return any(getattr(part, "__name__", "") == name for part in _parts(kind))
+
+
+def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str], verb: Verb) -> list[click.Parameter]:
+    """The argument or the options of one parameter of a verb."""
+    one, kind = argument
+    several = _several(kind)
+    if _is_of("Ship", kind):
+        change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
+                         "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
+        required = one.default is inspect.Parameter.empty
+        card = click.Argument([one.name], metavar="CARD", required=required)
+        return [card, change] if required else [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+    if one.kind is not inspect.Parameter.KEYWORD_ONLY and one.default is inspect.Parameter.empty:
+        nargs = -1 if several else 1
+        return [click.Argument([one.name], nargs=nargs, required=True, type=_type(kind, several))]
+    default = None if one.default in (inspect.Parameter.empty, None) else one.default
+    shown: dict[str, Any] = {"help": helps.get(one.name), "default": default}
+    stem, unit = _stem(one.name)
+    option = f"--{stem.replace('_', '-')}"
+    names = list(dict.fromkeys((option, f"--{one.name.replace('_', '-')}")))
+    if kind is bool:
+        flags = [f"{option}/--no-{option[2:]}"] if one.default else names
+        return [_option(flags, name=one.name, is_flag=True, **shown)]
+    if one.name in verb.texts:
+        return [_option(names, name=one.name, multiple=bool(several), metavar=stem.upper(), **shown)]
+    metavar = unit.upper().replace("/", "P") if unit else None
+    shown["show_default"] = default not in (None, "", ())
+    return [_option(names, name=one.name, type=_type(kind, several), multiple=bool(several), metavar=metavar, **shown)]
+
+
+def _stem(name: str) -> tuple[str, str]:
+    words, unit = in_words(name)
+    return (words.replace(" ", "_"), unit) if unit else (name, "")
+
+
+def _type(kind: Any, several: Any) -> Any:
+    """The click type of a type; of a sequence, of its items."""
+    parts = _parts(get_args(several)[0]) if several else _parts(kind)
+    for part in parts:
+        if (limits := arguments.bounds_of(part)) is not None and get_origin(part) is Annotated:
+            return _number(limits)
+        if get_origin(part) is Literal:
+            choices = [str(choice) for choice in get_args(part)]
+            return click.Choice(choices)
+    if Path in parts:
+        return click.Path(path_type=Path)
+    return next((part for part in parts if part in (int, float)), str)
+
+
+def _number(limits: arguments.ArgumentBounds) -> click.IntRange | click.FloatRange:
+    if limits.whole:
+        return click.IntRange(
+            None if limits.low is None else int(limits.low), None if limits.high is None else int(limits.high)
+        )
+    return click.FloatRange(limits.low, limits.high, min_open=limits.above)
+
+
+def _option(names: Sequence[str], *, name: str = "", **settings: Any) -> click.Option:
+    own = name or names[-1].lstrip("-").replace("-", "_")
+    return click.Option([*names, own], **settings)
+
+
+def _output_parameters(output: Output) -> list[click.Parameter]:
+    """The option of an output, and those of its keyword arguments."""
+    names = [output.option, "--output"] if output.option == "-o" else [output.option]
+    where = _option(names, type=OutputFile(output.endings), metavar=output.metavar, help=output.help,
+                    required=output.required)  # fmt: skip
+    found: list[click.Parameter] = [where]
+    documented = parse(output.write.__doc__ or "", style=DocstringStyle.NUMPYDOC)
+    helps = {one.arg_name: " ".join((one.description or "").split()) for one in documented.params}
+    for one, kind in _arguments(output.write):
+        if one.kind is inspect.Parameter.KEYWORD_ONLY:
+            found += _parameters((one, kind), helps, Verb(output.write, ""))
+    return found
+
+
+def _run(verb: Verb, given: dict[str, Any]) -> int:
+    """Call a verb with what the command line gave, write its files, and print its result."""
+    from tank2sim.cli.console import show_result, write_outputs
+    from tank2sim.cli.progress import showing_stages
+
+    values, changes = dict(given), given.get("set", ())
+    inputs: list[Path] = []
+    with ExitStack() as stack:
+        call = _values_for(verb.function, values, verb.texts, changes, inputs)
+        if "report" in inspect.signature(verb.function).parameters:
+            call["report"] = stack.enter_context(showing_stages(verb.words))
+        result = verb.function(**call)
+        contents: dict[Path, str | bytes] = {}
+        for output in verb.outputs:
+            name = "output" if output.option == "-o" else output.option.lstrip("-").replace("-", "_")
+            if (path := values.get(name)) is None:
+                continue
+            own = {one.name for one, _ in _arguments(output.write) if one.kind is inspect.Parameter.KEYWORD_ONLY}
+            options = _values_for(output.write, {name: values[name] for name in own}, {}, (), inputs)
+            if "report" in inspect.signature(output.write).parameters:
+                options["report"] = stack.enter_context(showing_stages("writing"))
+            made = output.write(result, path, **options)
+            if not isinstance(made, Mapping):
+                result, made = made, made.files
+            contents |= made
+    given_files = {name: values[name] for name in ("page", "plot", "json")}
+    written = write_outputs(result, contents, inputs, **given_files)
+    show_result(result, written, quiet=values["quiet"], verbose=values["verbose"])
+    return verb.exit_code(result)
+
+
+def _values_for(
+    function: Callable[..., Any],
+    values: Mapping[str, Any],
+    texts: Mapping[str, Callable[[Any], Any]],
+    changes: Sequence[str],
+    inputs: list[Path],
+) -> dict[str, Any]:
+    """The arguments of a function from the options; files that are read are added to `inputs`."""
+    call: dict[str, Any] = {}
+    for one, kind in _arguments(function):
+        if one.name not in values or (value := values[one.name]) is None or value == ():
+            continue
+        if _is_of("Ship", kind):
+            from tank2sim.api.ship import load
+            from tank2sim.cli.overrides import parse_changes
+
+            value = load(value, parse_changes(changes))
+            inputs.append(Path(value.card.source))
+        elif one.name in texts:
+            value = texts[one.name](value)
+        elif _literal(kind):
+            value = next(choice for choice in _literal(kind) if str(choice) == value)
+        inputs += [path for path in (value if isinstance(value, tuple) else (value,)) if isinstance(path, Path)]
+        call[one.name] = value
+    return call
+
+
+def _literal(kind: Any) -> tuple[Any, ...]:
+    return next((get_args(part) for part in _parts(kind) if get_origin(part) is Literal), ())

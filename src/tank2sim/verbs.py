@@ -1,0 +1,87 @@
+"""Verbs: functions of the API that are commands, too; each declares what the command line adds to its signature.
+
+This module and those that declare verbs import nothing heavy, so that the help of a command is there at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ParamSpec, TypeVar
+
+from tank2sim.arguments import checked
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+Progress = Callable[[str], None]
+"""Argument of a verb that takes long: called with the stage that begins; the command line shows it."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file that a command can write of its result, in addition to page, pictures and JSON.
+
+    Parameters
+    ----------
+    option : str
+        ``-o`` for the main one.
+    endings : tuple of str
+        How the name of the file may end (:mod:`tank2sim.files`); empty for a folder.
+    help : str
+    write : callable
+        Called with the result and the path; returns contents by path, or a result whose ``files`` they are. Its
+        keyword arguments are options of the command.
+    metavar : str
+    required : bool
+    """
+
+    option: str
+    endings: tuple[str, ...]
+    help: str
+    write: Callable[..., Any]
+    metavar: str = "FILE"
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A command as its function declares it.
+
+    Parameters
+    ----------
+    function : callable
+    words : str
+        A few words for the list of commands.
+    outputs : sequence of Output
+    texts : mapping
+        Argument to a function that makes its value of the words on the command line.
+    exit_code : callable
+        Of the result: the code with which the command ends.
+    """
+
+    function: Callable[..., Any]
+    words: str
+    outputs: Sequence[Output] = ()
+    texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
+    exit_code: Callable[[Any], int] = lambda _: 0
+
+
+def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:
+    """Declare a function a verb: its arguments are checked by their annotations, and it is a command.
+
+    Parameters
+    ----------
+    words : str
+        A few words for the list of commands.
+    *outputs : Output
+    **more
+        Further fields of :class:`Verb`.
+    """
+
+    def declare(function: Callable[_P, _T]) -> Callable[_P, _T]:
+        whole = checked(function)
+        whole.verb = Verb(whole, words, outputs, **more)  # type: ignore[attr-defined]
+        return whole
+
+    return declare
