@@ -55,7 +55,7 @@ class TrackKeeping:
     Parameters
     ----------
     length_m : float
-        Of all its legs.
+        Length of all its legs.
     duration_s : float
         Until the end of the last leg, or of the run.
     finished : bool
@@ -168,7 +168,7 @@ def keep_track(
     waypoints : array (n, 2)
     guidance : Guidance
     inputs : mapping, optional
-        Of the model, by name (current, wind); held.
+        Inputs of the model, by name (current, wind); held.
 
     Raises
     ------
