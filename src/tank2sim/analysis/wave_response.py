@@ -136,7 +136,7 @@ def wave_rows(body: Any, hull: HullInWaves, density: float, gravity: float, leng
         As :func:`read_hull` returns it.
     hull : HullInWaves
     density, gravity, length : float
-        Of the water, kg/m^3; m/s^2; L, m, for the default frequencies.
+        Density of the water, kg/m^3; gravity, m/s^2; L, m, for the default frequencies.
     """
     solver, rao = (importlib.import_module(f"capytaine{part}") for part in ("", ".post_pro.rao"))
     drift = importlib.import_module("capytaine.post_pro.mean_drift_force")
@@ -249,7 +249,7 @@ def with_waves_section(text: str, source: str, columns: Sequence[str], rows: Arr
     Parameters
     ----------
     text : str
-        Of the card; a table that it has is replaced.
+        Text of the card; a table that it has is replaced.
     source : str
         Where the numbers come from.
     columns : sequence of str

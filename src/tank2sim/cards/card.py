@@ -61,7 +61,7 @@ class Card:
     model
         Kind of equations.
     covariance : Covariance, optional
-        Of the card's numbers, where they were estimated here; a card that was read refers to a file of it
+        Covariance of the card's numbers, where they were estimated here; a card that was read refers to a file of it
         (:func:`tank2sim.cards.covariance_reading.read_covariance`).
     """
 
@@ -268,7 +268,7 @@ class CraftCard(Card):
     effects : tuple of EffectEntry
         Current, wind and others that a craft can have.
     spelt : mapping
-        As of :class:`ManoeuvringCard`.
+        As in :class:`ManoeuvringCard`.
     """
 
     ship: ShipSection

@@ -37,7 +37,7 @@ class Covariance:
     matrix : array (k, k)
         In the conventions of that file.
     samples : array (n, k), optional
-        Of the numbers' joint distribution, in the same conventions; normal without any.
+        Samples of the numbers' joint distribution, in the same conventions; normal without any.
     """
 
     names: tuple[str, ...]

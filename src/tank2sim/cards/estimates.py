@@ -93,7 +93,7 @@ def estimate(particulars: Particulars, names: Iterable[str]) -> dict[str, NamedE
     Parameters
     ----------
     particulars : Particulars
-        Of the ship.
+        Particulars of the ship.
     names : iterable of str
         Canonical names; ``yaw_inertia`` is J_z'. Names without a formula (see :data:`ESTIMATED`) are not in
         the result.

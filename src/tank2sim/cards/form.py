@@ -170,7 +170,7 @@ class CraftModel(CardSection):
     speed_mps : float
         Cruising speed, m/s: that of the start and, with ``scaling = "prime"``, V of the prime system.
     scaling : str
-        Of ``[rigid_body]``, ``[derivatives]`` and ``[uncertainty]``: ``dimensional`` is SI.
+        Scaling of ``[rigid_body]``, ``[derivatives]`` and ``[uncertainty]``: ``dimensional`` is SI.
     valid_speed_mps : pair of float, optional
         Speeds through the water at which the card holds; by default 0 to 1.2 times the cruising speed.
     """
@@ -445,7 +445,7 @@ class YawRig(CardSection):
     gravity_Nm, gravity_angle_rad : float
         Moment of gravity -G sin(psi - psi_0).
     pulses_per_turn : float
-        Of the encoder.
+        Pulses of the encoder in a turn.
     walls : TankWalls, optional
     """
 
@@ -582,7 +582,7 @@ class FittedTrial(CardSection):
     Parameters
     ----------
     name : str
-        Of its file, without ending.
+        Name of its file, without ending.
     t_s : list of float
         Times of these rows, rising.
     signals : mapping

@@ -10,15 +10,13 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from tank2sim.cards.card import CraftCard
+from tank2sim.cards.form import CraftForm
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.units import from_si
-
-if TYPE_CHECKING:
-    from tank2sim.cards.form import CraftForm
 
 
 class CraftTerm(NamedTuple):

@@ -77,7 +77,7 @@ class CaptiveDesign:
     usual : tuple of RunGroup
         The usual matrix, once.
     standard_errors, usual_standard_errors : array (m,)
-        Of each figure, by the plan and by the usual matrix in the same hours, but at least once.
+        Errors of each figure, by the plan and by the usual matrix in the same hours, but at least once.
     gauge_shares : mapping
         Gauge (X, Y, N) to the share (m,) of each figure's variance by the plan that is in its coefficients.
     beyond_use : mapping

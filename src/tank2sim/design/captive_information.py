@@ -48,7 +48,7 @@ class GaugeErrors:
     Parameters
     ----------
     noise : float
-        Of an independent reading.
+        Noise of an independent reading.
     zero : float
         Constant in a run.
     largest : float

@@ -104,7 +104,7 @@ class TankRuns:
     ----------
     tank : TankFile
     length_m, speed_mps : float
-        Of the model, and of the test.
+        Length and speed of the model, and of the test.
     largest : TestedRange
         To which the tests go, before the limits of the mechanism.
     """

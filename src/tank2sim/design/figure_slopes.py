@@ -59,7 +59,7 @@ class FigureSlopes:
     ----------
     figures : tuple of InfluenceFigure
     values : array (m,)
-        Of the card's ship.
+        Values of the card's ship.
     parameters : tuple of CardParameter
         k coefficients.
     at_card : array (m, k)

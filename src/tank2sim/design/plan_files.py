@@ -57,7 +57,7 @@ def plan_csv(rows: list[dict[str, object]]) -> str:
     Parameters
     ----------
     rows : list of dict
-        Of :func:`run_rows`.
+        Rows of :func:`run_rows`.
     """
     cells = [["" if value is None else f"{value}" for value in row.values()] for row in rows]
     return "\n".join([_HEADS, *(",".join(row) for row in cells)]) + "\n"
@@ -70,7 +70,7 @@ def campaign_template(design: CaptiveDesign, rows: list[dict[str, object]]) -> s
     ----------
     design : CaptiveDesign
     rows : list of dict
-        Of :func:`run_rows`.
+        Rows of :func:`run_rows`.
     """
     runs, ship, planned = design.tank_runs, design.card.ship, design.planned
     scale = runs.length_m / ship.length_m

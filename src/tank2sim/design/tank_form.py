@@ -36,13 +36,13 @@ class CarriageSection(CardSection):
     length_m
         Way of the carriage from standstill to standstill.
     acceleration_mps2
-        Of its start and its stop.
+        Acceleration of its start and its stop.
     settling_lengths
         Lengths of the model that it sails before the record begins.
     waiting_s
         From the end of a run to the next, until the water is calm.
     return_speed_mps
-        Of the way back, which is part of the waiting time.
+        Speed of the way back, which is part of the waiting time.
     speed_mps
         Highest speed.
     """
@@ -67,7 +67,7 @@ class MechanismSection(CardSection):
     drift_rad, rudder_rad
         Largest angles.
     lowest_frequency_radps, highest_frequency_radps
-        Of the oscillation.
+        Frequencies of the oscillation.
     cycles
         Fewest whole cycles of a record.
     """

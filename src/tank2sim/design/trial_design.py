@@ -57,7 +57,7 @@ class TrialManoeuvre:
     manoeuvre : str
         As ``simulate --manoeuvre`` takes it; empty for one that only its orders state.
     duration_s, total_s : float
-        Of the manoeuvre, and with its approach.
+        Duration of the manoeuvre, and with its approach.
     orders : str
         CSV of its orders by the card, for ``simulate --manoeuvre file:``.
     """
@@ -84,7 +84,7 @@ class TrialDesign:
     usual : tuple of TrialManoeuvre
         The usual set, once.
     prior_errors, standard_errors, usual_standard_errors : array (m,)
-        Of each figure before the trial, after it, and after the usual set in the same time.
+        Errors of each figure before the trial, after it, and after the usual set in the same time.
     curve : mapping
         ``minutes``, ``usual_minutes``, ``design`` and ``usual``: standard errors of each figure over the time.
     unstable : bool

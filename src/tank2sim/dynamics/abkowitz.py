@@ -43,7 +43,7 @@ def polynomial(names: Iterable[str], coefficients: Mapping[str, Any], **motion: 
     Parameters
     ----------
     names : iterable of str
-        Of :mod:`tank2sim.cards.terms`.
+        Names of terms (:mod:`tank2sim.cards.terms`).
     coefficients : mapping
         Name to coefficient.
     **motion

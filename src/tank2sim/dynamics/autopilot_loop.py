@@ -64,7 +64,7 @@ def ship_steered_by_either(ship: Model, autopilot: Model) -> Model:
     Parameters
     ----------
     autopilot : Model
-        Of :func:`tank2sim.dynamics.autopilot.autopilot_model`, with an integral.
+        Model by :func:`tank2sim.dynamics.autopilot.autopilot_model`, with an integral.
     """
     order = next(quantity for quantity in autopilot.quantities if quantity.name == "rudder.command")
     words = "Rudder order of the autopilot, positive to starboard"

@@ -34,7 +34,7 @@ class CardParameter:
     Parameters
     ----------
     name : str
-        Of the model's parameter, ``derivatives.Yv``.
+        Name of the model's parameter, ``derivatives.Yv``.
     value : float
         In the model's unit: prime or SI, rudder positive to starboard.
     standard_error : float
@@ -262,7 +262,7 @@ class JointErrors:
     together : frozenset of str
         Keys of the parameters in the card's covariance; all others are independent. Empty without a covariance.
     samples : array (n, m), optional
-        Of the joint distribution of m parameters, in the units of their values.
+        Samples of the joint distribution of m parameters, in the units of their values.
     sampled : tuple of int
         Places of these parameters.
     """

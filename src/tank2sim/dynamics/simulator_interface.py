@@ -163,7 +163,7 @@ def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[
     ----------
     given : mapping
     rolls : bool
-        Of a ship that rolls, which also has ``K`` (N m) and ``z`` (m).
+        True for a ship that rolls, which also has ``K`` (N m) and ``z`` (m).
 
     Raises
     ------

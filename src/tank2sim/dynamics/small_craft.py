@@ -278,7 +278,7 @@ def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, lo
     thrust : casadi.SX
         T, N, positive ahead.
     along, ahead, astern, loss : casadi.SX
-        As of :func:`thrust_of`.
+        As in :func:`thrust_of`.
     """
     lost = loss * along
     forward = (lost + ca.sqrt(lost**2 + 4 * ahead * ca.fmax(thrust, 0))) / (2 * ahead)

@@ -33,7 +33,7 @@ class SurgeCoefficients:
     total_mass_kg : float
         M, the mass of the body with the water in it plus its added mass lambda11.
     B1_kgs2pm3, B2_kgspm2, B3_kgpm : float
-        Of the fourth, third and second power of the speed.
+        Coefficients of the fourth, third and second power of the speed.
     """
 
     total_mass_kg: float

@@ -39,7 +39,7 @@ class TowedBody:
     beam_m : float, optional
         Breadth; the theory of the added mass needs it.
     density_kgpm3, viscosity_m2ps : float
-        Of the water; the viscosity is kinematic.
+        Density and kinematic viscosity of the water.
     """
 
     length_m: float

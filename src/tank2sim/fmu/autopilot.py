@@ -137,7 +137,7 @@ def loop_difference(
     ship, autopilot : Model
         What the FMUs are of.
     fmus : (Path, Path)
-        Of the ship and of the autopilot.
+        FMU of the ship and FMU of the autopilot.
     heading_rad : float
         Change of course.
     steps_s : sequence of float

@@ -64,7 +64,7 @@ class Named:
     parameters : mapping
         Estimates by the names of the effect's parameters (SI).
     standard_errors : mapping
-        Of those that were estimated, SI.
+        Standard errors of the estimated values, SI.
     confidence : float
         Calibrated probability that this effect is present.
     by_trial : mapping
@@ -89,7 +89,7 @@ class Refitted:
     value, standard_error : float
         Prime, or SI for a parameter of an effect; rudder positive to starboard.
     before, standard_error_before : float
-        Of the given card.
+        Value and standard error of the given card.
     """
 
     name: str
@@ -178,7 +178,7 @@ class Passed:
     Parameters
     ----------
     name : str
-        Of the trial.
+        Name of the trial.
     held_out : bool
         It was not used for naming the effect.
     time_s : array (n,)
@@ -263,7 +263,7 @@ class MissingSignal:
     time_s, values, errors : array (n,)
         Rows of all trials together: s, and the difference with its standard error.
     states, explaining, explained
-        As of :class:`MissingForce`; shares are of the mean square.
+        As in :class:`MissingForce`; shares are of the mean square.
     """
 
     quantity: str
@@ -328,7 +328,7 @@ class Gap:
         One of :data:`GAP_VERDICTS`.
     effects : tuple of Named
     coefficients : tuple of Refitted
-        Those of the improved card that were fitted together with the effects; empty where the given ones were kept.
+        Coefficients fitted together with the effects; empty where the given ones were kept.
     effect_alone : mapping
         ``fit`` and ``holdout`` to the misfit with the effects alone, noise units; empty where the given coefficients
         were kept.
@@ -345,9 +345,9 @@ class Gap:
     waves : WaveBand or None
         Accelerations by waves that were found in the fitted trials.
     passed : tuple of Passed
-        Of all trials.
+        Results of all trials.
     figures_before, figures_after : tuple of FigureComparison
-        Of turns and zigzags.
+        Figures of turns and zigzags.
     missing_force : MissingForce or None
     at_work : tuple of Acting
         Intervals in which the forces of the named effects act, the most significant first.
@@ -402,7 +402,7 @@ def misfit_of(results: Sequence[Passed], version: str, *, held_out: bool | None 
     version : str
         As in :meth:`Passed.misfit`.
     held_out : bool, optional
-        Of the trials held out, or of the fitted ones; by default of all.
+        True for the trials held out, False for the fitted ones; by default all.
     """
     chosen = [result.misfit(version) for result in results if held_out is None or result.held_out == held_out]
     return float(np.sqrt(np.mean(np.square(chosen))))

@@ -244,7 +244,7 @@ def _smaller(
     card, trials
         As given.
     passes : tuple of Gap
-        Of the first search, and of both together.
+        Results of the first search, and of both together.
     """
     first, both = passes
     reached = misfit_of(both.passed, "after", held_out=False)

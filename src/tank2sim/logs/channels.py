@@ -51,7 +51,7 @@ class LogChannel:
     unit : str
         Unit of the value; a key of the quantity's units.
     sign, scale, offset : float
-        Of the conversion above; the offset is in the unit of the record.
+        Numbers of the conversion above; the offset is in the unit of the record.
     delay_s : float
         By how much the stream is late, s; its times are set back by it.
     confidence : float

@@ -37,7 +37,7 @@ class ReferenceMotion:
     Parameters
     ----------
     time_s : array (n,)
-        Of the velocities, UTC s.
+        Times of the velocities, UTC s.
     v_north_mps, v_east_mps : array (n,)
         Over the ground, m/s.
     heading_time_s, heading_rad : array (m,)

@@ -54,7 +54,7 @@ class Voyage:
     origin_deg : tuple or None
         Latitude and longitude of x = y = 0.
     begin_s, end_s : float
-        Of the voyage, in the time of the series.
+        Beginning and end of the voyage, in the time of the series.
     findings : tuple of LogFinding
     counts : mapping
         Log to what was read and lost.

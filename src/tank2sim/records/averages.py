@@ -62,7 +62,7 @@ def read_averages(
     spelt : mapping
         Quantity to its key in the file and the factor that brings its column to SI.
     path : Path
-        Of the campaign's file, for messages and as the folder of the table.
+        File of the campaign, for messages and the folder of the table.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class ModelSection(CardSection):
     Parameters
     ----------
     mass_kg, yaw_inertia_kgm2, x_G_m
-        Of the body that the gauges carry, about midships; x_G positive forward. The inertia is needed by yaw tests.
+        Body that the gauges carry, about midships; x_G positive forward. The inertia is needed by yaw tests.
     trim_m
         Positive by the stern.
     scale
@@ -120,19 +120,19 @@ class UncertaintySection(CardSection):
     Parameters
     ----------
     calibration_relative
-        Of the gauges: relative error of every force and moment, each of X, Y and N by itself.
+        Relative error of the gauges in every force and moment, each of X, Y and N by itself.
     alignment_rad
         Angle between the model's axis at zero drift and the tank's.
     rudder_rad
         Zero of the rudder angle.
     speed_relative
-        Of the carriage speed.
+        Relative error of the carriage speed.
     mass_relative, yaw_inertia_relative
-        Of the carried mass and its yaw inertia.
+        Relative errors of the carried mass and its yaw inertia.
     force_delay_s
-        Of the delay of the forces behind the motion, s; stated, it takes the place of what the campaign shows.
+        Error of the delay of the forces behind the motion, s; if stated, it replaces the campaign's own estimate.
     blockage_relative
-        Of the speed of the water past the model, by the walls of the tank.
+        Relative error of the speed of the water past the model, by the walls of the tank.
     """
 
     calibration_relative: NotNegative = 0.0
@@ -161,7 +161,7 @@ class ColumnEntry(CardSection):
     quantity
         ``t y psi v r speed delta X Y N``, or with its unit: ``Y_kN``.
     unit
-        Of the recorded values (``kN``, ``mm``, ``deg/s``); by default that of the file. Not needed with a factor.
+        Unit of the recorded values (``kN``, ``mm``, ``deg/s``); by default the file's. Not needed with a factor.
     sign
         1, or -1 where the column has the opposite sign.
     factor
@@ -192,7 +192,7 @@ class FilesSection(CardSection):
     widths
         Characters of each column of fixed width, where no blank separates them.
     names
-        Of the columns of files without names.
+        Names of the columns of files without names.
     skip_lines
         Lines at the beginning that are not read.
     """
@@ -210,7 +210,7 @@ class RunSheet(CardSection):
     Parameters
     ----------
     yaw_rate_radps
-        Of a steady turn on a rotating arm or in circular motion, positive to starboard.
+        Yaw rate of a steady turn on a rotating arm or in circular motion, positive to starboard.
     heel_rad
         At which the model is held, positive to starboard.
     """
@@ -302,7 +302,7 @@ class PropellerTest(CardSection):
     number
         1, or 2 side by side, each before a rudder.
     y_P
-        Of the right one of two, to starboard.
+        Place of the right one of two, to starboard.
     """
 
     x_P: Annotated[float, Field(gt=-1, lt=1)] = -0.5

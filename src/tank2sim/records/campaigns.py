@@ -75,7 +75,7 @@ class CaptiveRun:
     propeller_radps : float or None
         Revolutions: the mean of the record, or those of the sheet.
     thrust_N, rudder_normal_force_N : array, (rows,), or None
-        Of the propeller, positive forward; of the water on the rudder, positive to port.
+        Thrust of the propeller, positive forward; force of the water on the rudder, positive to port.
     torque_Nm : array, (rows,), or None
         That the propeller takes.
     heel_rad : float

@@ -37,7 +37,7 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
     ----------
     path : Path
     thrusters : sequence of ThrusterSection
-        Of the card.
+        Thrusters of the card.
 
     Raises
     ------

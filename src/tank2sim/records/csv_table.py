@@ -229,7 +229,7 @@ def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: 
     path : Path
         For messages.
     names : sequence of str
-        Of the columns.
+        Names of the columns.
     rows : sequence of str
     lines : array of int, (rows,)
         Line of the file of each row.

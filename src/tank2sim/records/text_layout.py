@@ -44,7 +44,7 @@ class TextLayout:
     comma : bool
         Decimal commas.
     names, units : tuple of str
-        Of the columns; a column without a name is ``column 3``; a unit is empty where the file has none.
+        Names and units of the columns; ``column 3`` without a name, an empty unit without a unit.
     skip : int
         Lines above the first row of values.
     """

@@ -46,7 +46,7 @@ class YawRecord:
     angle_rad : array
         Yaw angle as the encoder counts it, + clockwise.
     current_A : array
-        Of the motor, + turns clockwise.
+        Current of the motor, + turns clockwise.
     medium : str
         ``air`` or ``water``.
     programme : YawProgramme

@@ -61,7 +61,7 @@ class Draws:
         truncated normal distribution, which preserves correlations. Clipping at the bounds would not.
     seed : int
     samples : array (n, m), optional
-        Of the joint distribution of m of the parameters: a member has one of its rows instead of normal values.
+        Samples of the joint distribution of m of the parameters: a member has one of its rows instead of normal values.
     sampled : array (m,)
         Places of these parameters.
     """
@@ -275,7 +275,7 @@ class Ensemble:
     figures : mapping
         Name to the figures of all members (members,); nan where a member does not show it.
     histories : array (kept, signals, times), or None
-        Of the first members, at most :data:`KEPT`.
+        Histories of the first members, at most :data:`KEPT`.
     unusable : mapping
         Reason of unusable members, to their number.
     redrawn : Redrawn

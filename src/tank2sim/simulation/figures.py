@@ -42,7 +42,7 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
     manoeuvre
         One of :mod:`tank2sim.simulation.manoeuvres`.
     trajectory : Trajectory
-        Of a ship.
+        Trajectory of a ship.
     length : float
         Length between perpendiculars, m.
     """
@@ -245,7 +245,7 @@ def spiral_loop(rudders: Array, rates: Array) -> tuple[float, float]:
     Parameters
     ----------
     rudders, rates : array (n,)
-        As of :func:`zero_rate_rudders`.
+        As in :func:`zero_rate_rudders`.
     """
     half = len(rudders) // 2
     height = float(np.max(np.abs(rates[: half + 1] - rates[half:][::-1])))

@@ -125,7 +125,7 @@ def follow_programme(
     Parameters
     ----------
     integrator : Integrator
-        Of a model of :func:`tank2sim.dynamics.glider.glider_model`.
+        Integrator of a model by :func:`tank2sim.dynamics.glider.glider_model`.
     orders : sequence of mapping
         For each step ``buoyancy.command`` (kg), ``pitch.command`` and ``roll.command`` (rad).
 

@@ -405,7 +405,7 @@ def read_orders(path: Path) -> Orders:
 def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Orders:
     """Orders from columns (n,) in SI: ``t_s``, ``delta_order_rad`` to starboard, ``n_radps``; `source` is for messages.
 
-    Of a craft with thrusters ``n_<name>_radps`` and ``azimuth_<name>_rad`` in place of these.
+    A craft with thrusters has ``n_<name>_radps`` and ``azimuth_<name>_rad`` in place of these.
 
     Raises
     ------

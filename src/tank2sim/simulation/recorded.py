@@ -146,7 +146,7 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
         With a rudder, heading and positions. Unmeasured yaw rate and velocities through the water are derived from
         them, less the current of the model.
     model : Model
-        Of a ship of the trial's size: for L/u0 and the names of its variables.
+        Model of a ship of the trial's size: for L/u0 and the names of its variables.
     """
     held = held_rudders(trial)
     if not held:
@@ -268,7 +268,7 @@ def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float
     what : Recorded
         From :func:`recorded`.
     integrator : Integrator
-        Of a model with steering gear (of a card made :func:`steerable`, so that the recorded rate can be set).
+        Integrator of a model with steering gear (card made :func:`steerable`, so that the recorded rate can be set).
     parameters : dict, optional
         Values of the model's parameters by name.
 

@@ -38,7 +38,7 @@ class Measuring:
     record_every : int
         Samples of the controller per row of the record.
     seed : int
-        Of the noise.
+        Seed of the noise.
     """
 
     encoder: bool = True

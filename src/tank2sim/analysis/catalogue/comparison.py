@@ -64,7 +64,7 @@ class SteeringComparison:
     turns : tuple of ModelTurns
         Steady turns of every complete model at the rudders of Table 1.
     influence : tuple of InfluenceTable
-        Of every complete model at the main model's draught.
+        Influence coefficients of every complete model at the main model's draught.
     runs : mapping
         Manoeuvres of the same models, by name.
     predictions : mapping

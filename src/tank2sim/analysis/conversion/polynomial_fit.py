@@ -71,7 +71,7 @@ class PolynomialFit:
     ranges : mapping
         ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
     covariance : array (k, k), optional
-        Of `derivatives`, in their order, by the errors of the MMG card; None if it states none.
+        Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none.
     """
 
     derivatives: Mapping[str, float]

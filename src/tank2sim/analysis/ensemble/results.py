@@ -121,7 +121,7 @@ class Chance:
     undecided : int
         Usable members whose trial does not show it; they count as not meeting it.
     band : Band or None
-        Of what was found.
+        Band of the figures found.
     beyond : int
         Usable members whose trial left the card's range before it was known; they count by what was found.
     tail : Tail, optional
@@ -160,9 +160,9 @@ class ChanceOfAll:
     Parameters
     ----------
     names : tuple of str
-        Of these criteria.
+        Names of these criteria.
     met, between, tail
-        As of :class:`Chance`.
+        As in :class:`Chance`.
     """
 
     names: tuple[str, ...]

@@ -43,7 +43,7 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
     question : OfManoeuvre
         The manoeuvre.
     draws : Draws
-        Of the members.
+        Draws of the members.
     """
     manoeuvre = question.manoeuvre
     if isinstance(manoeuvre, SpiralManoeuvre) or not runs_in_lanes(manoeuvre, question.duration_s):

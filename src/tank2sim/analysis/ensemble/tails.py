@@ -71,11 +71,11 @@ class Tail:
         Members drawn about the failing ships; those that do not meet the criterion, of these the ones whose trial does
         not show the figure; those that cannot be used; failing ones whose trial left the card's range.
     unusable_probability : float
-        Of ships that cannot be used: they count neither as failing nor as meeting.
+        Probability of ships that cannot be used: they count neither as failing nor as meeting.
     distance : float
         From the card to the limit along the steepest change of the figure, in standard deviations, if it were linear.
     linear_probability : float
-        Of the figure beyond the limit, if it were linear.
+        Probability of the figure beyond the limit, if it were linear.
     linear_figure, figure : float, and float or None
         The figure of the ship at that distance (at most :data:`FARTHEST_LIMIT`), if it were linear, and as it is.
     failing_ships : mapping
@@ -175,9 +175,9 @@ def tails(
     question : Question
         Figures by the names of `limits`.
     draws : Draws
-        Of the ensemble `found`.
+        Draws of the ensemble `found`.
     found : Ensemble
-        Of this question.
+        Ensemble of this question.
     limits : mapping
         Name to the largest allowed value of each criterion that counts.
     executor : Executor, optional
@@ -187,7 +187,7 @@ def tails(
     tails : dict
         By criterion.
     any : Tail or None
-        Of ships that fail at least one of `limits`; None if that is not rare.
+        Tail of ships that fail at least one of `limits`; None if that is not rare.
     notices : list of str
         Why there are none.
     """

@@ -48,7 +48,7 @@ class GlidePath:
     glides : tuple of SteadyGlide
         One for each step.
     durations_s : tuple of float
-        Of the steps.
+        Durations of the steps.
     places : tuple of PathPoint
         The start, and the end of each step.
     """

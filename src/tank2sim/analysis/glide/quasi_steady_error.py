@@ -40,7 +40,7 @@ class SwingError:
     label : str
         The oscillating control.
     period_s : array (n,)
-        Of the swing.
+        Period of the swing.
     share : array (n,)
         Root mean square over a period of the difference from the instantaneous steady glide: of the velocity, relative
         to the speed; for roll of the rate of turn, relative to its root mean square.

@@ -71,7 +71,7 @@ class Range:
     Parameters
     ----------
     path_angle_rad, buoyancy_kg, speed_mps : float
-        Of its dives and climbs, without sign.
+        Path angle, buoyancy and speed of its dives and climbs, without sign.
     depth_m : float
         Depth of the dives and climbs.
     budget_kg : float
@@ -170,9 +170,9 @@ class GlideStudy:
     radii_m : tuple of float
         Turning radius of the transient model, which has the added mass.
     path, printed_path, compared
-        Of the programme; None without.
+        Results of the programme; None without one.
     ranges : tuple of Range
-        Of the best and the fastest glide and the requested glides that do not turn.
+        Ranges of the best and the fastest glide and the requested glides that do not turn.
     polar : tuple of SteadyGlide
     errors, swings
         Empty unless views were requested.

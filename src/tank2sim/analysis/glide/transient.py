@@ -167,7 +167,7 @@ class ProgrammeError:
     label : str
         Name of the alternating orders.
     duration_s : array (n,)
-        Of one step.
+        Duration of one step.
     distance_m, share : arrays (n,)
         Largest distance of the two paths at the end of a step, and as a share of the length of the path.
     """

@@ -133,9 +133,9 @@ def rudder_by_rules(length_m: float, beam_m: float, draught_m: float, area_m2: f
     Parameters
     ----------
     length_m, beam_m, draught_m : float
-        Of the ship.
+        Dimensions of the ship.
     area_m2 : float, optional
-        Of the rudder, where it is known.
+        Area of the rudder, if known.
     """
     # Rules of Det Norske Veritas: A = L T/100 (1 + 25 (B/L)^2), as in Molland and Turnock (2007), Marine Rudders.
     area = length_m * draught_m / 100 * (1 + 25 * (beam_m / length_m) ** 2) if area_m2 is None else area_m2

@@ -199,7 +199,7 @@ def guess_ship(ship: ShipDimensions, given: Sequence[GivenFigure], name: str, me
     ship : ShipDimensions
     given : sequence of GivenFigure
     name : str
-        Of the ship on the card.
+        Name of the ship on the card.
     members : int
         Ships of the prior.
     seed : int

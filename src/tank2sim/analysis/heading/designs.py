@@ -129,9 +129,9 @@ def design_heading(
     speed_mps : float, optional
         Speed of the design; by default that of expansion.
     weights : LqrWeights, optional
-        Of the LQR.
+        Weights of the LQR.
     wave_filter_radps : float, optional
-        Of the PID: frequency of encounter of waves to which the rudder does not respond (:func:`_filtered`).
+        Frequency of encounter of waves to which the rudder of the PID does not respond (:func:`_filtered`).
 
     Raises
     ------

@@ -31,7 +31,7 @@ class Weather:
     wave_radps, wave_damping : float
         Frequency of encounter, and relative damping of the shaping filter: 0.1 for a narrow band (Fossen 2011, 8.2).
     seed : int
-        Of the noise that drives the filter.
+        Seed of the noise that drives the filter.
     """
 
     current_mps: float = 0.5

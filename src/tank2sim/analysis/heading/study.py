@@ -75,11 +75,11 @@ class StudySettings:
     kind : str
         One of :data:`tank2sim.analysis.heading.designs.DESIGNS`.
     speed_mps : float, optional
-        Of the design; by default that of expansion.
+        Speed of the design; by default that of expansion.
     weights : LqrWeights
-        Of the LQR.
+        Weights of the LQR.
     wave_filter_radps : float, optional
-        Of the PID.
+        Frequency of the wave filter of the PID.
     course_change_rad : float
         The ordinary change of course, positive to starboard.
     large_change_rad : float

@@ -59,7 +59,7 @@ class TrackKeeping:
     Parameters
     ----------
     length_m : float
-        Of all its legs.
+        Length of all its legs.
     duration_s : float
         Until the end of the last leg, or of the run.
     finished : bool
@@ -200,7 +200,7 @@ def keep_track(
     waypoints : array (n, 2)
     guidance : Guidance
     inputs : mapping, optional
-        Of the model, by name (current, wind); held.
+        Inputs of the model, by name (current, wind); held.
 
     Raises
     ------

@@ -46,9 +46,9 @@ class CardInfluence:
     ship : str
     figures : tuple of InfluenceFigure
     values : array (nf,)
-        Of the figures.
+        Values of the figures.
     errors : JointErrors
-        Of the k parameters.
+        Errors of the k parameters.
     slopes : array (nf, k)
         Exact slopes dF/dc.
     difference : array (nf, k)

@@ -140,7 +140,7 @@ class InfluenceFigure:
 def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
     """Parse a figure of a command line: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
 
-    Of a craft with thrusters: ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, in rpm.
+    A craft with thrusters: ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, in rpm.
 
     Raises
     ------

@@ -55,13 +55,13 @@ class CraftAtSpeed:
     speed_mps, revolutions_radps : float
         Surge velocity through the water, and the mean revolutions of the two sides that hold it.
     eigenvalues : tuple of complex
-        Of surge, sway and yaw, 1/s, least damped first.
+        Eigenvalues of surge, sway and yaw, 1/s, least damped first.
     steering_modes : tuple of complex
-        Of sway and yaw at a held speed, 1/s.
+        Steering modes of sway and yaw at a held speed, 1/s.
     surge_time_constant_s : float
         -1 over the slope of du/dt by u; None where nothing brakes the craft.
     K, T_s, T1_s, T2_s, T3_s : float
-        Of r/d; K in rad/s by rad/s; T1 and T2 are None for an oscillating pair.
+        Constants of r/d; K in rad/s by rad/s; T1 and T2 are None for an oscillating pair.
     """
 
     speed_mps: float

@@ -95,7 +95,7 @@ class Margin:
     percent : float
         C' in per cent of |Y'_v (N'_r - m' x'_G)|, its stabilising part.
     slopes : array (2, 2)
-        Of Y' and N' by v' and r', the inertia of (3.1) included.
+        Slopes of Y' and N' by v' and r', the inertia of (3.1) included.
     influences : tuple of MarginInfluence
         The strongest first.
     speeds_mps, criteria, speed_slopes : arrays (k,)

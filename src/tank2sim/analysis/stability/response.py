@@ -37,7 +37,7 @@ class SteeringResponse:
     Parameters
     ----------
     label : str
-        Of what.
+        Name of the response.
     poles, zeros : arrays of complex
         1/s.
     gain_per_s : float

@@ -37,7 +37,7 @@ class StabilityStudy:
     Parameters
     ----------
     stability, margin, trim, responses
-        Of the straight course at the requested speed.
+        Results of the straight course at the requested speed.
     turning, characteristic : optional
         At the speed of expansion; None without a steady motion, which `notices` state.
     direct, reverse : SpiralPoints, optional

@@ -84,7 +84,7 @@ class Tuned:
     targets : tuple of Target
     means : Means
     values : array (k,)
-        Of all parameters of the study, tuned.
+        Values of all parameters of the study, tuned.
     before, after : array
         The figures of the targets.
     moves : tuple of Move

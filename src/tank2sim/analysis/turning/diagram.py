@@ -78,7 +78,7 @@ class SteadyTurning:
     growth_per_s : array (k,)
         Largest real part of the eigenvalues with the rudder held, 1/s: a stable turn has it negative.
     slope : array (k, 2)
-        Of rudder and yaw rate by arc length.
+        Slopes of rudder and yaw rate by arc length.
     arc : array (k,)
     straight : int
         Row of the straight course.

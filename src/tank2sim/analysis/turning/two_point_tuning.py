@@ -77,7 +77,7 @@ class Levers:
 def levers_of_ship(card: ManoeuvringCard, model: Model) -> Levers:
     """The levers of a ship in the derivatives of (3.5) or (3.8): Nv, Nvu, ..; Nr, Nru, ..; all terms with a rudder.
 
-    Of an MMG ship f_alpha takes the place of the rudder's terms.
+    In an MMG ship f_alpha takes the place of the rudder's terms.
     """
     static: list[str] = []
     damping: dict[str, float] = {}

@@ -95,7 +95,7 @@ class Bridge:
     ----------
     card : ManoeuvringCard
     rudder_deg : float
-        Of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg without one on the card.
+        Rudder of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg without one on the card.
     deep, shallow : tuple of ShipTrack
         Circles to starboard and port; `shallow` at :data:`SHALLOW` times the draught, empty without the effect.
     stops : tuple of ShipTrack

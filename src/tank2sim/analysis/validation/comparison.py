@@ -59,7 +59,7 @@ class FigureRow:
     name : str
         With its unit.
     values, deviations : tuple of float or None
-        Of each card, the reference first; None where the run did not show it, or its error is unknown.
+        One for each card, the reference first; None where the run did not show it, or its error is unknown.
     outside : tuple of bool
         True where the run had left the card's range before the figure was reached.
     """

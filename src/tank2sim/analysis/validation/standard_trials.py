@@ -87,7 +87,7 @@ class TrialShip:
         Parameters
         ----------
         manoeuvre : Manoeuvre
-            Of :mod:`tank2sim.simulation.manoeuvres`.
+            One of :mod:`tank2sim.simulation.manoeuvres`.
         parameters, inputs : mapping, optional
             Values in place of the model's, by name, SI.
         """
@@ -113,7 +113,7 @@ def ship_of(card: SteeredCard) -> TrialShip:
 def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
     """Name to trial: turns at the largest rudder, zigzags 10/10 and 20/20, and the stop if all have an engine.
 
-    Of craft with thrusters :func:`craft_trials`.
+    For craft with thrusters see :func:`craft_trials`.
     """
     craft = [ship.card for ship in ships if isinstance(ship.card, CraftCard)]
     if craft:

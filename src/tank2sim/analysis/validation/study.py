@@ -210,7 +210,7 @@ def validate_card(
     Parameters
     ----------
     card : ManoeuvringCard
-        Of the ship.
+        Card of the ship.
     trials : sequence of Trial
         At the ship's size.
     count : int

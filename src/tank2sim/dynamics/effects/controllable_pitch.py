@@ -153,7 +153,7 @@ def b_series_torque(J: Any, pitch: Any, area: Any, blades: Any) -> Any:
     Parameters
     ----------
     J, pitch, area, blades : float or symbol
-        As of :func:`b_series_thrust`.
+        As in :func:`b_series_thrust`.
     """
     return _of_series(B_SERIES_TORQUE, J, pitch, area, blades)
 

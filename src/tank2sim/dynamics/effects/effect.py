@@ -306,11 +306,11 @@ class Effect:
         Parameters
         ----------
         model : Model
-            Of the ship, with or without other effects.
+            Model of the ship, with or without other effects.
         values : mapping
             SI, by the names of the parameters; those with a default may be absent.
         card : ManoeuvringCard
-            Of the ship, for what the effect needs to know of it.
+            Card of the ship, for what the effect needs to know of it.
 
         Raises
         ------

@@ -50,7 +50,7 @@ def largest_force(card: ManoeuvringCard) -> float:
     Parameters
     ----------
     card : ManoeuvringCard
-        Of the ship, whose weight of water L^2 T it goes with.
+        Card of the ship; the value goes with its weight of water L^2 T.
     """
     weight = card.environment.water_density_kgpm3 * card.environment.gravity_mps2 * card.ship.length_m**2
     return THRUST_IN_WEIGHTS * weight * model_particular(card, "draught_m")

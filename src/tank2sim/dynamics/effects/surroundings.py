@@ -67,7 +67,7 @@ def air_over_ship(model: Model, speed: ca.SX, direction: ca.SX) -> tuple[ca.SX, 
     Parameters
     ----------
     model : Model
-        Of the ship; its velocity over the ground holds a current if the model has one.
+        Model of the ship; its velocity over the ground holds a current if the model has one.
     speed, direction : casadi.SX
         True wind (m/s) and the direction from which it comes (rad, clockwise from north).
     """

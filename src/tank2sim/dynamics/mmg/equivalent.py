@@ -41,7 +41,7 @@ def linear_equivalent(card: MmgCard, model: Model, side: Literal["plus", "minus"
     ----------
     card : MmgCard
     model : Model
-        Of the card.
+        Model of the card.
     side : str
         ``plus`` for beta_R > 0, ``minus`` for beta_R < 0.
     """
@@ -78,7 +78,7 @@ def linear_form(card: MmgCard, model: Model) -> ManoeuvringCard:
     ----------
     card : MmgCard
     model : Model
-        Of the card.
+        Model of the card.
     """
     plus, minus = (linear_equivalent(card, model, side) for side in ("plus", "minus"))
     derivatives = {name: 0.5 * (plus[name] + minus[name]) for name in plus}

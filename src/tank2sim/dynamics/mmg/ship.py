@@ -136,7 +136,7 @@ class Side:
     Parameters
     ----------
     suffix : str
-        Of its quantities: empty, or ``_right``, ``_left`` of two.
+        Ending of its quantities: empty, or ``_right`` and ``_left`` if there are two.
     mirror : float
         1, or -1 for the left one.
     y_P, y_R : float

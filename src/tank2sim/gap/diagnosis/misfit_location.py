@@ -150,7 +150,7 @@ def figures(
         The card of `version` in `passed`.
     trials : sequence of Trial
     passed : sequence of Passed
-        Of these trials.
+        Results of these trials.
     version : str
         ``before`` or ``after``.
     """

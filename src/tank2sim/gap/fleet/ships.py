@@ -32,7 +32,7 @@ class ShipFolder:
     Parameters
     ----------
     name : str
-        Of the folder.
+        Name of the folder.
     card : Path
     trials, holdout : tuple of Path
         Fitted and held out, in the order of their names; none held out without that sub-folder.

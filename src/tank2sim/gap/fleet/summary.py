@@ -25,7 +25,7 @@ class ShipSummary:
     folder : str
         Name of its folder, and of that of its results.
     name : str
-        Of the ship, as its card has it.
+        Name of the ship, as its card has it.
     verdict : str
         One of :data:`.result.GAP_VERDICTS`.
     effects : tuple of mappings
@@ -83,7 +83,7 @@ class FleetSummary:
     Parameters
     ----------
     name : str
-        Of the folder.
+        Name of the folder.
     ships : tuple of ShipSummary
         In the order of their folders' names, those with a fault among them.
     notices : tuple of str

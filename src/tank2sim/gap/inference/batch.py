@@ -57,7 +57,7 @@ class MeasuredBatch:
     Parameters
     ----------
     names : tuple of str
-        Of the R runs.
+        Names of the R runs.
     seen : tuple of str
         The ny variables that are measured.
     step_s : float

@@ -54,7 +54,7 @@ class CoefficientEstimates:
     Parameters
     ----------
     names : tuple of str
-        Of n parameters, as in :class:`NuisanceParameters`.
+        Names of n parameters, as in :class:`NuisanceParameters`.
     change : array (n,)
         Most probable value less that of the card.
     covariance : array (n, n)

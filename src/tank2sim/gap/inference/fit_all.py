@@ -35,7 +35,7 @@ class Proposal:
     limit : float
         See :meth:`.likelihood.Likelihood.at_best`.
     each : tuple of str
-        Those of the effects whose wind or current differs from trial to trial.
+        The effects whose wind or current differs from trial to trial.
     """
 
     thetas: dict[str, Array]
@@ -58,7 +58,7 @@ class HypothesisCache:
     none : Hypothesis
         The card without an effect.
     motion : MeasuredBatch, optional
-        Of the trials: their number, and the winds and currents that they recorded.
+        Motion of the trials: their number, and the winds and currents that they recorded.
     """
 
     def __init__(self, none: Hypothesis, motion: MeasuredBatch | None = None):
@@ -161,7 +161,7 @@ def refit(fit: ExplanationFit, starts: Sequence[Array], rounds: Sequence[int]) -
     ----------
     fit : ExplanationFit
     starts, rounds
-        As of :class:`Proposal`.
+        As in :class:`Proposal`.
     """
     return Proposal(thetas_of(fit), starts, rounds, each=fit.hypothesis.each)
 

@@ -49,11 +49,11 @@ class EstimatedParameter:
         Name of its effect.
     parameter : EffectParameter
     variable : str
-        Of the model that holds it.
+        Variable of the model that holds it.
     run : int, optional
         Place of the only trial in which it acts; None for a parameter of all trials.
     axis : int
-        Of one trial's wind or current, as `direction_rad` counts: 0 for its part along north, 1 along east, m/s.
+        Part of one trial's wind or current, as `direction_rad` counts: 0 along north, 1 along east, m/s.
     """
 
     effect: str

@@ -41,9 +41,9 @@ class NoiseLevels:
     Parameters
     ----------
     white, slow, slow_s : array (ny,)
-        Of each sensor: standard deviation of the white noise of a block's mean, of the slow error, its time constant.
+        For each sensor: standard deviation of a block's mean by white noise, of the slow error, its time constant.
     force, force_s : array (3,)
-        Of the unmodelled accelerations: standard deviation (m/s2, m/s2, rad/s2) and time constant.
+        Standard deviation (m/s2, m/s2, rad/s2) and time constant of the unmodelled accelerations.
     """
 
     white: Array

@@ -78,12 +78,12 @@ class Likelihood:
     Parameters
     ----------
     motion : MeasuredBatch
-        Of the trials, side by side.
+        Motion of the trials, side by side.
     none : Hypothesis
         The card without an effect.
     coefficients : NuisanceParameters
     belief : Belief
-        Of the noise and of the coefficients' width.
+        Belief about the noise and the coefficients' width.
     scale : array, optional
         Of each logarithm of the noise and of the width, in which the search for the noise takes its steps
         (:meth:`noise_scale`); by default 1.

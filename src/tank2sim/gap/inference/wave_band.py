@@ -50,7 +50,7 @@ class WaveBand:
     level : array (3,)
         Standard deviation in surge, sway (m/s2) and yaw (rad/s2).
     frequency : float
-        Of the middle of the band, rad/s.
+        Frequency of the middle of the band, rad/s.
     time : float
         In which the correlation from one wave to later ones falls to 1/e, s.
     """

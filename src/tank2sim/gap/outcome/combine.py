@@ -14,9 +14,9 @@ def combine_passes(first: Gap, further: Gap) -> Gap:
     Parameters
     ----------
     first : Gap
-        Of the given card.
+        Result of the given card.
     further : Gap
-        Of the card that `first` improved, with the same trials; its effects are of the ship.
+        Result of the card that `first` improved, with the same trials; its effects act on the ship.
     """
     refitted = {coefficient.name: coefficient for coefficient in further.coefficients}
     of_given = {coefficient.name: coefficient for coefficient in first.coefficients}
@@ -64,7 +64,7 @@ def without_effect(smaller: Gap, both: Gap, dropped: str) -> Gap:
         Of a search for these effects alone: what it says of rivals, and of what could hide, is of `both`, and no effect
         is surer than there.
     both : Gap
-        Of both searches together.
+        Result of both searches together.
     dropped : str
         The effect that is superfluous with the others.
     """

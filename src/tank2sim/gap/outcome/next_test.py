@@ -80,7 +80,7 @@ class Explanation:
     free : tuple of str
         k names of the model's parameters and inputs that are not known exactly: the effect's, and derivatives.
     covariance : array (k, k)
-        Of these, SI (derivatives prime); may be singular.
+        Their covariance, SI (derivatives prime); may be singular.
     """
 
     name: str
@@ -136,7 +136,7 @@ def next_test(
     noise : mapping
         Variable (``motion.*``) to the standard deviation of one reading, SI: the signals of the test's sensors.
     duration_s : float, optional
-        Of the test; by default :data:`LENGTH` L/u0.
+        Duration of the test; by default :data:`LENGTH` L/u0.
     correlation_s : float
         Time constant of the readings' errors: one independent reading every 2 of it (or :data:`READ_S`, if longer).
     unsure_s : float

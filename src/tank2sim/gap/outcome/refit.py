@@ -58,9 +58,9 @@ def refit_coefficients(
     ----------
     card : ManoeuvringCard
     model : Model
-        Of the card; values stay within its bounds.
+        Model of the card; values stay within its bounds.
     estimates : CoefficientEstimates
-        Of parameters of the card's model.
+        Estimates of parameters of the card's model.
     """
     known = free_parameters(card, inertia=True)
     rows = [row for row, name in enumerate(estimates.names) if name in known]

@@ -52,7 +52,7 @@ class Proof:
     results : list of Passed
         Fitted trials first.
     coefficients : tuple of Refitted
-        Those of the base that differ from the given card's.
+        Coefficients of the base that differ from the given card's.
     effect_alone : mapping
         Misfit of the effects without refitted coefficients, noise units: ``fit`` and ``holdout``; empty where the
         coefficients are the given ones.
@@ -92,7 +92,7 @@ class Prover:
     trials : tuple of Measured
         Fitted ones and those held out.
     likelihood : Likelihood
-        Of the fitted ones.
+        Likelihood of the fitted trials.
     replays : TrialReplays
     """
 

@@ -42,7 +42,7 @@ class Judged:
     ----------
     decision : Decision
     proof : Proof
-        Of what it names.
+        Proof of the named effects.
     withheld : tuple of str
         Names that brought no simulation closer.
     by_simulation : str

@@ -49,7 +49,7 @@ class InputRecord:
     Parameters
     ----------
     name : str
-        Of the trial.
+        Name of the trial.
     begin_s, step_s : float
         First instant in the trial's own time, and the step of the inputs, s.
     inputs : array (n, nu)

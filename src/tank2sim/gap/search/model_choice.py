@@ -90,7 +90,7 @@ class Decision:
     alike : tuple of ExplanationFit
         Other explanations that are as good.
     probabilities : mapping
-        Of each explanation that was fitted, by its effects.
+        Probabilities of each explanation that was fitted, by its effects.
     strange : tuple of Strange
         Where the innovations of the best are not noise.
     """
@@ -177,7 +177,7 @@ def decide_without(search: Search, decision: Decision, name: str, false_discover
     search : Search
     decision : Decision
     name : str
-        Of the effect.
+        Name of the effect.
     false_discovery : float
         As in :func:`decide`.
     """
@@ -238,7 +238,7 @@ def decide_as_good(search: Search, decision: Decision, other: ExplanationFit, fa
     search : Search
     decision : Decision
     other : ExplanationFit
-        Of the search, simpler than the best.
+        Explanation of the search that is simpler than the best.
     false_discovery : float
         As in :func:`decide`.
     """

@@ -33,7 +33,7 @@ class LeftOut:
         The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with the velocity in an
         oscillating run; predicted with the derivatives of all other runs.
     standard_error : float
-        Of predicted less measured.
+        Standard error of predicted less measured.
     chance : float
         Probability of at least this misfit of all coefficients.
     misfit : float

@@ -55,7 +55,7 @@ class CampaignEquations:
     force : str
         ``X``, ``Y`` or ``N``.
     names : tuple of str
-        Of the columns.
+        Names of the columns.
     design : array, (rows, columns)
         Each run's block is multiplied by the inverse root of its within-run covariance.
     values : array, (rows,)

@@ -39,7 +39,7 @@ class HarmonicFit:
     coefficients : array, (columns,)
         In the order of :attr:`ReducedRun.labels`, N or N m, hydrodynamic sense, as measured.
     covariance : array, (columns, columns)
-        Of noise within the run, without the zero error of the run.
+        Covariance of noise within the run, without the zero error of the run.
     density : array, (columns,)
         Variance of white noise that would disturb each coefficient as much.
     freedom : array, (columns,)

@@ -177,7 +177,7 @@ class Reduction:
     missing : tuple of str
         Names in :data:`ESSENTIAL` that the campaign does not give.
     delay : DelayEstimate or None
-        Of the forces as recorded, less ``[test] force_delay_s``; None if no oscillations at two frequencies show it.
+        Delay of the forces as recorded, less ``[test] force_delay_s``; None without oscillations at two frequencies.
     alignment : AlignmentEstimate or None
         The zero of the drift angle by Y0 and N0; None if the campaign does not give them.
     """

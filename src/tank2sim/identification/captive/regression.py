@@ -121,11 +121,11 @@ class Solution:
     Parameters
     ----------
     names : tuple of str
-        Of the terms.
+        Names of the terms.
     values : array, (terms,)
         Prime.
     covariance : array, (terms, terms)
-        Of the values.
+        Covariance of the values.
     spread : Spread
         With which they were weighted.
     condition : float
@@ -285,7 +285,7 @@ class _ZeroLikelihood:
     along : array, (runs, columns + 1)
         Design and right-hand side of each run along its zero error.
     across : array, (columns + 1, columns + 1)
-        Of all runs across theirs, as a triangle.
+        Design and right-hand side of all runs across their zero errors, as a triangle.
     prior : array, (terms, columns + 1)
     sizes : array, (runs,)
         z_i' z_i.

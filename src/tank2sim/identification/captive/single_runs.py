@@ -47,7 +47,7 @@ class FourierCoefficient:
     order : int
         0 for the mean.
     cosine, sine : float
-        Of the mean ``cosine`` is the mean and ``sine`` is 0.
+        Coefficients; those of the mean are the mean and 0.
     cosine_error, sine_error : float
         Standard errors; 0 for motions, which are fitted as the mechanism makes them.
     """
@@ -120,7 +120,7 @@ class SingleRun:
     residual_rms : mapping
         Force to the root mean square of record less harmonics and trend, N or N m.
     derivatives : OscillationDerivatives or None
-        Of an oscillating run whose model is known, by its first and third harmonics.
+        Derivatives of an oscillating run whose model is known, by its first and third harmonics.
     faults : tuple of str
         What contradicts the record.
     """

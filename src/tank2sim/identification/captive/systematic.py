@@ -257,7 +257,7 @@ def gauge_gains(
     equations : CampaignEquations
         Without trends with frequency.
     spread : Spread
-        Of the runs within each kind.
+        Spread of the runs within each kind.
     rival : float
         Largest ratio of a trend with frequency to its standard error: a gain must explain the runs better.
     """

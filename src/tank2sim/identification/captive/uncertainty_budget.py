@@ -115,7 +115,7 @@ def regression_parts(selection: Selection, solution: Solution) -> dict[str, Arra
     selection : Selection
         Its equations.
     solution : Solution
-        Of these equations.
+        Solution of these equations.
     """
     equations, spread = selection.equations, solution.spread
     weights = spread.weights or spread

@@ -42,7 +42,7 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
     values, errors : mapping
         Coefficients of hull (prime II, by 1/2 rho L d U^2), propeller and rudder by name, and their standard errors.
     note : str
-        Of where they are from.
+        Sentence that says where the numbers are from.
     """
     form = tests.form
     model, rudder = form.model, form.rudder

@@ -63,7 +63,7 @@ def refuse_other_curve(points: Array, path: Path) -> None:
     points : array, (points, 2 or more)
         J, K_T.
     path : Path
-        Of the campaign, for the message.
+        File of the campaign, for the message.
     """
     J, K_T = points[:, :2].T
     remedy = "name the column of K_T = T/(rho n² D⁴), positive ahead"
@@ -86,7 +86,7 @@ def refuse_astern(form: CampaignFile, path: Path, revolutions: Array, thrusts: d
     ----------
     form : CampaignFile
     path : Path
-        Of the campaign, for the message.
+        File of the campaign, for the message.
     revolutions : array, (conditions,)
         rad/s.
     thrusts : mapping

@@ -110,7 +110,7 @@ class MmgFit:
         Coefficients; those of the hull in prime II; ``rudder_offset`` in rad.
     values : array, (k,)
     covariance : array, (k, k)
-        Of both types.
+        Covariance of both types.
     random : array, (k,)
         Standard errors by the scatter alone (Type A).
     common : mapping
@@ -254,7 +254,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array, channels
     Parameters
     ----------
     model : Model
-        Of an MMG card.
+        Model of an MMG card.
     names : sequence of str, (k,)
     units : array, (k,)
         What one of a coefficient is in the model: L/d of those of the hull.

@@ -41,7 +41,7 @@ class SteadyTests:
     Parameters
     ----------
     path : Path
-        Of the campaign's file.
+        File of the campaign.
     form : CampaignFile
         What it states.
     names : tuple of str, (conditions,)
@@ -53,7 +53,7 @@ class SteadyTests:
     open_water : array, (points, 2 or 3)
         J, K_T, and K_Q if the torque was measured.
     remarks : tuple of str
-        Of reading the files.
+        Remarks from reading the files.
     """
 
     path: Path

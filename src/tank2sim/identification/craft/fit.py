@@ -80,7 +80,7 @@ class CraftFit:
     ----------
     problem : Problem
     estimate : KalmanEstimate
-        Of the k free parameters.
+        Estimate of the k free parameters.
     levels : Levels
         Noise levels.
     by_run : array (runs, k, k)
@@ -177,7 +177,7 @@ def spread_between(found: Array, errors: Array, before: float) -> tuple[float, f
     Parameters
     ----------
     found, errors : array (n,)
-        Of each trial, and its standard error, where it was known beforehand to be 0 within `before`.
+        Value of each trial and its standard error, known beforehand to be 0 within `before`.
     before : float
 
     Examples

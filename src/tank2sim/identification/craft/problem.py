@@ -254,7 +254,7 @@ def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem
     problem : Problem
         By :func:`craft_problem`.
     means, spreads : array (5,)
-        Of :data:`DISTURBANCES`.
+        Means and spreads of the :data:`DISTURBANCES`.
     """
     known = dict(zip(DISTURBANCES, zip(means.tolist(), spreads.tolist(), strict=True), strict=True))
 

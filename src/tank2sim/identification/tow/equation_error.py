@@ -40,7 +40,7 @@ class SpeedFit:
     scatter_mps : float
         Standard deviation of a single reading about the polynomial.
     covariance : array, (degree + 1, degree + 1)
-        Of the coefficients of (t / span)^k.
+        Covariance of the coefficients of (t / span)^k.
     """
 
     polynomial: Polynomial

@@ -84,7 +84,7 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
 def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
     """The largest set of drag terms that all fits (of one model) can distinguish from M and each other.
 
-    Of sets of equal size the one with the lower powers of the speed.
+    Among sets of equal size the one with the lower powers of the speed is taken.
     """
     terms = fits[0].terms
     for count in range(len(terms), 0, -1):

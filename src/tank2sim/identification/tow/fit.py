@@ -37,13 +37,13 @@ class TowFit:
     values : array, (unknowns,)
         M, the coefficients of the terms, and the start delay if it is estimated; SI.
     covariance : array, (unknowns, unknowns), or None
-        Of the values; None where the method gives none. A given mass has no variance.
+        Covariance of the values; None where the method gives none. A given mass has no variance.
     mass_kg : float
         m, taken as exact.
     design : array, (rows, free unknowns)
         Design matrix of the method's least squares.
     J : float
-        Of (1.6), N s^(1/2), with the polynomial speed of the tows.
+        Integral J of (1.6), N s^(1/2), with the polynomial speed of the tows.
     largest_speed_error_mps : float
         Largest absolute difference of the integrated speed from the mean of the tows; infinite where it overflows.
     """

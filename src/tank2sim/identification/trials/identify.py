@@ -112,7 +112,7 @@ class Identification:
     before, before_holdout : Comparison
         The same for the given card.
     structure : str
-        Of the model, as requested or chosen.
+        Structure of the model, as requested or chosen.
     manoeuvres : mapping
         Trial to a description of the recognised manoeuvre.
     forced : tuple of str
@@ -133,7 +133,7 @@ class Identification:
     current : WaterCurrent or None
         Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have it.
     choice : MethodChoice or None
-        Of the method, and its reason; None where the options name the method.
+        Choice of the method, and its reason; None where the options name the method.
     """
 
     started: ManoeuvringCard

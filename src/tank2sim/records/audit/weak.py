@@ -41,7 +41,7 @@ class AuditWindows:
     Parameters
     ----------
     step_s : float
-        Of the time base.
+        Step of the time base.
     samples : int
         Width, odd.
     hop : int

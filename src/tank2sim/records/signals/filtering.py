@@ -48,7 +48,7 @@ def butterworth(
     cutoff_hz : sequence of 1 or (band) 2 floats
         Where one pass has -3 dB; forwards and backwards together have -6 dB there.
     order : int
-        Of one pass; of a band pass, of each of its sides.
+        Order of one pass; in a band pass, of each of its sides.
     causal : bool
         Forwards alone; it begins as if the signal had always had its first value.
 
@@ -93,7 +93,7 @@ def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int
     samples : int
         Length of the window, odd; at most the record.
     degree : int
-        Of the polynomial, below `samples`.
+        Degree of the polynomial, below `samples`.
     derivative : int
         0 for the value, 1 or more for the derivative by time, in unit/s and so on.
 

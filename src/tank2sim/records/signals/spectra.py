@@ -34,7 +34,7 @@ class Averaging:
     Parameters
     ----------
     samples : int
-        Of one segment.
+        Samples of one segment.
     segments : int
         How many there are.
     freedom : float
@@ -111,7 +111,7 @@ class Transfer:
     Parameters
     ----------
     frequency_hz : array (m,)
-        As of :class:`Spectrum`.
+        As in :class:`Spectrum`.
     response : complex array (m,)
         Output over input; a negative angle: the output comes later.
     coherence : array (m,)

@@ -82,7 +82,7 @@ class Stationarity:
     block : int
         Samples averaged to one value of the tests, so that their few lags reach over the correlation time.
     mean, variance : (float, float)
-        Of the first and the second half, in the signal's unit and its square; those of :func:`mean_and_deviation`.
+        Both halves, in the signal's unit and its square, as by :func:`mean_and_deviation`.
     """
 
     verdict: Stationary
@@ -110,7 +110,7 @@ class Normality:
         Samples tested, one every two correlation times. All samples together would make the tests reject what is
         normal: they take each for new evidence.
     skewness, excess_kurtosis : float
-        Of all samples; both 0 for a normal distribution.
+        Skewness and excess kurtosis of all samples; both 0 for a normal distribution.
     """
 
     verdict: str

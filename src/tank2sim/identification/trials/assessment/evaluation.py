@@ -134,7 +134,7 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
     Parameters
     ----------
     card : ManoeuvringCard
-        Of the ship.
+        Card of the ship.
     trials : sequence of Trial
         At the ship's size; trials other than turns and zigzags are ignored.
     """
@@ -165,7 +165,7 @@ class Passage:
     Parameters
     ----------
     name : str
-        Of the trial.
+        Name of the trial.
     closed_loop : bool
         True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it was
         driven by the recorded rudder, from the initial state that fits the record best.
@@ -330,7 +330,7 @@ def compare_card(
     Parameters
     ----------
     card, trials
-        Of the same size.
+        Card and trials of the same size.
     residual : mapping
         Expected standard deviation of each variable's error: it weighs the signals in the fit of a window's initial
         state. With weights of sensor noise alone, the state would follow a single signal.

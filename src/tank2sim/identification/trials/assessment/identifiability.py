@@ -52,11 +52,11 @@ class Identifiability:
     free : tuple of str
         Names of the parameters.
     singular_values : array (k,)
-        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
+        Singular values of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
     condition : float
         Largest over smallest of them, inf where the smallest is zero.
     correlation : array (k, k)
-        Of the estimates by the trials alone.
+        Correlation of the estimates by the trials alone.
     pairs : tuple of (str, str, float)
         Parameters whose absolute correlation exceeds :data:`CLOSE_CORRELATION`, the closest first.
     unseen : tuple of tuple of str

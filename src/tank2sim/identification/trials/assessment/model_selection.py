@@ -115,7 +115,7 @@ class HeldOutFold:
     held_out : tuple of str
         Names of the runs.
     error : float
-        Of the score on them; inf where the fit or the prediction failed.
+        Error on them, by the score; inf where the fit or the prediction failed.
     values : array (k,)
         Estimates without them, empty where the fit failed.
     """

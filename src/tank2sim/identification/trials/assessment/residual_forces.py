@@ -37,7 +37,7 @@ class Disturbances:
     Parameters
     ----------
     covariance : array (3, 3)
-        Of X, Y (N) and N (N m).
+        Covariance of X, Y (N) and N (N m).
     correlation_s : float
         Time in which their correlation falls to 1/e, s.
     """

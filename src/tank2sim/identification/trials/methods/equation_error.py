@@ -53,7 +53,7 @@ class WhiteningWeights:
     inverse : array (3, 3)
         L^-1, with L L' the covariance of the residuals, L lower triangular.
     colour : tuple of ColouredNoise
-        Of the three components of L^-1 e.
+        Colour of the three components of L^-1 e.
     """
 
     inverse: Array

@@ -47,7 +47,7 @@ def damped_gauss_newton(
     -------
     best : Point
     costs : tuple of float
-        Of all points after the start, the best last.
+        Costs of all points after the start, the best last.
     system : System or None
         Normal equations at the best point; None where they were not computed.
     """

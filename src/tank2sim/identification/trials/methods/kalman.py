@@ -84,14 +84,14 @@ class Smoothed:
     Parameters
     ----------
     name : str
-        Of the run.
+        Name of the run.
     states, state_errors : arrays (n, nx)
         The model's states and their standard errors (parameters taken as exact).
     accelerations, acceleration_errors : arrays (n, m)
         Random accelerations, unexplained by the model, over the step after each instant, in the order of
         :attr:`KalmanEstimate.process_noise`, m/s2 or rad/s2. Times the mass matrix they are unexplained forces.
     drifts : array (n, ny)
-        Of the sensors, in the signals' units; (n, 0) without drift.
+        Drifts of the sensors, in the signals' units; (n, 0) without drift.
     innovations : array (n, ny)
         Whitened: independent with unit variance if the model holds; nan where not measured.
     """
@@ -116,7 +116,7 @@ class KalmanEstimate(Estimate):
     measurement_noise : mapping
         Standard deviation of the white noise by measured variable (``noise`` holds that of the innovations).
     drift : mapping
-        Of each sensor by measured variable; empty without drift.
+        Drift of each sensor by measured variable; empty without drift.
     smoothed : tuple of Smoothed
         In the order of the runs.
     """

@@ -25,7 +25,7 @@ class Variances:
     Parameters
     ----------
     process : array (..., runs, nz)
-        Of the noise added to the state in a step (diagonal).
+        Variances of the noise added to the state in a step (diagonal).
     measurement : array (..., runs, n, ny)
         1 where not measured.
     start : array (..., runs, nz, nz)
@@ -108,7 +108,7 @@ def variant_likelihoods(
     variances : Variances
         With a leading axis of variants; the first variant is the filter of the trajectory itself.
     innovations, after : arrays (runs, n, ny), (runs, n, nz)
-        Of the first variant: innovations, and states after each measurement.
+        Innovations of the first variant, and its states after each measurement.
     factors : array (variants, runs, g)
         Share of each of the last g states that remains after a step.
 

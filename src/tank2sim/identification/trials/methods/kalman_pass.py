@@ -80,11 +80,11 @@ class Levels:
     Parameters
     ----------
     process : array (g,)
-        Of the standard deviation of each random acceleration, m/s2 or rad/s2, and then of each sensor's drift.
+        Standard deviations of each random acceleration, m/s2 or rad/s2, and then of each sensor's drift.
     time : array (g,)
-        Of their time constants, s; -inf for white.
+        Time constants, s; -inf for white.
     measurement : array (ny,)
-        Of the standard deviation of each measured signal's noise, in the signal's unit.
+        Standard deviation of each measured signal's noise, in the signal's unit.
     """
 
     process: Array

@@ -33,7 +33,7 @@ def evidence_scale(problem: Problem, information: Array, values: Array, scale: M
     problem : Problem
         k free parameters.
     information : array (k, k)
-        Of the trials alone.
+        Information of the trials alone.
     values : array (k,)
         Estimates.
     scale : mapping
@@ -59,7 +59,7 @@ def sandwich(information: Array, unit: Array, scores: Sequence[Array], before: A
     Parameters
     ----------
     information : array (k, k)
-        Of the trials alone, under the noise model.
+        Information of the trials alone, under the noise model.
     unit : array (k,)
         Sizes of the parameters, which scale the matrices: the prior's errors.
     scores : sequence of arrays (blocks, k)

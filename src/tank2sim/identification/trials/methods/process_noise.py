@@ -29,9 +29,9 @@ class Tangents:
     Parameters
     ----------
     A, B : arrays (n, nz, nz), (n, nz, k)
-        Of the next state by the state (after the measurement) and by the free parameters.
+        Slopes of the next state by the state (after the measurement) and by the free parameters.
     C, D : arrays (n, ny, nz), (n, ny, k)
-        Of the observed values by the state (before the measurement) and by the free parameters.
+        Slopes of the observed values by the state (before the measurement) and by the free parameters.
     """
 
     A: Array

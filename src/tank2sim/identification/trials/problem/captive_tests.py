@@ -166,7 +166,7 @@ def captive_tests(card: ManoeuvringCard, model: Model, free: Sequence[str], sour
     Parameters
     ----------
     card : ManoeuvringCard
-        Of the ship, at the size of `model`.
+        Card of the ship, at the size of `model`.
     model : Model
         Driven by the rudder's angle or order.
     free : sequence of str

@@ -126,7 +126,7 @@ class FittedMotion:
     starts : tuple of array (pieces, nx)
         Initial states of the pieces of each run.
     noise : tuple of ColouredNoise
-        Of each seen variable.
+        Noise of each seen variable.
     """
 
     piece_s: float | None
@@ -147,9 +147,9 @@ class Estimate:
     values : array (k,)
         Estimates.
     covariance : array (k, k)
-        Of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
+        Covariance of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
     information : array (k, k)
-        Of the trials alone: the inverse covariance without the prior.
+        Information of the trials alone: the inverse covariance without the prior.
     noise : mapping
         Standard deviation of the residual by variable.
     cost : tuple of float
@@ -161,7 +161,7 @@ class Estimate:
     motion : FittedMotion, optional
         What output error fitted in addition to the parameters.
     samples : array (draws, k), optional
-        Of the posterior, where it was sampled: `values` and `covariance` are then theirs.
+        Samples of the posterior, where it was sampled: `values` and `covariance` are then theirs.
     """
 
     method: str

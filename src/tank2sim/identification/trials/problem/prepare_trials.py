@@ -63,7 +63,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     given : iterable
         Files, or trials as they were read.
     card : ManoeuvringCard
-        Of the ship.
+        Card of the ship.
     report_unused : bool
         Whether a notice says that a wind or depth was measured which no effect of the card uses.
 

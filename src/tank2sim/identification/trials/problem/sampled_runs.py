@@ -50,7 +50,7 @@ class SampledRun:
     Parameters
     ----------
     name : str
-        Of the trial.
+        Name of the trial.
     begin_s, step_s : float
         Time of the first instant in the trial's own time, and the step, s.
     inputs : array (n, nu)

@@ -203,7 +203,7 @@ def with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> Manoeuvr
     ----------
     card : ManoeuvringCard
     name : str
-        Of the effect.
+        Name of the effect.
     parameters : mapping
         Parameter, as spelt in a card, to value and standard error before the trials.
     """

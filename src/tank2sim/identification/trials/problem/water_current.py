@@ -44,7 +44,7 @@ class WaterCurrent:
     velocity : array (2,)
         To north and east, m/s.
     covariance : array (2, 2)
-        Of both.
+        Covariance of both.
     ship_speed_mps : float
         Speed of the card.
     """
@@ -140,7 +140,7 @@ def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate
     ----------
     estimate : Estimate
     card : ManoeuvringCard
-        Of the problem; its current is added.
+        Card of the problem; its current is added.
     """
     part = [estimate.free.index(name) for name in CURRENT_PARAMETERS]
     kept = [place for place in range(len(estimate.free)) if place not in part]
