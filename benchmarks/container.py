@@ -36,7 +36,7 @@ def main() -> None:
     if not REFERENCE.is_dir():
         sys.exit(f"{REFERENCE} is missing; TANK2SIM_DATA names its parent")
     ship = t2s.load("container")
-    fitted = t2s.convert(ship).converted
+    fitted = t2s.convert(ship).ship
     models = {"tank2sim": build(ship.manoeuvring()), "polynomial": build(fitted.manoeuvring())}
     begin = {"initial.u": 8.0, "initial.trim": 0.0}
     worst = {"phi": 0.0, "psi": 0.0, "x": 0.0, "y": 0.0}

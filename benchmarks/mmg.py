@@ -74,7 +74,7 @@ def main() -> None:
     """Print a row for each figure."""
     model, ship = t2s.load("kvlcc2-l7-mmg"), t2s.load("kvlcc2-mmg")
     began = time.perf_counter()
-    fitted = t2s.convert(model).converted
+    fitted = t2s.convert(model).ship
     seconds = time.perf_counter() - began
     print(
         f"{'manoeuvre':20s} {'figure':18s} {'tank2sim':>9s} {'elsewhere':>9s} {'shipmmg':>9s} {'polynomial':>10s} "

@@ -10,9 +10,7 @@ from .api.captive_run import CaptiveRunResult as CaptiveRunResult
 from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import ComparisonResult as ComparisonResult
 from .api.comparison import compare as compare
-from .api.convention import ConventionResult as ConventionResult
 from .api.convention import convention as convention
-from .api.conversion import ConversionResult as ConversionResult
 from .api.conversion import convert as convert
 from .api.craft_identification import (
     CraftIdentificationResult as CraftIdentificationResult,
@@ -80,6 +78,8 @@ from .api.yaw import yaw as yaw
 from .errors import InputError as InputError
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
+from .results.convention import ConventionResult as ConventionResult
+from .results.conversion import ConversionResult as ConversionResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.ships import ShipsResult as ShipsResult

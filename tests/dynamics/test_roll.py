@@ -214,7 +214,7 @@ def test_every_scaling_of_the_card_is_the_same_ship() -> None:
     ship = t2s.load("container")
     expected = ship.turn(10).figures["tactical_diameter_m"]
     for scaling in ("dimensional", "prime_ii", "bis"):
-        made = t2s.convert(ship, to="mmg", scaling=scaling).converted
+        made = t2s.convert(ship, to="mmg", scaling=scaling).ship
         assert made.turn(10).figures["tactical_diameter_m"] == pytest.approx(expected, rel=1e-9)
         assert made.turn(10).figures["largest_heel_deg"] == pytest.approx(
             ship.turn(10).figures["largest_heel_deg"], rel=1e-8
@@ -226,15 +226,15 @@ def test_the_polynomial_of_a_ship_that_rolls_rolls_alike() -> None:
     made = t2s.convert("container", to="abkowitz")
     assert {change.after is None for change in made.made.changes} == {False}
     for manoeuvre in ("turn:10", "zigzag:10/10"):
-        first, second = (ship.simulate(manoeuvre).figures for ship in (t2s.load("container"), made.converted))
+        first, second = (ship.simulate(manoeuvre).figures for ship in (t2s.load("container"), made.ship))
         assert second["largest_heel_deg"] == pytest.approx(first["largest_heel_deg"], rel=0.05)
 
 
 @pytest.mark.slow
 def test_an_origin_moved_forward_and_back_is_the_same_ship() -> None:
-    made = t2s.convert("container", to="abkowitz").converted
-    there = t2s.convert(made, origin_m=10.0).converted
-    back = t2s.convert(there, origin_m=-10.0).converted
+    made = t2s.convert("container", to="abkowitz").ship
+    there = t2s.convert(made, origin_m=10.0).ship
+    back = t2s.convert(there, origin_m=-10.0).ship
     for name in made.manoeuvring().derivatives:
         expected = made.manoeuvring().derivatives[name]
         assert back.manoeuvring().derivatives[name] == pytest.approx(expected, rel=1e-8, abs=1e-15), name

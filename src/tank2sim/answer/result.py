@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import importlib
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -87,6 +88,15 @@ class Result(ABC, Generic[_S]):
         kinds = (base for parent in cls.__mro__ for base in getattr(parent, "__orig_bases__", ()))
         found: type[_S] = next(get_args(base)[0] for base in kinds if issubclass(get_origin(base) or object, Result))
         return found
+
+    def __getattr__(self, name: str) -> Any:
+        """`ship`: the :class:`tank2sim.Ship` of the card found, of a result that has a `card`."""
+        if name != "ship" or (card := self.__dict__.get("card")) is None:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        return importlib.import_module("tank2sim.api.ship").Ship(card)  # the API is above this room
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(["ship"] if self.__dict__.get("card") else [])]
 
     @property
     def tables(self) -> tuple[Table, ...]:

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from tank2sim.api.verbs import Output, Progress, verb
 from tank2sim.arguments import ArgumentBounds, NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import FMU
-from tank2sim.verbs import Output, Progress, verb
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -570,7 +570,7 @@ def _polynomial(ship: Ship) -> tuple[ManoeuvringCard, tuple[str, ...]]:
     if not isinstance(card, MmgCard):
         return card, ()
     made = convert(ship)
-    return made.converted.manoeuvring(), (
+    return made.ship.manoeuvring(), (
         "the card is of the MMG method: the plan is for the polynomial that is fitted to it",
         *made.notices,
     )

@@ -14,6 +14,8 @@ from tank2sim.files import schema_command, schema_name
 RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
     "check": ("results.fmu:CheckResult",),
+    "convention": ("results.convention:ConventionResult",),
+    "convert": ("results.conversion:ConversionResult",),
     "export": ("results.fmu:ExportResult",),
     "ships": ("results.ships:ShipsResult",),
 }

@@ -824,55 +824,6 @@ class BridgeKeys(_Keys):
     ballast: dict[str, Any] | None
 
 
-class ConvertedFigureKeys(_Part):
-    """A figure of a manoeuvre before and after a conversion."""
-
-    manoeuvre: str
-    figure: str
-    before: JsonNumber
-    after: JsonNumber
-    error_percent: JsonNumber
-
-
-class ConvertKeys(_Keys):
-    """A card in another language."""
-
-    ship: str
-    from_kind: str
-    to: str
-    fit: dict[str, Any] | None
-    figures: list[ConvertedFigureKeys]
-    notices: list[str]
-
-
-class ReadingKeys(_Part):
-    """A reading of a table: its conventions, its probability, its figures, and what speaks against it."""
-
-    rudder_sign: str
-    scaling: str
-    yaw_rate_terms: str
-    origin: str
-    probability: float
-    C_prime: JsonNumber
-    turning_index: JsonNumber
-    advance_lengths: JsonNumber
-    tactical_diameter_lengths: JsonNumber
-    overshoot_1_deg: JsonNumber
-    vanished: list[str]
-    against: list[str]
-
-
-class ConventionKeys(_Keys):
-    """Readings of a table of derivatives, the most probable first."""
-
-    source: str
-    stated: dict[str, str]
-    assumed: list[str]
-    scaled_with_nominal_speed: bool | None
-    readings: list[ReadingKeys]
-    notices: list[str]
-
-
 class SignalsKeys(_Keys):
     """Statistics, spectra and filters of records."""
 
@@ -1138,8 +1089,6 @@ class GuessKeys(_Keys):
 KEYS: dict[str, Any] = {
     "audit": AuditKeys,
     "compare": CompareKeys,
-    "convention": ConventionKeys,
-    "convert": ConvertKeys,
     "demo": DemoKeys,
     "design": CampaignDesignKeys | TrialDesignKeys,
     "gap": GapKeys,

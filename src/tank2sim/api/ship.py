@@ -24,6 +24,7 @@ from tank2sim.api.bounds import (
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
+from tank2sim.cards.card import manoeuvring_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.errors import InputError, close_name
@@ -60,12 +61,6 @@ class SimulationOptions(TypedDict, total=False):
     members: EnsembleSize
     seed: Seed
     executor: str
-
-
-CRAFT_COMMANDS = (
-    "identify, validate, compare, simulate, stability, autopilot, influence, convert, export, steer (without ensembles)"
-)
-"""Commands that take the card of a craft with thrusters."""
 
 
 class Ship:
@@ -136,15 +131,7 @@ class Ship:
         InputError
             It is not: a towed body, a yaw rig, a glider or a craft without a rudder.
         """
-        if isinstance(self.card, CraftCard):
-            remedy = f"craft with thrusters are taken by {CRAFT_COMMANDS}"
-            raise InputError(
-                self.card.source, "model.kind", "is small_craft, and this is of ships with a rudder", remedy
-            )
-        if not isinstance(self.card, ManoeuvringCard):
-            remedy = "give a linear, abkowitz or mmg card"
-            raise InputError(self.card.source, "model.kind", "is not that of a ship that manoeuvres", remedy)
-        return self.card
+        return manoeuvring_card(self.card)
 
     def steered(self) -> SteeredCard:
         """The card, if it is one of a ship that manoeuvres or of a small craft with thrusters.

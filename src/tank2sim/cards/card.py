@@ -320,3 +320,26 @@ class YawRigCard(Card):
     yaw_rig: YawRig
     programme: ProgrammeSection | None = None
     uncertainty: Mapping[str, float] = field(default_factory=dict)
+
+
+CRAFT_COMMANDS = (
+    "identify, validate, compare, simulate, stability, autopilot, influence, convert, export, steer (without ensembles)"
+)
+"""Commands that take the card of a craft with thrusters."""
+
+
+def manoeuvring_card(card: Card) -> ManoeuvringCard:
+    """The card, if it is one of a ship that manoeuvres in the horizontal plane.
+
+    Raises
+    ------
+    InputError
+        It is not: a towed body, a yaw rig, a glider or a craft without a rudder.
+    """
+    if isinstance(card, CraftCard):
+        remedy = f"craft with thrusters are taken by {CRAFT_COMMANDS}"
+        raise InputError(card.source, "model.kind", "is small_craft, and this is of ships with a rudder", remedy)
+    if not isinstance(card, ManoeuvringCard):
+        remedy = "give a linear, abkowitz or mmg card"
+        raise InputError(card.source, "model.kind", "is not that of a ship that manoeuvres", remedy)
+    return card

@@ -73,7 +73,11 @@ GROUPS = {
 COMMANDS = {name: words for group in GROUPS.values() for name, words in group.items()}
 
 
-VERBS = {"autopilot": "api.autopilot:autopilot"}
+VERBS = {
+    "autopilot": "api.autopilot:autopilot",
+    "convention": "api.convention:convention",
+    "convert": "api.conversion:convert",
+}
 """Commands that are derived from their function."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import inspect
+import re
 import types
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -12,13 +13,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import click
-from docstring_parser import DocstringStyle, parse
+from docstring_parser import Docstring, DocstringStyle, parse
 
 from tank2sim import arguments
+from tank2sim.api.verbs import Output, Verb
 from tank2sim.cli.options import OutputFile
 from tank2sim.files import JSON, PAGE, PICTURE
 from tank2sim.units import in_words
-from tank2sim.verbs import Output, Verb
 
 
 class _Unknown(type):
@@ -76,9 +77,7 @@ def command_of(name: str, verb: Verb) -> click.Command:
         Name of the command.
     verb : Verb
     """
-    documented = parse(verb.function.__doc__ or "", style=DocstringStyle.NUMPYDOC)
-    helps = {names: " ".join((one.description or "").split()) for one in documented.params for names in [one.arg_name]}
-    helps = {single.strip(): text for names, text in helps.items() for single in names.split(",")}
+    documented, helps = _documented(verb.function)
     own = [parameter for one in _arguments(verb.function) for parameter in _parameters(one, helps, verb)]
     written = [parameter for output in verb.outputs for parameter in _output_parameters(output)]
     main = [] if any(output.option == "-o" for output in verb.outputs) else ["-o"]
@@ -95,7 +94,15 @@ def command_of(name: str, verb: Verb) -> click.Command:
     def run(**given: Any) -> int:
         return _run(verb, given)
 
-    return VerbCommand(name, params=[*own, *written, *shared], callback=run, help=text.replace("``", ""))
+    return VerbCommand(name, params=[*own, *written, *shared], callback=run, help=text)
+
+
+def _documented(function: Callable[..., Any]) -> tuple[Docstring, dict[str, str]]:
+    """The docstring of a function, and the description of each parameter in plain text."""
+    plain = re.sub(r":\w+:`[.~]?(?:[\w.]+\.)?(\w+)`|``", lambda found: found[1] or "", function.__doc__ or "")
+    documented = parse(plain, style=DocstringStyle.NUMPYDOC)
+    words = {one.arg_name: " ".join((one.description or "").split()) for one in documented.params}
+    return documented, {name.strip(): text for names, text in words.items() for name in names.split(",")}
 
 
 def _arguments(function: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Any]]:
@@ -139,7 +146,8 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         nargs = -1 if several else 1
         return [click.Argument([one.name], nargs=nargs, required=True, type=_type(kind, several))]
     default = None if one.default in (inspect.Parameter.empty, None) else one.default
-    shown: dict[str, Any] = {"help": helps.get(one.name), "default": default}
+    words = "; ".join(f"{choice}: {text}" for choice, text in verb.choices.get(one.name, {}).items())
+    shown: dict[str, Any] = {"help": " ".join(filter(None, (helps.get(one.name), words))), "default": default}
     stem, unit = _stem(one.name)
     option = f"--{stem.replace('_', '-')}"
     names = list(dict.fromkeys((option, f"--{one.name.replace('_', '-')}")))
@@ -172,7 +180,9 @@ def _type(kind: Any, several: Any) -> Any:
     return next((part for part in parts if part in (int, float)), str)
 
 
-def _number(limits: arguments.ArgumentBounds) -> click.IntRange | click.FloatRange:
+def _number(limits: arguments.ArgumentBounds) -> Any:
+    if limits == arguments.ArgumentBounds():
+        return float
     if limits.whole:
         return click.IntRange(
             None if limits.low is None else int(limits.low), None if limits.high is None else int(limits.high)
@@ -191,8 +201,7 @@ def _output_parameters(output: Output) -> list[click.Parameter]:
     where = _option(names, type=OutputFile(output.endings), metavar=output.metavar, help=output.help,
                     required=output.required)  # fmt: skip
     found: list[click.Parameter] = [where]
-    documented = parse(output.write.__doc__ or "", style=DocstringStyle.NUMPYDOC)
-    helps = {one.arg_name: " ".join((one.description or "").split()) for one in documented.params}
+    _, helps = _documented(output.write)
     for one, kind in _arguments(output.write):
         if one.kind is inspect.Parameter.KEYWORD_ONLY:
             found += _parameters((one, kind), helps, Verb(output.write, ""))

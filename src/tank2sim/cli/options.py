@@ -44,7 +44,7 @@ def number(kind: Any) -> click.IntRange | click.FloatRange:
 class OutputFile(click.Path):
     """A file to be written, whose name ends as files of its kind do (:mod:`tank2sim.files`); a folder has no ending."""
 
-    def __init__(self, endings: Sequence[str], **more: Any) -> None:
+    def __init__(self, endings: Sequence[str] | None, **more: Any) -> None:
         super().__init__(path_type=Path, **more)
         self.endings = endings
 
@@ -53,7 +53,8 @@ class OutputFile(click.Path):
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if self.endings == JSON and str(path) == "-":
             return STANDARD_OUTPUT
-        refuse_other_ending(path, self.endings)
+        if self.endings is not None:
+            refuse_other_ending(path, self.endings)
         return path
 
 

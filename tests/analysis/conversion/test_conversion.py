@@ -68,9 +68,7 @@ def test_moving_the_origin_follows_the_formulas() -> None:
 def test_a_ship_is_as_stable_about_any_origin(name: str) -> None:
     """Eigenvalues of straight motion do not know the origin; with "total" and with "hydrodynamic" cards."""
     moved = t2s.convert(name, origin_m=-4.0)
-    before, after = (
-        ship.stability(spirals=False).to_dict()["eigenvalues"] for ship in (t2s.load(name), moved.converted)
-    )
+    before, after = (ship.stability(spirals=False).to_dict()["eigenvalues"] for ship in (t2s.load(name), moved.ship))
     assert np.array(after) == pytest.approx(np.array(before), rel=1e-6)
     assert moved.made.card is not None
     assert moved.made.card.rigid_body.x_G == pytest.approx(
@@ -79,8 +77,8 @@ def test_a_ship_is_as_stable_about_any_origin(name: str) -> None:
 
 
 def test_there_and_back_is_the_same_card() -> None:
-    there = t2s.convert("mariner", origin_m=5.0).converted
-    back = t2s.convert(there, origin_m=-5.0).converted.manoeuvring()
+    there = t2s.convert("mariner", origin_m=5.0).ship
+    back = t2s.convert(there, origin_m=-5.0).ship.manoeuvring()
     for name, value in polynomial("mariner").derivatives.items():
         assert back.derivatives[name] == pytest.approx(value, rel=1e-9, abs=1e-15), name
 
@@ -95,7 +93,7 @@ def test_other_conventions_are_the_same_ship(scaling: str, sign: str) -> None:
     for name, value in old.derivatives.items():
         assert new.derivatives[name] == pytest.approx(value, rel=1e-9), name
         assert new.uncertainty[name] == pytest.approx(old.uncertainty[name], rel=5e-3), name
-    assert made.converted.turn(35).figures == pytest.approx(t2s.load("kvlcc2").turn(35).figures, rel=1e-6)
+    assert made.ship.turn(35).figures == pytest.approx(t2s.load("kvlcc2").turn(35).figures, rel=1e-6)
 
 
 def test_numbers_of_the_file_have_the_factors_of_their_system() -> None:
@@ -125,7 +123,7 @@ def parse_toml(text: str) -> dict[str, dict[str, float]]:
 @pytest.mark.slow
 def test_an_mmg_card_in_other_scalings_is_the_same_ship() -> None:
     for scaling in ("prime", "dimensional", "bis"):
-        made = t2s.convert("kvlcc2-l7-mmg", to="mmg", scaling=scaling).converted
+        made = t2s.convert("kvlcc2-l7-mmg", to="mmg", scaling=scaling).ship
         before, after = t2s.load("kvlcc2-l7-mmg").turn(35).figures, made.turn(35).figures
         assert after["tactical_diameter_m"] == pytest.approx(before["tactical_diameter_m"], rel=1e-6), scaling
 
@@ -218,7 +216,7 @@ def test_the_polynomial_follows_standard_manoeuvres_and_says_how_well() -> None:
         for angle in ("10/10", "20/20"):
             entry = found[f"zigzag:{side}{angle}", "overshoot_1_deg"]
             assert abs(entry["after"] - entry["before"]) < 1.2
-    again = made.converted.turn(35).figures["tactical_diameter_m"]
+    again = made.ship.turn(35).figures["tactical_diameter_m"]
     assert again == pytest.approx(found["turn:35", "tactical_diameter_m"]["after"], rel=1e-6)
     assert made.made.card is not None and made.made.card.model.kind == "abkowitz"
 
@@ -229,7 +227,7 @@ def test_a_ship_alike_to_both_sides_gets_a_polynomial_that_is_so_too() -> None:
     assert made.made.card is not None
     derivatives = made.made.card.derivatives
     assert not any(derivatives.get(name) for name in ("Y0", "Y0u", "N0", "N0uu", "Xv"))
-    port, starboard = (made.converted.turn(side).figures["advance_m"] for side in (-35, 35))
+    port, starboard = (made.ship.turn(side).figures["advance_m"] for side in (-35, 35))
     assert port == pytest.approx(starboard, rel=1e-6)
 
 
@@ -382,12 +380,12 @@ def test_mmgdynamics_has_the_rates_of_the_model_where_it_has_the_same_equations(
         ("mariner", {"to": "shipmmg"}, ["model.kind"]),
         ("mariner", {"to": "mmgdynamics"}, ["model.kind"]),
         ("container", {"to": "mmgdynamics"}, ["roll"]),
-        ("mariner", {"to": "abkowits"}, ["--to", "abkowitz"]),
+        ("mariner", {"to": "abkowits"}, ["to", "abkowitz"]),
         ("mariner", {"scaling": "bis"}, ["ship.displacement_kg", "bis"]),
-        ("mariner", {"scaling": "imperial"}, ["--scaling"]),
-        ("mariner", {"rudder_sign": "left"}, ["--rudder-sign"]),
-        ("mariner", {"origin_m": 1e4}, ["--origin"]),
-        ("mariner", {"to": "mss", "scaling": "prime"}, ["--to", "mss"]),
+        ("mariner", {"scaling": "imperial"}, ["scaling"]),
+        ("mariner", {"rudder_sign": "left"}, ["rudder_sign"]),
+        ("mariner", {"origin_m": 1e4}, ["origin_m"]),
+        ("mariner", {"to": "mss", "scaling": "prime"}, ["to", "mss"]),
         ("kvlcc2", {"origin_m": 1.0}, ["effects", "midships"]),
         ("kvlcc2-l7-mmg", {"to": "mmg", "origin_m": 1.0}, ["model.kind", "abkowitz"]),
         ("kvlcc2-l7-mmg", {"scatter": 0.0}, ["scatter"]),

@@ -74,7 +74,7 @@ def test_vrx_has_positive_damping_and_no_more_than_its_axes(craft: CraftCard) ->
 
 
 def test_what_the_simpler_form_loses_is_in_the_figures_and_gazebos_hull_loses_nothing(craft: CraftCard) -> None:
-    gazebo, vrx = (t2s.convert(t2s.Ship(craft), to).content()["figures"] for to in ("gazebo", "vrx"))
+    gazebo, vrx = (t2s.convert(t2s.Ship(craft), to).to_dict()["figures"] for to in ("gazebo", "vrx"))
     assert all(entry["after"] == pytest.approx(entry["before"], rel=1e-12) for entry in gazebo)
     straight = [entry for entry in vrx if entry["manoeuvre"].startswith("straight")]
     turn = next(entry for entry in vrx if entry["figure"] == "steady_diameter_m")
@@ -84,8 +84,8 @@ def test_what_the_simpler_form_loses_is_in_the_figures_and_gazebos_hull_loses_no
 
 def test_a_card_goes_to_prime_and_back_to_the_last_digits(craft: CraftCard) -> None:
     prime = t2s.convert(t2s.Ship(craft), "small_craft", scaling="prime")
-    assert '"prime"' in prime.text and prime.converted.card.rigid_body.mass == pytest.approx(80.0, rel=1e-14)
-    back = t2s.convert(prime.converted, "small_craft", scaling="dimensional").converted.card
+    assert '"prime"' in prime.text and prime.ship.card.rigid_body.mass == pytest.approx(80.0, rel=1e-14)
+    back = t2s.convert(prime.ship, "small_craft", scaling="dimensional").ship.card
     assert back.derivatives == pytest.approx(craft.derivatives, rel=1e-14)
 
 

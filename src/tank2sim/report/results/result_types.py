@@ -84,8 +84,6 @@ RESULT_TYPES = (
     ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
-    ResultType("Conventions of a table", "convention", ("source", "readings"), ()),
-    ResultType("Card in another language", "convert", ("ship", "to", "figures"), ("to",)),
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
     ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),
     ResultType("Validation", "validate", ("verification", "counts", "figures"), ("verdict",)),

@@ -5,6 +5,8 @@ This module and those that declare verbs import nothing heavy, so that the help 
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
@@ -26,8 +28,8 @@ class Output:
     ----------
     option : str
         ``-o`` for the main one.
-    endings : tuple of str
-        How the name of the file may end (:mod:`tank2sim.files`); empty for a folder.
+    endings : tuple of str, optional
+        How the name of the file may end (:mod:`tank2sim.files`); empty for a folder, None where its content decides.
     help : str
     write : callable
         Called with the result and the path; returns contents by path, or a result whose ``files`` they are. Its
@@ -37,7 +39,7 @@ class Output:
     """
 
     option: str
-    endings: tuple[str, ...]
+    endings: tuple[str, ...] | None
     help: str
     write: Callable[..., Any]
     metavar: str = "FILE"
@@ -56,6 +58,8 @@ class Verb:
     outputs : sequence of Output
     texts : mapping
         Argument to a function that makes its value of the words on the command line.
+    choices : mapping
+        Argument to the words of its choices.
     exit_code : callable
         Of the result: the code with which the command ends.
     """
@@ -64,11 +68,14 @@ class Verb:
     words: str
     outputs: Sequence[Output] = ()
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
+    choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     exit_code: Callable[[Any], int] = lambda _: 0
 
 
 def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:
     """Declare a function a verb: its arguments are checked by their annotations, and it is a command.
+
+    A first argument `ship` may also be a card, its file, or the name of a bundled ship.
 
     Parameters
     ----------
@@ -80,8 +87,19 @@ def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T
     """
 
     def declare(function: Callable[_P, _T]) -> Callable[_P, _T]:
-        whole = checked(function)
-        whole.verb = Verb(whole, words, outputs, **more)  # type: ignore[attr-defined]
-        return whole
+        checking = checked(function)
+        first = next(iter(inspect.signature(function).parameters), "")
+
+        @functools.wraps(checking)
+        def call(*args: _P.args, **options: _P.kwargs) -> _T:
+            if first != "ship":
+                return checking(*args, **options)
+            from tank2sim.api.ship import as_ship
+
+            ship, *rest = args or (options.pop("ship", None),)
+            return checking(as_ship(ship), *rest, **options)  # type: ignore[arg-type]
+
+        call.verb = Verb(call, words, outputs, **more)  # type: ignore[attr-defined]
+        return call
 
     return declare

@@ -1,0 +1,223 @@
+"""Result of ``convention``: readings of a table of derivatives with unstated conventions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from tank2sim.answer.parts import Cell, KeyFigure, Section, table
+from tank2sim.answer.result import Result
+from tank2sim.cards import Card
+
+SURE_READING = 0.9
+"""Probability from which the first reading is taken without a mark. Project choice; ``benchmarks/convention.py`` prints
+how often a first reading with it is the true one."""
+
+_SHOWN, _LEAST_SHOWN, _MOST_SHOWN = 1e-3, 4, 8
+_ALIKE = 0.05
+"""Relative difference of figures up to which two readings are one ship in practice (project choice)."""
+
+_WORDS = {
+    "rudder_sign": {"starboard": "rudder positive to starboard", "port": "rudder positive to port"},
+    "scaling": {"prime": "prime system", "prime_ii": "prime system with L d", "bis": "bis system", "dimensional": "SI"},
+    "yaw_rate_terms": {"hydrodynamic": "yaw-rate terms without inertia", "total": "yaw-rate terms with inertia"},
+    "origin": {"midships": "origin midships", "centre_of_gravity": "origin in the centre of gravity"},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingFound:
+    """A reading of a table.
+
+    Parameters
+    ----------
+    rudder_sign, scaling, yaw_rate_terms, origin : str
+        Conventions, as a card states them.
+    probability : float
+        Among all readings.
+    C_prime : float
+        C' of straight-line stability, positive if stable.
+    turning_index : float or None
+        Norrbin's P: heading by rudder after one ship's length; None without rudder forces.
+    advance_lengths, tactical_diameter_lengths : float or None
+        Turn with 35 deg (or the gear's largest rudder), over L; None where it was not simulated or not reached.
+    overshoot_1_deg : float or None
+        First overshoot of the 10/10 zigzag.
+    vanished : tuple of str
+        Terms that vanish to the printed digits.
+    against : tuple of str
+        What speaks against the reading, the strongest first.
+    """
+
+    rudder_sign: str
+    scaling: str
+    yaw_rate_terms: str
+    origin: str
+    probability: float
+    C_prime: float
+    turning_index: float | None
+    advance_lengths: float | None
+    tactical_diameter_lengths: float | None
+    overshoot_1_deg: float | None
+    vanished: tuple[str, ...]
+    against: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConventionStudy:
+    """Readings of a table.
+
+    Parameters
+    ----------
+    source : str
+        The table.
+    stated : dict
+        Conventions that the table states.
+    readings : tuple of ReadingFound
+        The most probable first.
+    assumed : dict
+        Sizes that the table lacks, by key, and the values taken.
+    left_out : tuple of str
+        Numbers that were not read.
+    scaled_with_nominal_speed : bool or None
+        Whether terms by the speed count it once; None if the table lacks them.
+    speed_scale : str or None
+        As the table states it.
+    """
+
+    source: str
+    stated: dict[str, str]
+    readings: tuple[ReadingFound, ...]
+    assumed: dict[str, float]
+    left_out: tuple[str, ...]
+    scaled_with_nominal_speed: bool | None
+    speed_scale: str | None
+    notices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConventionResult(Result[ConventionStudy]):
+    """Readings of a table, the most probable first.
+
+    Parameters
+    ----------
+    study : ConventionStudy
+    card : Card, optional
+        The card of the first reading, with estimates of the accelerations that the table lacks; None if the result was
+        read from its JSON.
+    """
+
+    study: ConventionStudy
+    card: Card | None = None
+    command: ClassVar[str] = "convention"
+
+    @property
+    def readings(self) -> tuple[ReadingFound, ...]:
+        """Readings of the table, the most probable first."""
+        return self.study.readings
+
+    @property
+    def title(self) -> str:
+        """The file."""
+        return f"{Path(self.study.source).name}: conventions"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The first reading with its probability, and the conventions that the numbers do not settle."""
+        first, name = self.readings[0], Path(self.study.source).name
+        open_keys = [key for key in _WORDS if len({getattr(entry, key) for entry in self.readings}) > 1]
+        if not open_keys:
+            return (f"{name}: every convention is stated",)
+        read = ", ".join(_WORDS[key][getattr(first, key)] for key in _WORDS)
+        mark = "" if first.probability >= SURE_READING else "UNCERTAIN: "
+        lines = [f"{mark}{name}: {read}: probability {first.probability:.2g}"]
+        if doubtful := [key for key in open_keys if self._share(key) < SURE_READING]:
+            shares = [f"{_WORDS[key][getattr(first, key)]} by {100 * self._share(key):.0f} %" for key in doubtful]
+            lines.append(f"Not settled by the numbers: {', '.join(shares)}")
+        return tuple(lines)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Assumed sizes, doubts about the first reading, and what was not read."""
+        study, first, found = self.study, self.readings[0], []
+        if study.assumed:
+            sizes = ", ".join(f"{key} = {value:.4g}" for key, value in study.assumed.items())
+            found.append(f"ASSUMED, because the table lacks them: {sizes}")
+        if first.against:
+            found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
+        if study.left_out:
+            found.append(f"not read, and not on the card of a reading: {', '.join(study.left_out)}")
+        if study.scaled_with_nominal_speed:
+            found.append(
+                "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
+                'speed_scale = "nominal", by which speed counts once'
+            )
+            if study.speed_scale == "instantaneous":
+                found.append('the file states speed_scale = "instantaneous", by which speed counts twice')
+        if len(self.readings) > 1 and same_in_practice(first, self.readings[1]) and first.probability < SURE_READING:
+            found.append("the first two readings are one ship in practice: their figures differ by less than 5 %")
+        if first.vanished:
+            found.append(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits")
+        return tuple(found)
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Probability of the first reading."""
+        return [KeyFigure(label="First reading", value=100 * self.readings[0].probability, unit="%")]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Readings with probability and figures, and what speaks against each."""
+        shown = [
+            (number, entry)
+            for number, entry in enumerate(self.readings[:_MOST_SHOWN], start=1)
+            if entry.probability >= _SHOWN or number <= _LEAST_SHOWN
+        ]
+        rows: list[list[Cell]] = [
+            [
+                number,
+                100 * entry.probability,
+                ", ".join(getattr(entry, key).replace("_", " ") for key in _WORDS),
+                entry.C_prime > 0,
+                entry.turning_index,
+                entry.tactical_diameter_lengths,
+                entry.overshoot_1_deg,
+            ]
+            for number, entry in shown
+        ]
+        heads = ("no.", "probability (%)", "rudder, scaling, yaw-rate terms, origin", "stable", "P", "DT/L")
+        note = (
+            "P: heading by rudder after one length (Norrbin); DT: tactical diameter at 35 deg; 10/10: first overshoot"
+        )
+        tables = [table("Readings", (*heads, "10/10 (deg)"), rows, note, digits=3)]
+        against: list[list[Cell]] = [[number, "; ".join(entry.against)] for number, entry in shown if entry.against]
+        if against:
+            tables.append(table("Evidence against them", ("no.", "unlike a ship of these dimensions"), against))
+        return [Section(heading="Readings", tables=tables)]
+
+    def files(self, path: str | Path) -> dict[Path, str | bytes]:
+        """The card of the first reading, at `path`."""
+        assert self.card is not None, "a result that was read from its JSON has no card"
+        return {Path(path): self.card.text}
+
+    def _share(self, key: str) -> float:
+        first = getattr(self.readings[0], key)
+        return math.fsum(entry.probability for entry in self.readings if getattr(entry, key) == first)
+
+
+def same_in_practice(first: ReadingFound, second: ReadingFound) -> bool:
+    """Whether two readings are one ship in practice: both stable or neither, and every simulated figure within 5 %.
+
+    Parameters
+    ----------
+    first, second : ReadingFound
+    """
+    if (first.C_prime > 0) != (second.C_prime > 0):
+        return False
+    names = ("advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg")
+    pairs = [(getattr(first, name), getattr(second, name)) for name in names]
+    known = [(a, b) for a, b in pairs if a is not None and b is not None]
+    return bool(known) and all(abs(a - b) <= _ALIKE * max(abs(a), abs(b)) for a, b in known)
