@@ -67,7 +67,6 @@ from .api.steering_models import (
     steering_models as steering_models,
 )
 from .api.steering_page import SteeringPageResult as SteeringPageResult
-from .api.tow import TowResult as TowResult
 from .api.tow import tow as tow
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
@@ -83,5 +82,6 @@ from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.ships import ShipsResult as ShipsResult
+from .results.tow import TowResult as TowResult
 
 __version__: str

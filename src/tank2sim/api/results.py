@@ -16,6 +16,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "check": ("results.fmu:CheckResult",),
     "export": ("results.fmu:ExportResult",),
     "ships": ("results.ships:ShipsResult",),
+    "tow": ("results.tow:TowResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -893,46 +893,6 @@ class SteerKeys(_Keys):
     notices: list[str]
 
 
-class TowMethodKeys(_Part):
-    """Estimates of one method; ``estimated`` lists the unknowns that were free."""
-
-    estimated: list[str]
-    estimates: dict[str, JsonNumber]
-    standard_errors: dict[str, JsonNumber]
-    correlation: dict[str, Any] | None
-    condition: JsonNumber
-    condition_scaled: JsonNumber
-    J: JsonNumber
-    largest_speed_error_mps: JsonNumber
-
-
-class TowKeys(_Keys):
-    """Surge mass and drag from accelerating tows."""
-
-    tows: str
-    force_N: float
-    force_polynomial: list[float]
-    mass_kg: float
-    terms: list[str]
-    start_delay: bool
-    given_total_mass_kg: JsonNumber
-    readings: int
-    top_speed_mps: float
-    speed_polynomial: list[float]
-    methods: dict[str, TowMethodKeys]
-    warnings: list[str]
-    tows_of_the_paper: bool
-    speed_polynomials: list[dict[str, Any]]
-    models: list[dict[str, Any]]
-    mass_range_kg: list[JsonNumber] | None
-    tow_by_tow: dict[str, dict[str, Any]]
-    confidence_ellipses: list[dict[str, Any]]
-    mass_by_theory: list[dict[str, str | float]]
-    speeds: dict[str, Any]
-    body: NotRequired[dict[str, JsonNumber]]
-    drag_coefficients: NotRequired[dict[str, dict[str, dict[str, JsonNumber]]] | None]
-
-
 class ValidateKeys(_Keys):
     """A validation report after ITTC 7.5-02-06-03."""
 
@@ -1156,7 +1116,6 @@ KEYS: dict[str, Any] = {
     "simulate": SimulateKeys,
     "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
-    "tow": TowKeys,
     "validate": ValidateKeys | CraftValidateKeys,
     "yaw": YawKeys,
 }

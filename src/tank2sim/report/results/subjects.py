@@ -26,7 +26,6 @@ from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
-from tank2sim.report.tow.page import tow_page
 from tank2sim.report.validation.page import validation_page
 from tank2sim.report.yaw.page import yaw_page
 
@@ -82,9 +81,6 @@ _PAGES: Mapping[str, _Page] = {
         mmg_reduction_page,
         {"coefficients": dict, "channels": dict, "readings": dict, "yaw_arm": dict, "conditions": list}
         | {"model": str, "notices": list},
-    ),
-    "Towed vehicle": _Page(
-        tow_page, {"tows_of_the_paper": bool, "speeds": dict, "models": list, "tow_by_tow": dict, "methods": dict}
     ),
     "Yaw rig": _Page(
         yaw_page, {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list, "notes": list}
