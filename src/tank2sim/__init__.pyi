@@ -47,9 +47,7 @@ from .api.influence import TuningResult as TuningResult
 from .api.log import LogResult as LogResult
 from .api.log import log as log
 from .api.manoeuvre import ManoeuvreResult as ManoeuvreResult
-from .api.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
-from .api.reduction import ReductionResult as ReductionResult
 from .api.reduction import reduce as reduce
 from .api.report import ReportResult as ReportResult
 from .api.report import make_report as make_report
@@ -81,6 +79,8 @@ from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
+from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
+from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
 from .results.tow import TowResult as TowResult
 

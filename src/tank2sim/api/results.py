@@ -15,6 +15,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
     "check": ("results.fmu:CheckResult",),
     "export": ("results.fmu:ExportResult",),
+    "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
 }

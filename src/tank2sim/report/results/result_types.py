@@ -65,13 +65,6 @@ RESULT_TYPES = (
     ),
     ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
-        "Captive tests to MMG",
-        "reduce",
-        ("campaign", "coefficients", "yaw_arm"),
-        ("coefficients.w_P0.value",),
-    ),
-    ResultType("Captive tests", "reduce", ("campaign", "derivatives"), ("test.speed_mps",)),
-    ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
