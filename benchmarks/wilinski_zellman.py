@@ -199,11 +199,12 @@ def algorithm(tows: Tows, study: TowStudy) -> None:
     def mass(speed: Polynomial) -> float:
         return float(solve_normal_equations(discretise(speed, paper.TIMES_S, TERMS, paper.FORCE_N))[0])
 
+    by_tow = list(study.tow_by_tow.values())
     for number, expected in enumerate(PER_TOW):
         own = tows.only(number)
         continued = "" if own.time_s[-1] == 50 else ", continued from 45 s to 50 s"
         beside(f"M of tow {number + 1}{continued}, kg", expected, mass(fit_mean_speed(own).polynomial), 0.6)
-    beside("M of tow 4 over its own 45 s, kg", 2682, study.by_tow[0].alone[3, 0], 0.6)
+    beside("M of tow 4 over its own 45 s, kg", 2682, by_tow[0].alone[3, 0], 0.6)
     beside("M of the true means, kg", 2857, mass(fit_mean_speed(tows).polynomial), 0.5)
     every = ~np.isnan(tows.speed_mps)
     times = np.broadcast_to(tows.time_s[:, None], every.shape)[every]
@@ -213,29 +214,28 @@ def algorithm(tows: Tows, study: TowStudy) -> None:
 def reanalysis(study: TowStudy) -> None:
     """Models of other size, tow by tow."""
     for one in study.models:
-        name = one.model.label
-        fit = one.fit
+        name = one.label
         mass, half, scatter, aic = REANALYSIS.get(name, (np.nan,) * 4)
         known = name in REANALYSIS
-        beside(f"{name}: M, kg", mass, fit.estimates[0], 0.01 * mass if known else None)
-        beside(f"{name}: 95 % half-width, kg", half, fit.half_widths[0], 0.04 * half if known else None)
-        beside(f"{name}: scatter, m/s", scatter, fit.scatter_mps, 6e-6 if known else None)
-        beside(f"{name}: AIC", aic, fit.aic, 0.1 if known else None)
+        beside(f"{name}: M, kg", mass, one.estimates["M"], 0.01 * mass if known else None)
+        beside(f"{name}: 95 % half-width, kg", half, one.half_widths_95["M"], 0.04 * half if known else None)
+        beside(f"{name}: scatter, m/s", scatter, one.scatter_mps, 6e-6 if known else None)
+        beside(f"{name}: AIC", aic, one.aic, 0.1 if known else None)
         if known:
-            beside(f"{name}: scaled condition", CONDITIONS[name], fit.condition_scaled, 0.06 * CONDITIONS[name])
-    for way, errors in zip(study.by_tow[1:], ((84, 23), (62, 13, 0.4)), strict=True):
-        for name, expected, found in zip(way.unknowns, errors, way.jackknife_errors, strict=True):
+            beside(f"{name}: scaled condition", CONDITIONS[name], one.condition_scaled, 0.06 * CONDITIONS[name])
+    _, simple, late = study.tow_by_tow.values()
+    for way, errors in zip((simple, late), ((84, 23), (62, 13, 0.4)), strict=True):
+        for name, expected, found in zip(way.unknowns, errors, way.jackknife_standard_errors, strict=True):
             beside(f"leave-one-out error, {way.unknowns[-1]}: {name}", expected, found, 0.5 if expected > 1 else 0.05)
-    for number, (expected, found) in enumerate(zip(BY_TOW, study.by_tow[1].alone, strict=True), start=1):
+    for number, (expected, found) in enumerate(zip(BY_TOW, simple.alone, strict=True), start=1):
         for name, value, own in zip(("M", "B3"), expected, found, strict=True):
             beside(f"{name} of tow {number}, output error of M, B3", value, own, 0.6)
-    fits = {one.model.label: (one.model.unknowns, one.fit) for one in study.models}
+    models = {one.label: one for one in study.models}
     for name, told in DRAGS.items():
-        unknowns, fit = fits[name]
         for term, (value, half) in told.items():
-            at = unknowns.index(term)
-            beside(f"{name}: {term}", value, fit.estimates[at], max(0.04 * half, 0.06))
-            beside(f"{name}: {term}, 95 % half-width", half, fit.half_widths[at], max(0.04 * half, 0.06))
+            beside(f"{name}: {term}", value, models[name].estimates[term], max(0.04 * half, 0.06))
+            found_half = models[name].half_widths_95[term]
+            beside(f"{name}: {term}, 95 % half-width", half, found_half, max(0.04 * half, 0.06))
     low, high = study.mass_range_kg or (np.nan, np.nan)
     beside("least M of the usable models, kg", 2500, low, 100)
     beside("greatest M of the usable models, kg", 3400, high, 100)
@@ -249,10 +249,10 @@ def main() -> int:
     solution()
     body_of_the_paper()
     result = identify_tow(tows)
-    study = study_tows(result, towed_body(tows, result.mass_kg, {}))
+    study = study_tows(result, tows, towed_body(tows, result.mass_kg, {}))
     algorithm(tows, study)
     reanalysis(study)
-    for note in study.notes:
+    for note in study.warnings:
         print(f"note: {note}")
     return beside.end()
 

@@ -45,9 +45,7 @@ from .api.influence import TuningResult as TuningResult
 from .api.log import LogResult as LogResult
 from .api.log import log as log
 from .api.manoeuvre import ManoeuvreResult as ManoeuvreResult
-from .api.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
-from .api.reduction import ReductionResult as ReductionResult
 from .api.reduction import reduce as reduce
 from .api.report import ReportResult as ReportResult
 from .api.report import make_report as make_report
@@ -65,7 +63,6 @@ from .api.steering_models import (
     steering_models as steering_models,
 )
 from .api.steering_page import SteeringPageResult as SteeringPageResult
-from .api.tow import TowResult as TowResult
 from .api.tow import tow as tow
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
@@ -82,6 +79,9 @@ from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
+from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
+from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
+from .results.tow import TowResult as TowResult
 
 __version__: str

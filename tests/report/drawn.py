@@ -18,6 +18,13 @@ def line(chart: Any, up: str, run: str | None = None) -> list[float]:
     return [rows[place] for place in sorted(rows)]
 
 
+def whole_panel(chart: Any, number: int) -> list[dict[str, Any]]:
+    """Rows of all layers of one of the panels under each other."""
+    specification = chart_specification(chart)
+    layers = specification["vconcat"][number]["layer"]
+    return [row for layer in layers for row in specification["datasets"][layer["data"]["name"]]]
+
+
 def panels(chart: Any) -> dict[str, list[dict[str, Any]]]:
     """Title of each panel to the rows of its first layer."""
     specification = chart_specification(chart)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.answer.numbers import format_number, is_number_text
+from tank2sim.answer.numbers import format_number, is_number_text, without_exponents
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -338,4 +338,4 @@ class Section:
 
 def notices_section(notices: Sequence[str]) -> list[Section]:
     """Return the section with the notices of a result, empty without any."""
-    return [Section(heading="Notices", notes=notices)] if notices else []
+    return [Section(heading="Notices", notes=[without_exponents(text) for text in notices])] if notices else []

@@ -2,166 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import checked
-from tank2sim.api.result import OldResult, screen_table
-from tank2sim.cards import Card, parse_card
-from tank2sim.cards.covariance import Covariance
+from tank2sim.api.ship import Ship
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.as_json import reduction_as_json
-from tank2sim.identification.captive.findings import implausible, reduction_findings
-from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign, reduction_covariance
-from tank2sim.identification.captive.result_card import (
-    FILLS,
-    Contents,
-    card_contents,
-    reduced_card_text,
-    reynolds_ratio,
-)
-from tank2sim.identification.captive.tables import (
-    derivative_rows,
-    prediction_errors,
-    prediction_rows,
-    terms_left_out,
-    terms_not_excited,
-    terms_of_heel,
-)
-from tank2sim.identification.captive.uncertainty_budget import uncertainty_budget
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
-
-if TYPE_CHECKING:
-    import altair as alt
-    import pandas as pd
-
-    from tank2sim.api.ship import Ship
-
-
-class ReductionResult(OldResult):
-    """Hydrodynamic derivatives from captive tests.
-
-    Parameters
-    ----------
-    reduction : Reduction
-    contents : Contents
-        Of the card: what was measured, and what was taken from published estimates.
-    fill : str or None
-        Name of those estimates.
-    ratio : float or None
-        Length of the card's ship over that of the model.
-
-    Raises
-    ------
-    InputError
-        The derivatives are not those of a ship: no card can be made of them.
-    """
-
-    command = "reduce"
-
-    def __init__(self, reduction: Reduction, contents: Contents, fill: str | None, ratio: float | None) -> None:
-        self.reduction, self.contents, self.ratio = reduction, contents, ratio
-        self.findings = tuple(implausible(reduction))
-        fillings = _fill_notices(contents, fill, ratio, reduction.campaign)
-        self.notices = (*reduction_findings(reduction), *fillings, *_heel_notices(reduction))
-
-    @cached_property
-    def card(self) -> Card:
-        """The card found, with the covariance of what was measured; ``card.save("ship.toml")`` writes it."""
-        text = reduced_card_text(self.reduction, self.contents, self.ratio or 1.0)
-        card = parse_card(text, "the reduced card")
-        # What is estimated is independent of what was measured.
-        entries, estimated = self.contents.entries, self.contents.estimated
-        names = [name for name in entries if name in self.reduction.derivatives and name not in estimated]
-        matrix = reduction_covariance(self.reduction, names)
-        return replace(card, covariance=Covariance(tuple(f"derivatives.{name}" for name in names), matrix))
-
-    @property
-    def ship(self) -> Ship:
-        """The ship of the card found."""
-        from tank2sim.api.ship import Ship
-
-        return Ship(self.card)
-
-    @property
-    def derivatives(self) -> pd.DataFrame:
-        """Derivatives by name: prime value, standard error, origin; rudder positive to starboard."""
-        import pandas as pd
-
-        rows = [
-            (row.name, row.value, row.standard_error, row.origin)
-            for row in derivative_rows(self.reduction, self.contents)
-        ]
-        return pd.DataFrame(rows, columns=["name", "value", "standard_error", "origin"]).set_index("name")
-
-    @property
-    def budget(self) -> pd.DataFrame:
-        """Uncertainty budget by derivative (ITTC 7.5-02-06-04): share of the variance of each source; prime
-        ``combined`` and ``expanded`` (k = 2) uncertainty."""
-        import pandas as pd
-
-        rows = [
-            {"name": row.name, "value": row.value, "combined": row.combined, "expanded": row.expanded, **row.shares}
-            for row in uncertainty_budget(self.reduction)
-        ]
-        return pd.DataFrame(rows).set_index("name")
-
-    def content(self) -> Mapping[str, object]:
-        """As :meth:`.OldResult.content`."""
-        return reduction_as_json(self.reduction, self.contents, self.notices)
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """Whose size the card has, if the campaign states a ship."""
-        model = self.reduction.campaign.model
-        if self.ratio is not None or model.scale is None:
-            return ()
-        size = (
-            f"{model.length_m:.4g} m long; --scale ship makes that of the ship of {model.length_m * model.scale:.4g} m"
-        )
-        return (f"The card is of the model, {size}.",)
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """Derivatives, terms left out, and errors of runs predicted from the others."""
-        rows: list[list[object]] = []
-        for row in derivative_rows(self.reduction, self.contents):
-            value, stepped = f"{row.value:.5g} ± {row.standard_error:.2g}", row.stepped
-            stepwise = f"{stepped.value:.5g} ± {stepped.standard_error:.2g} ({stepped.found_in})" if stepped else "-"
-            rows.append([row.name, value, stepwise, row.origin])
-        name, count = self.reduction.campaign.model.name, len(self.reduction.runs)
-        tables = [
-            screen_table(
-                f"{name}: derivatives from {count} runs (prime, rudder to starboard)",
-                ("", "whole campaign", "test by test", ""),
-                rows,
-            )
-        ]
-        if left_out := [[choice.name, choice.reason, choice.explanation] for choice in terms_left_out(self.reduction)]:
-            tables.append(screen_table("Terms that the runs excite and that were left out", ("", "", "why"), left_out))
-        errors_by_type = prediction_rows(prediction_errors(self.reduction))
-        tables.append(
-            screen_table(
-                "Leave-one-out: root mean square error of each run predicted from the others, % of the range",
-                ("runs of type", *FORCE_COLUMNS),
-                [
-                    [kind, *(f"{errors[force]:.2g}" if force in errors else "-" for force in FORCE_COLUMNS)]
-                    for kind, errors in errors_by_type.items()
-                ],
-                (f"Not excited by any run: {', '.join(terms_not_excited(self.reduction))}",),
-            )
-        )
-        return tuple(tables)
-
-    def charts(self) -> dict[str, alt.TopLevelMixin]:
-        """Force fits with bands, loops, harmonics and residuals, by file stem."""
-        from tank2sim.report.captive.page import reduction_charts
-
-        return dict(reduction_charts(self.to_dict()))
+from tank2sim.identification.captive.findings import reduction_findings
+from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign
+from tank2sim.identification.captive.result_card import FILLS, Contents, card_contents, reynolds_ratio
+from tank2sim.identification.captive.study import study_reduction, terms_of_heel
+from tank2sim.records.campaigns import Campaign, read_campaign
+from tank2sim.results.reduction import ReductionResult
 
 
 @checked
@@ -216,7 +68,14 @@ def reduce(
         test_symmetry=test_symmetry,
     )
     reduction = reduce_campaign(read, options)
-    return ReductionResult(reduction, card_contents(reduction, fill), fill, ratio)
+    contents = card_contents(reduction, fill)
+    fillings = _fill_notices(contents, fill, ratio, read)
+    warnings = (*reduction_findings(reduction), *fillings, *_heel_notices(reduction))
+    found = ReductionResult(study_reduction(reduction, contents, warnings, ratio), reduction, contents)
+    try:
+        return replace(found, ship=Ship(found.card))
+    except InputError:
+        return found
 
 
 def _ratio(campaign: Campaign, given: float | str | None) -> float | None:

@@ -17,7 +17,9 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "convention": ("results.convention:ConventionResult",),
     "convert": ("results.conversion:ConversionResult",),
     "export": ("results.fmu:ExportResult",),
+    "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "ships": ("results.ships:ShipsResult",),
+    "tow": ("results.tow:TowResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -256,18 +256,6 @@ class CraftStabilityKeys(_Keys):
     notices: list[str]
 
 
-class DerivativeKeys(_Part):
-    """A derivative (prime) from captive tests."""
-
-    value: float
-    standard_error: float
-    origin: str
-    source: NotRequired[str]
-    type_a: NotRequired[JsonNumber]
-    type_b: NotRequired[dict[str, Any]]
-    paper_order: NotRequired[dict[str, Any] | None]
-
-
 class FourierCoefficientKeys(_Part):
     """A Fourier coefficient of a signal of a captive run."""
 
@@ -321,85 +309,6 @@ class RunKeys(_Keys):
     runs: list[SingleRunKeys]
     repeats: list[RepeatedCoefficientKeys]
     inertia_removed: bool
-    notices: list[str]
-
-
-class BudgetRowKeys(_Part):
-    """Uncertainty of a derivative (prime) by its causes: standard uncertainties, and shares of the variance."""
-
-    value: float
-    combined: float
-    expanded: float
-    parts: dict[str, float]
-    shares: dict[str, float]
-
-
-class BudgetKeys(_Part):
-    """The uncertainty budget of a campaign after ITTC 7.5-02-06-04."""
-
-    coverage_factor: float
-    sources: dict[str, str]
-    not_stated: list[str]
-    blockage_speed_relative: JsonNumber
-    derivatives: dict[str, BudgetRowKeys]
-
-
-class ReduceKeys(_Keys):
-    """Captive tests reduced to derivatives."""
-
-    campaign: str
-    model: dict[str, str | float | None]
-    test: dict[str, str | float | None]
-    conventions: dict[str, str | float | None]
-    rigid_body: dict[str, JsonNumber]
-    derivatives: dict[str, DerivativeKeys]
-    uncertainty_budget: BudgetKeys
-    missing: list[str]
-    warnings: list[str]
-    methods: dict[str, Any]
-    selection: dict[str, list[dict[str, Any]]]
-    spread: dict[str, dict[str, Any]]
-    systematic_errors: list[dict[str, Any]]
-    force_delay: dict[str, Any] | None
-    alignment: dict[str, Any] | None
-    trends: list[dict[str, Any]]
-    symmetry: dict[str, Any]
-    leave_one_out: dict[str, list[dict[str, Any]]]
-    prediction_errors: dict[str, dict[str, Any]]
-    oscillations: list[dict[str, Any]]
-    third_order: list[dict[str, Any]]
-    heel_derivatives: dict[str, dict[str, Any]]
-    runs: list[dict[str, Any]]
-    plots: dict[str, dict[str, Any]]
-    not_used: dict[str, Any]
-    faults: list[Any]
-    repeats: dict[str, Any]
-    resistance: dict[str, Any] | None
-
-
-class MmgCoefficientKeys(_Part):
-    """A coefficient of the MMG method; hull in prime II."""
-
-    value: float
-    standard_error: float
-    origin: str
-    type_a: float
-    type_b: dict[str, float]
-
-
-class ReduceMmgKeys(_Keys):
-    """Steady captive tests reduced to the MMG method."""
-
-    campaign: str
-    model: str
-    coefficients: dict[str, MmgCoefficientKeys]
-    yaw_arm: dict[str, float]
-    rudder_angle_of_no_force_deg: float | None
-    channels: dict[str, dict[str, Any]]
-    open_water: dict[str, JsonNumber]
-    readings: dict[str, dict[str, Any]]
-    conditions: list[str]
-    not_excited: list[str]
     notices: list[str]
 
 
@@ -844,46 +753,6 @@ class SteerKeys(_Keys):
     notices: list[str]
 
 
-class TowMethodKeys(_Part):
-    """Estimates of one method; ``estimated`` lists the unknowns that were free."""
-
-    estimated: list[str]
-    estimates: dict[str, JsonNumber]
-    standard_errors: dict[str, JsonNumber]
-    correlation: dict[str, Any] | None
-    condition: JsonNumber
-    condition_scaled: JsonNumber
-    J: JsonNumber
-    largest_speed_error_mps: JsonNumber
-
-
-class TowKeys(_Keys):
-    """Surge mass and drag from accelerating tows."""
-
-    tows: str
-    force_N: float
-    force_polynomial: list[float]
-    mass_kg: float
-    terms: list[str]
-    start_delay: bool
-    given_total_mass_kg: JsonNumber
-    readings: int
-    top_speed_mps: float
-    speed_polynomial: list[float]
-    methods: dict[str, TowMethodKeys]
-    warnings: list[str]
-    tows_of_the_paper: bool
-    speed_polynomials: list[dict[str, Any]]
-    models: list[dict[str, Any]]
-    mass_range_kg: list[JsonNumber] | None
-    tow_by_tow: dict[str, dict[str, Any]]
-    confidence_ellipses: list[dict[str, Any]]
-    mass_by_theory: list[dict[str, str | float]]
-    speeds: dict[str, Any]
-    body: NotRequired[dict[str, JsonNumber]]
-    drag_coefficients: NotRequired[dict[str, dict[str, dict[str, JsonNumber]]] | None]
-
-
 class ValidateKeys(_Keys):
     """A validation report after ITTC 7.5-02-06-03."""
 
@@ -1099,13 +968,11 @@ KEYS: dict[str, Any] = {
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
-    "reduce": ReduceKeys | ReduceMmgKeys,
     "run": RunKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,
     "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
-    "tow": TowKeys,
     "validate": ValidateKeys | CraftValidateKeys,
     "yaw": YawKeys,
 }

@@ -84,11 +84,12 @@ def command(
     files = result.card.files(output) if output else {}
     if budget:
         files[budget] = result.budget.to_csv(float_format="%.6g", lineterminator="\n")
-    inputs = [campaign, *(campaign.parent / run.name.partition(" line ")[0] for run in result.reduction.campaign.runs)]
+    read = result.reduction.campaign.runs if result.reduction else ()
+    inputs = [campaign, *(campaign.parent / run.name.partition(" line ")[0] for run in read)]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)
     if output:
-        screen.print(f"{output}: {len(result.contents.entries)} derivatives", soft_wrap=True, markup=False)
+        screen.print(f"{output}: {len(result.study.derivatives)} derivatives", soft_wrap=True, markup=False)
 
 
 def _reduce_to_mmg(
@@ -98,6 +99,7 @@ def _reduce_to_mmg(
     from tank2sim.api.mmg_reduction import reduce_to_mmg
 
     result = reduce_to_mmg(campaign)
+    assert result.fit and result.card
     form = result.fit.tests.form
     tables = [section.file for section in (form.averages, form.open_water) if section and section.file]
     files = result.card.files(output) if output else {}

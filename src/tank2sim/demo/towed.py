@@ -10,6 +10,7 @@ import numpy as np
 
 from tank2sim.answer.charts.picture import Tow, chart_png, tow_chart
 from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.answer.study import study_values
 from tank2sim.arrays import Array
 from tank2sim.bundled import bundled
 from tank2sim.cards import parse_card
@@ -37,7 +38,7 @@ def towed_vehicle(workshop: Workshop) -> DemoOutcome:
     workshop.begin("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
     paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
-    text = tow_card_text(chosen, chosen.fits["output_error"], name=NAME, source=SOURCE, length_m=LENGTH_M)
+    text = tow_card_text(chosen, chosen.methods["output_error"], name=NAME, source=SOURCE, length_m=LENGTH_M)
     card = parse_card(text, workshop.write("towed-vehicle.toml", text).name)
     model = build(card)
     checked = [workshop.checked_fmu(card, model, "towed-vehicle", fmi) for fmi in (2, 3)]
@@ -50,8 +51,8 @@ def towed_vehicle(workshop: Workshop) -> DemoOutcome:
     misses = _misses(tows, times, speed)
     reports = [report for _, report in checked]
     result: dict[str, object] = {
-        "four_unknowns": paper.as_json(),
-        "two_unknowns": chosen.as_json(),
+        "four_unknowns": study_values(paper),
+        "two_unknowns": study_values(chosen),
         "tows": misses,
         "checks": [asdict(report) for report in reports],
     }
@@ -101,7 +102,7 @@ def _section(
 
 
 def _figures(chosen: TowIdentification, misses: list[dict[str, float]], reports: list[CheckReport]) -> list[KeyFigure]:
-    fit = chosen.fits["output_error"]
+    fit = chosen.methods["output_error"]
     return [
         KeyFigure(
             label="Vehicle's mass with added mass",
@@ -154,10 +155,10 @@ def _miss_table(misses: list[dict[str, float]]) -> Table:
 
 def _estimates(result: TowIdentification, caption: str) -> Table:
     units = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m"}
-    unknowns = next(iter(result.fits.values())).unknowns
+    unknowns = next(iter(result.methods.values())).unknowns
     rows = []
-    for method, fit in result.fits.items():
-        errors = [None] * len(unknowns) if fit.covariance is None else np.sqrt(np.diag(fit.covariance)).tolist()
+    for method, fit in result.methods.items():
+        errors = [None] * len(unknowns) if fit.errors is None else fit.errors.tolist()
         pairs = [cell for pair in zip(fit.values.tolist(), errors, strict=True) for cell in pair]
         rows.append([method.replace("_", " "), *pairs, fit.condition_scaled])
     columns = [Column(title="method")]

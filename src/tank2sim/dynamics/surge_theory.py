@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -88,10 +87,6 @@ class DragPolynomial:
         """The same drag, referred to an area so many times smaller."""
         return DragPolynomial(A1_s2pm2=factor * self.A1_s2pm2, A2_spm=factor * self.A2_spm, A3=factor * self.A3)
 
-    def as_json(self) -> dict[str, float]:
-        """The coefficients."""
-        return dict(vars(self))
-
 
 def drag_polynomial(coefficients: SurgeCoefficients, body: TowedBody) -> DragPolynomial:
     """A_i = B_i / (rho L^2 / 2), (1.5): C referred to L^2; times :attr:`TowedBody.area_ratio` referred to V^(2/3)."""
@@ -121,10 +116,6 @@ class MassByTheory:
     k11: float
     deep_kg: float
     near_surface_kg: float
-
-    def as_json(self) -> dict[str, Any]:
-        """The row as plain data."""
-        return dict(vars(self))
 
 
 def mass_by_theory(body: TowedBody, k11: float, basis: str) -> MassByTheory:

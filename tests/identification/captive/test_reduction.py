@@ -9,16 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tank2sim.answer.study import study_values
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.as_json import reduction_as_json
 from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text, reynolds_ratio
 from tank2sim.identification.captive.stepwise import scatter_within_tests
-from tank2sim.identification.captive.tables import prediction_errors
+from tank2sim.identification.captive.study import prediction_errors, study_reduction
 from tank2sim.identification.captive.type_b import type_b_shifts
 from tank2sim.records.campaigns import read_campaign
 from tests.conftest import ROOT
@@ -290,9 +290,7 @@ def test_the_card_says_what_the_reduction_says(noisy):
     card = card_contents(noisy)
     text = reduced_card_text(noisy, card)
     read = parse_card(text, "card.toml")
-    result = json.loads(
-        json.dumps(reduction_as_json(noisy, card, reduction_findings(noisy)), default=lambda v: np.asarray(v).tolist())
-    )
+    result = study_values(study_reduction(noisy, card, reduction_findings(noisy)))
     assert {name: entry["value"] for name, entry in result["derivatives"].items()} == dict(read.derivatives)
     assert {n: entry["standard_error"] for n, entry in result["derivatives"].items()} == dict(read.uncertainty)
     assert read.model.yaw_rate_terms == "hydrodynamic"
@@ -341,9 +339,9 @@ def test_a_towed_model_gets_its_thrust_with_the_fill(noisy):
 
 def test_the_real_table_predicts_each_condition_from_the_others(hmri):
     errors = prediction_errors(hmri)
-    assert errors["drift_and_rudder"]["Y"]["relative"] < 0.03
-    assert errors["drift_and_rudder"]["N"]["relative"] < 0.03
-    assert errors["static_drift"]["Y"]["relative"] < 0.03
+    assert errors["drift_and_rudder"]["Y"].relative < 0.03
+    assert errors["drift_and_rudder"]["N"].relative < 0.03
+    assert errors["static_drift"]["Y"].relative < 0.03
 
 
 def test_the_real_table_has_the_signs_of_a_ship(hmri):
@@ -367,16 +365,16 @@ def test_speed_and_load_that_change_together_are_reported_and_left_out(hmri):
 @pytest.mark.parametrize("name", ["drift_+08.csv", "rudder_-20.csv"])
 def test_harmonics_are_reported_without_dimension(noisy, name):
     """The mean of a steady run by 1/2 rho L^2 U^2, and L more for a moment."""
-    reported = reduction_as_json(noisy, card_contents(noisy), ())
+    reported = study_reduction(noisy, card_contents(noisy))
     record = next(run for run in noisy.campaign.runs if run.name == name)
-    shown = next(run for run in reported["runs"] if run["name"] == name)
-    assert shown["speed_mps"] == pytest.approx(record.speed_mps.mean(), rel=1e-3)
+    shown = next(run for run in reported.runs if run.name == name)
+    assert shown.speed_mps == pytest.approx(record.speed_mps.mean(), rel=1e-3)
     force = 0.5 * 1000.0 * noisy.campaign.model.length_m**2 * record.speed_mps.mean() ** 2
     for letter, values, unit in (("Y", record.Y_N, force), ("N", record.N_Nm, force * noisy.campaign.model.length_m)):
-        mean = shown["harmonics"][letter]["mean"]
-        assert abs(mean["value"]) == pytest.approx(abs(values.mean()) / unit, rel=2e-3)
+        mean = shown.harmonics[letter]["mean"]
+        assert abs(mean.value) == pytest.approx(abs(values.mean()) / unit, rel=2e-3)
         white = values.std() / unit / np.sqrt(len(values))
-        assert 0.1 * white < mean["standard_error"] < 10 * white
+        assert 0.1 * white < mean.standard_error < 10 * white
 
 
 @pytest.mark.slow

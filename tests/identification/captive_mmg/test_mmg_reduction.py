@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.mmg_reduction import MmgReductionResult
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses
 from tank2sim.identification.captive_mmg.regression import ORDINARY, fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
+from tank2sim.identification.captive_mmg.study import study_mmg
+from tank2sim.results.mmg_reduction import MmgReductionResult
 from tests.cli.command_line import refused, tank2sim
 from tests.identification.captive_mmg.tank import (
     KVLCC2,
@@ -126,8 +127,8 @@ def test_forces_of_the_water_alone_have_no_inertia_of_the_body(tmp_path) -> None
 
 def test_a_zero_of_the_rudder_is_found_and_not_taken_for_a_force(tmp_path) -> None:
     found = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, rudder_zero=np.radians(1.5)))
-    assert found.content()["rudder_angle_of_no_force_deg"] == pytest.approx(-1.5, abs=0.1)
-    assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).content()["rudder_angle_of_no_force_deg"] is None
+    assert found.study.rudder_angle_of_no_force_deg == pytest.approx(-1.5, abs=0.1)
+    assert t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2)).study.rudder_angle_of_no_force_deg is None
 
 
 def test_what_no_condition_shows_is_open_or_zero_and_named(tmp_path) -> None:
@@ -171,12 +172,12 @@ def test_a_campaign_that_lacks_what_the_method_needs_is_refused(tmp_path, old, n
 @pytest.mark.slow
 def test_a_coefficient_at_the_limit_of_the_search_marks_the_result(tmp_path) -> None:
     fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
-    assert fit.at_limit == () and MmgReductionResult(fit).marks == ()
+    assert fit.at_limit == () and MmgReductionResult(study_mmg(fit)).marks == ()
     values = fit.values.copy()
     values[fit.names.index("C_2_plus")] = 5.0
     at_limit = replace(fit, values=values)
     assert at_limit.at_limit == ("C_2_plus",)
-    assert any("C_2_plus" in mark for mark in MmgReductionResult(at_limit).marks)
+    assert any("C_2_plus" in mark for mark in MmgReductionResult(study_mmg(at_limit)).marks)
     assert fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2 | {"C_2_plus": 6.0}))).at_limit == ("C_2_plus",)
 
 
@@ -223,11 +224,11 @@ def test_columns_of_another_sign_or_unit_are_refused_by_their_names(tmp_path, co
 def test_points_of_the_open_water_curve_have_a_row_and_mark_a_result_that_they_doubt(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
     sound = t2s.reduce_to_mmg(path)
-    assert sound.marks == () and sound.content()["open_water"]["unexplained"] < 0.02
+    assert sound.marks == () and sound.study.open_water["K_T"].unexplained < 0.02
     assert [row[0] for row in sound.tables[1].rows][-1].startswith("K_T")
     scale_column(tmp_path, "K_T", 1.1)
     doubted = t2s.reduce_to_mmg(path)
-    assert doubted.content()["open_water"]["unexplained"] == pytest.approx(0.09, abs=0.01)
+    assert doubted.study.open_water["K_T"].unexplained == pytest.approx(0.09, abs=0.01)
     assert any("K_T" in mark for mark in doubted.marks)
     with_torque = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, torque=True))
     assert [row[0].partition(" ")[0] for row in with_torque.tables[1].rows][-2:] == ["K_T", "K_Q"]
@@ -292,16 +293,16 @@ def test_a_hull_whose_derivatives_no_ship_has_marks_the_result(tmp_path) -> None
     for name, value in (("Nr", 0.03), ("Nr", -0.5), ("Nr", -0.005), ("Nv", 0.1), ("l_R", 0.5), ("t_P", 0.75)):
         values = fit.values.copy()
         values[fit.names.index(name)] = value
-        marks = MmgReductionResult(replace(fit, values=values)).marks
+        marks = MmgReductionResult(study_mmg(replace(fit, values=values))).marks
         assert any(f" {name} is" in mark for mark in marks), name
 
 
 @pytest.mark.slow
 def test_the_polynomial_warns_of_a_yaw_rate_in_another_unit(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
-    assert not t2s.reduce(path).headline
+    assert not t2s.reduce(path).marks
     path.write_text(path.read_text().replace("yaw_rate_prime", "yaw_rate_degps"))
-    assert any("yaw rate" in line for line in t2s.reduce(path).headline)
+    assert any("yaw rate" in line for line in t2s.reduce(path).marks)
 
 
 def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(tmp_path) -> None:
@@ -431,7 +432,7 @@ def test_torque_gives_the_relative_rotative_efficiency_and_leaves_the_ship_as_it
     written = t2s.Ship(result.card)
     assert written.card.propeller.eta_R == pytest.approx(result.coefficients["eta_R"].value, rel=1e-4)
     assert "propeller.power" in written.model.outputs and "propeller.power" not in t2s.Ship(plain.card).model.outputs
-    assert result.content()["readings"]["Q"]["unit"] == "N.m"
+    assert result.study.readings["Q"].unit == "N.m"
     for name in ("Yv", "Nr", "t_P", "eps"):
         apart = abs(result.coefficients[name].value - plain.coefficients[name].value)
         assert apart < plain.coefficients[name].standard_error, name
@@ -492,7 +493,7 @@ def test_two_propellers_and_rudders_give_the_coefficients_of_both_sides(tmp_path
         assert result.coefficients[name].value == pytest.approx(value, rel=2e-3, abs=2e-4), name
     assert result.card.propeller.number == result.card.rudder.number == 2
     assert result.card.propeller.y_P == result.card.rudder.y_R == 0.05
-    assert set(result.content()["readings"]) == {"X", "Y", "N", "T", "F_N", "T_left", "F_N_left"}
+    assert set(result.study.readings) == {"X", "Y", "N", "T", "F_N", "T_left", "F_N_left"}
 
 
 @pytest.mark.slow

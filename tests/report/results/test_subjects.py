@@ -13,13 +13,9 @@ from tank2sim.analysis.glide.study import study as glide_study
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Illustration, Section
-from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.files import json_text
-from tank2sim.identification.tow.identify import identify_tow
-from tank2sim.identification.tow.study import study_tows, towed_body
 from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
-from tank2sim.records.tows import read_tows
 from tank2sim.records.yaw import read_yaw_record
 from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
@@ -175,29 +171,6 @@ def test_the_turning_circle_of_a_poster_is_drawn_with_the_way_ahead_up() -> None
 
 
 @pytest.fixture(scope="module")
-def tow() -> dict[str, Any]:
-    tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
-    result = identify_tow(tows, terms=("B3",))
-    return study_tows(result, towed_body(tows, result.mass_kg, {})).as_json()
-
-
-def test_tows_have_their_readings_their_fits_and_what_is_between_them(tow: dict[str, Any]) -> None:
-    charts = drawn(tow)
-    titles = ["Speeds of the tows and of the models", "Models of different size", "M and B3 together"]
-    assert list(charts)[:4] == [*titles, "Drag coefficient"]
-    speed, left = panels_of(charts[titles[0]]).values()
-    first, *_ = tow["speeds"]["simulated_mps"]
-    assert [row["v"] for row in speed if row["run"] == first] == pytest.approx(
-        tow["speeds"]["simulated_mps"][first], 1e-5
-    )
-    assert {row["v"] for row in left if row["run"] == first} == {0.0}
-    models = {row["name"]: row["m"] for row in rows_of(charts[titles[1]].chart)}
-    assert models == {
-        ", ".join(one["unknowns"]): pytest.approx(one["estimates"]["M"], rel=1e-5) for one in tow["models"]
-    }
-
-
-@pytest.fixture(scope="module")
 def yaw(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     truth = Truth(humps=1)
     path = written(tmp_path_factory.mktemp("yaw") / "water.csv", truth, record(truth))
@@ -248,9 +221,9 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
 def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
-    tow: dict[str, Any], yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
+    yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
 ) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, tow, yaw, glide]
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, yaw, glide]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

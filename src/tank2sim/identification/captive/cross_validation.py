@@ -32,8 +32,8 @@ class LeftOut:
     measured, predicted : float
         The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with the velocity in an
         oscillating run; predicted with the derivatives of all other runs.
-    standard_error : float
-        Standard error of predicted less measured.
+    error, standard_error : float
+        Predicted less measured, and its standard error.
     chance : float
         Probability of at least this misfit of all coefficients.
     misfit : float
@@ -50,6 +50,7 @@ class LeftOut:
     type: str
     measured: float
     predicted: float
+    error: float
     standard_error: float
     chance: float
     misfit: float
@@ -57,11 +58,6 @@ class LeftOut:
     size: float
     influence: float
     moved: str
-
-    @property
-    def error(self) -> float:
-        """Predicted less measured."""
-        return self.predicted - self.measured
 
     @property
     def unlikely(self) -> bool:
@@ -113,6 +109,7 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
                 type=equations.runs[place].run.type,
                 measured=float(shown[row]),
                 predicted=float(expected[row]),
+                error=float(expected[row]) - float(shown[row]),
                 standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[row, row])),
                 chance=float(chdtrc(end - start, squares)),
                 misfit=float(np.sqrt(squares / (end - start))),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import parse_term
 from tank2sim.dynamics.abkowitz import polynomial
@@ -32,31 +33,124 @@ _ACROSS = {
 """Kind of steady run to what it varies, and its unit."""
 _LETTER = {"static_drift": "v", "static_rudder": "d", "steady_turn": "r"}
 _ZERO = 1e-9
-"""Angle, rad, up to which it is zero."""
-
-Plot = dict[str, Any]
-"""A chart as JSON: ``kind``, ``title`` and what the kind needs (:mod:`tank2sim.report.captive.charts`)."""
+"""Smaller angles (rad) count as zero."""
 
 
-def plots_as_json(reduction: Reduction) -> dict[str, Plot]:
+def _nothing() -> Array:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ForceSeries:
+    """One force against an angle or an amplitude.
+
+    Parameters
+    ----------
+    label : str
+        Name of the series, such as ``pure sway, 0.45 rad/s``.
+    x, value : array (n,)
+        Measured points.
+    half_width : array (n,), optional
+        Half the 95 % interval of each point, in its unit.
+    fit_x, fit_value, fit_half_width : array (m,), optional
+        The fit and half its 95 % band; a fit without half widths has no band.
+    """
+
+    label: str
+    x: Array = field(default_factory=_nothing)
+    value: Array = field(default_factory=_nothing)
+    half_width: Array | None = None
+    fit_x: Array = field(default_factory=_nothing)
+    fit_value: Array = field(default_factory=_nothing)
+    fit_half_width: Array | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ForceLoop:
+    """Forces over the motion in one run, in the order of time.
+
+    Parameters
+    ----------
+    label : str
+        Name of the run.
+    motion : array (n,)
+        Sway velocity or yaw rate.
+    forces : dict
+        Name of a force to its values (n,).
+    fitted_motion : array (m,)
+    fitted : dict
+        Name of a force to the values (m,) of the fit.
+    """
+
+    label: str
+    motion: Array
+    forces: Columns
+    fitted_motion: Array = field(default_factory=_nothing)
+    fitted: Columns = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Harmonics:
+    """Amplitudes of the harmonics (1, 2, 3, ... in this order) of a force in one run, and those of the fit if given."""
+
+    run: str
+    amplitude: Array
+    fitted: Array | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ForcePlot:
+    """A force against the motion: titles of both, and the unit of the motion."""
+
+    title: str
+    across: str
+    unit: str
+    up: str
+    series: tuple[ForceSeries, ...]
+    kind: Literal["force"] = "force"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HarmonicsPlot:
+    """Harmonics of a force in the oscillating runs."""
+
+    title: str
+    up: str
+    runs: tuple[Harmonics, ...]
+    kind: Literal["harmonics"] = "harmonics"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopPlot:
+    """Loops of ``Y`` and ``N`` over the motion, with its title and unit."""
+
+    title: str
+    across: str
+    unit: str
+    loops: tuple[ForceLoop, ...]
+    kind: Literal["loops"] = "loops"
+
+
+ReductionPlot = ForcePlot | HarmonicsPlot | LoopPlot
+
+
+def reduction_plots(reduction: Reduction) -> dict[str, ReductionPlot]:
     """Return the data of the charts of a reduction by file stem, as far as the campaign has runs for them."""
-    plots: dict[str, Plot] = {}
+    plots: dict[str, ReductionPlot | None] = {}
     for force in reduction.forces:
         for kind, across in _ACROSS.items():
-            if plot := _steady_plot(reduction, force, kind, across):
-                plots[f"{kind}_{force}"] = plot
+            plots[f"{kind}_{force}"] = _steady_plot(reduction, force, kind, across)
         for kind, words in (("pure_sway", "sway velocity amplitude v'"), ("pure_yaw", "yaw rate amplitude r'")):
-            if force != "X" and (plot := _amplitude_plot(reduction, force, kind, words)):
-                plots[f"{kind}_{force}"] = plot
-        if force != "X" and (plot := _harmonics(reduction, force)):
-            plots[f"harmonics_{force}"] = plot
+            if force != "X":
+                plots[f"{kind}_{force}"] = _amplitude_plot(reduction, force, kind, words)
+        if force != "X":
+            plots[f"harmonics_{force}"] = _harmonics(reduction, force)
     for kind in ("pure_sway", "pure_yaw", "yaw_with_drift"):
-        if plot := _loops(reduction, kind):
-            plots[f"loops_{kind}"] = plot
-    return plots
+        plots[f"loops_{kind}"] = _loops(reduction, kind)
+    return {stem: plot for stem, plot in plots.items() if plot is not None}
 
 
-def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tuple[str, str]) -> Plot | None:
+def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tuple[str, str]) -> ForcePlot | None:
     """Force coefficient of the steady runs at the test speed against the one motion that they vary."""
     runs = [run for run in reduction.runs if run.run.type == kind and not run.motion.heel_rad]
     if kind == "steady_turn":
@@ -76,16 +170,22 @@ def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tupl
     v = -np.sin(across) if letter == "v" else still
     r, rudder = across if letter == "r" else still, across if letter == "d" else still
     fit, width = _fitted(reduction.forces[force], _regressors(reduction.forces[force], v, r, rudder))
-    series = {
-        "label": kind.replace("_", " "),
-        "x": angle,
-        "value": value,
-        "half_width": _NORMAL * error,
-        "fit_x": across,
-        "fit_value": fit,
-        "fit_half_width": width,
-    }
-    return _force_plot([series], across_title, f"{force}'", f"{force}' against {across_title[0]}")
+    series = ForceSeries(
+        label=kind.replace("_", " "),
+        x=angle,
+        value=value,
+        half_width=_NORMAL * error,
+        fit_x=across,
+        fit_value=fit,
+        fit_half_width=width,
+    )
+    return ForcePlot(
+        title=f"{force}' against {across_title[0]}",
+        across=across_title[0],
+        unit=across_title[1],
+        up=f"{force}'",
+        series=(series,),
+    )
 
 
 def _varies_alone(run: ReducedRun, kind: str) -> bool:
@@ -142,7 +242,7 @@ def _fitted(result: ForceResult, regressors: Array) -> tuple[Array, Array]:
     return regressors @ solution.values, _NORMAL * np.sqrt(np.maximum(variance, 0.0))
 
 
-def _amplitude_plot(reduction: Reduction, force: str, kind: str, words: str) -> Plot | None:
+def _amplitude_plot(reduction: Reduction, force: str, kind: str, words: str) -> ForcePlot | None:
     """Damping of each run by (4.4) against its amplitude, a series a frequency; the third order bends the fit."""
     rows = [row for row in reduction.oscillations if row.type == kind and row.run not in reduction.not_used]
     if not rows:
@@ -156,29 +256,23 @@ def _amplitude_plot(reduction: Reduction, force: str, kind: str, words: str) -> 
         if name in names:
             regressors[:, names.index(name)] = column
     fit, width = _fitted(result, regressors)
-    series: list[Plot] = [
-        {"label": "fit", "x": [], "value": [], "fit_x": amplitude, "fit_value": fit, "fit_half_width": width},
-    ]
+    series = [ForceSeries(label="fit", fit_x=amplitude, fit_value=fit, fit_half_width=width)]
+    name = force + letter
     for frequency in sorted({round(row.frequency_radps, 2) for row in rows}):
         at_frequency = [row for row in rows if round(row.frequency_radps, 2) == frequency]
         series.append(
-            {
-                "label": f"{frequency:g} rad/s",
-                "x": [abs(row.amplitude) for row in at_frequency],
-                "value": [row.values[force + letter] for row in at_frequency],
-                "half_width": [_NORMAL * row.standard_errors[force + letter] for row in at_frequency],
-            }
+            ForceSeries(
+                label=f"{frequency:g} rad/s",
+                x=np.array([abs(row.amplitude) for row in at_frequency]),
+                value=np.array([row.values[name] for row in at_frequency]),
+                half_width=_NORMAL * np.array([row.standard_errors[name] for row in at_frequency]),
+            )
         )
-    title = f"{force}{letter} of single runs against the amplitude"
-    return _force_plot(series, (words, "1"), f"{force}{letter}", title)
+    title = f"{name} of single runs against the amplitude"
+    return ForcePlot(title=title, across=words, unit="1", up=name, series=tuple(series))
 
 
-def _force_plot(series: Sequence[Plot], across: tuple[str, str], up: str, title: str) -> Plot:
-    """A force, `up`, against the motion, `across` with its unit."""
-    return {"kind": "force", "title": title, "across": across[0], "unit": across[1], "up": up, "series": series}
-
-
-def _harmonics(reduction: Reduction, force: str) -> Plot | None:
+def _harmonics(reduction: Reduction, force: str) -> HarmonicsPlot | None:
     """Harmonics of the water's force in every oscillating run, and those that the derivatives give."""
     equations, solution = reduction.forces[force].selection.equations, reduction.forces[force].solution
     values = np.array([solution.value(name) for name in equations.names])
@@ -190,11 +284,11 @@ def _harmonics(reduction: Reduction, force: str) -> Plot | None:
         rows = slice(start, start + len(root))
         measured = root @ equations.values[rows]
         fitted = root @ (equations.design[rows] @ values)
-        bars.append({"run": run.run.name, "amplitude": _amplitudes(measured), "fitted": _amplitudes(fitted)})
+        bars.append(Harmonics(run=run.run.name, amplitude=_amplitudes(measured), fitted=_amplitudes(fitted)))
     if not bars:
         return None
     title = f"Harmonics of {force}', without the body's inertia"
-    return {"kind": "harmonics", "title": title, "up": f"{force}'", "runs": bars}
+    return HarmonicsPlot(title=title, up=f"{force}'", runs=tuple(bars))
 
 
 def _amplitudes(coefficients: Array) -> Array:
@@ -202,7 +296,7 @@ def _amplitudes(coefficients: Array) -> Array:
     return amplitudes
 
 
-def _loops(reduction: Reduction, kind: str) -> Plot | None:
+def _loops(reduction: Reduction, kind: str) -> LoopPlot | None:
     """Y and N of the water over the velocity: the largest amplitude of each frequency."""
     runs: dict[float, ReducedRun] = {}
     for run in reduction.runs:
@@ -215,23 +309,27 @@ def _loops(reduction: Reduction, kind: str) -> Plot | None:
     chosen = [runs[frequency] for frequency in sorted(runs)][:_LOOPS]
     words, unit = ("sway velocity", "m/s") if kind == "pure_sway" else ("yaw rate", "rad/s")
     title = f"Loops of {kind.replace('_', ' ')}: the opening is the added mass"
-    loops = [_loop(reduction, run) for run in chosen]
-    return {"kind": "loops", "title": title, "across": words, "unit": unit, "loops": loops}
+    loops = tuple(_loop(reduction, run) for run in chosen)
+    return LoopPlot(title=title, across=words, unit=unit, loops=loops)
 
 
 def _velocity(run: ReducedRun) -> Array:
     return run.motion.v_mps if run.run.type == "pure_sway" else run.motion.r_radps
 
 
-def _loop(reduction: Reduction, run: ReducedRun) -> Plot:
+def _loop(reduction: Reduction, run: ReducedRun) -> ForceLoop:
     """Motion, and Y and N of the water, over the whole run and one period of the fit; thinned to draw."""
     inertia: Mapping[str, Array] = rigid_body_force(reduction.campaign, run.motion)
     kept, velocity = run.motion.kept, _velocity(run)
     one_period = slice(0, len(run.motion.time_s) // run.motion.periods + 1)
     measured = {force: run.run.force(force)[kept] + inertia[force] for force in "YN"}
     fitted = {force: (run.fitted(force) + inertia[force])[one_period] for force in "YN"}
-    return {
-        "label": run.run.name,
-        "measured": drawn_columns({"motion": velocity, **measured}, _LOOP_SAMPLES),
-        "fitted": drawn_columns({"motion": velocity[one_period], **fitted}, _LOOP_SAMPLES),
-    }
+    forces = drawn_columns({"motion": velocity, **measured}, _LOOP_SAMPLES)
+    fit = drawn_columns({"motion": velocity[one_period], **fitted}, _LOOP_SAMPLES)
+    return ForceLoop(
+        label=run.run.name,
+        motion=forces.pop("motion"),
+        forces=forces,
+        fitted_motion=fit.pop("motion"),
+        fitted=fit,
+    )

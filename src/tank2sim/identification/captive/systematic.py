@@ -148,6 +148,8 @@ class DelayEstimate:
         The channels have one delay; if not, they differ as memory of the flow does.
     supported : bool
         Sway and yaw show it each by itself: it is not the memory of one of the motions.
+    corrected : bool
+        It is taken out of the results.
     """
 
     size: float
@@ -156,6 +158,7 @@ class DelayEstimate:
     chance: float
     alike: bool
     supported: bool
+    corrected: bool = False
 
     @property
     def possible_s(self) -> float:

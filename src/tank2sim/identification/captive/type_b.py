@@ -108,17 +108,15 @@ class AlignmentEstimate:
         ``Y`` and ``N`` to angle and standard error.
     chance : float
         Probability of so large a difference of the two.
+    shown : bool
+        The angle is not zero, and Y0 and N0 agree on it.
     """
 
     angle_rad: float
     standard_error_rad: float
     by_force: Mapping[str, tuple[float, float]]
     chance: float
-
-    @property
-    def shown(self) -> bool:
-        """The angle is not zero, and Y0 and N0 agree on it."""
-        return abs(self.angle_rad) > _SHOWN * self.standard_error_rad and self.chance > _ALIKE
+    shown: bool
 
 
 def alignment_estimate(
@@ -151,6 +149,11 @@ def alignment_estimate(
     total = sum(weights.values())
     mean = sum(weights[force] * angle for force, (angle, _) in found.items()) / total
     scatter = sum(weights[force] * (angle - mean) ** 2 for force, (angle, _) in found.items())
+    chance, error = float(chdtrc(1, scatter)), total**-0.5
     return AlignmentEstimate(
-        angle_rad=mean, standard_error_rad=total**-0.5, by_force=found, chance=float(chdtrc(1, scatter))
+        angle_rad=mean,
+        standard_error_rad=error,
+        by_force=found,
+        chance=chance,
+        shown=bool(abs(mean) > _SHOWN * error and chance > _ALIKE),
     )

@@ -59,8 +59,9 @@ class BudgetRow:
     value : float
     combined, expanded : float
         Standard uncertainty, and :data:`COVERAGE_FACTOR` times that.
-    parts : mapping
-        Source, a key of :data:`BUDGET_SOURCES`, to its standard uncertainty.
+    parts, shares : mapping
+        Source, a key of :data:`BUDGET_SOURCES`, to its standard uncertainty, and to its share of the variance; the
+        shares add up to 1.
     """
 
     name: str
@@ -68,12 +69,7 @@ class BudgetRow:
     combined: float
     expanded: float
     parts: Mapping[str, float]
-
-    @property
-    def shares(self) -> dict[str, float]:
-        """Source to its share of the variance; the shares add up to 1."""
-        total = sum(size**2 for size in self.parts.values())
-        return {source: size**2 / total if total else 0.0 for source, size in self.parts.items()}
+    shares: Mapping[str, float]
 
 
 def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
@@ -90,7 +86,8 @@ def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
                 variances[source] += float(sizes[place])
             for source, size in found.type_b.items():
                 variances[_SOURCE_OF.get(source, "calibration")] += size**2
-            combined = float(np.sqrt(sum(variances.values())))
+            total = sum(variances.values())
+            combined = float(np.sqrt(total))
             rows.append(
                 BudgetRow(
                     name=name,
@@ -98,6 +95,7 @@ def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
                     combined=combined,
                     expanded=COVERAGE_FACTOR * combined,
                     parts={source: float(np.sqrt(variance)) for source, variance in variances.items()},
+                    shares={source: variance / total if total else 0.0 for source, variance in variances.items()},
                 )
             )
     return tuple(rows)

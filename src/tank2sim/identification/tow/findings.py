@@ -47,7 +47,9 @@ _TWO_SIDED_95 = 1.96
 _SIGNIFICANCE = 0.05
 
 
-def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit]) -> Iterator[str]:
+def tow_findings(
+    tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit], designs: Mapping[str, Array]
+) -> Iterator[str]:
     """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
 
     Parameters
@@ -60,9 +62,11 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
         v*(t) of the equation error, m/s over s.
     fits : mapping
         Method to its fit. The method of the paper is omitted if QR, with the same estimates, is included.
+    designs : mapping
+        Method to its design matrix (rows, free unknowns).
     """
     messages = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
-    yield from _identifiability(messages)
+    yield from _identifiability(messages, designs)
     for fit in messages:
         yield from _plausibility(fit, tows.top_speed_mps)
     if any(fit.method != "output_error" for fit in messages):
@@ -70,7 +74,7 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
     if "output_error" in fits:
         fit = fits["output_error"]
         speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
-        row = _worst_misfit(tows, speeds, len(fit.free))
+        row = _worst_misfit(tows, speeds, len(fit.estimated))
         if row is not None:
             fast = speeds[row] - tows.mean_speed_mps[row]
             yield (
@@ -81,33 +85,33 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
     yield from _disagreement(messages)
 
 
-def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
+def identifiable_terms(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> tuple[str, ...]:
     """The largest set of drag terms that all fits (of one model) can distinguish from M and each other.
 
     Among sets of equal size the one with the lower powers of the speed is taken.
     """
-    terms = fits[0].terms
+    terms = tuple(fits[0].drag_terms)
     for count in range(len(terms), 0, -1):
         for chosen in combinations(reversed(terms), count):
-            columns = [
-                [place for place, name in enumerate(fit.free) if name in chosen or name not in terms] for fit in fits
+            left = [
+                designs[fit.method][:, [name in chosen or name not in terms for name in fit.estimated]] for fit in fits
             ]
-            if all(scaled_condition(fit.design[:, kept]) <= COLLINEAR for fit, kept in zip(fits, columns, strict=True)):
+            if all(scaled_condition(design) <= COLLINEAR for design in left):
                 return chosen
     return ()
 
 
-def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
+def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator[str]:
     collinear = [fit for fit in fits if fit.condition_scaled > COLLINEAR**2]
     if collinear:
         numbers = " and ".join(f"{fit.condition_scaled:.2g} ({fit.method})" for fit in collinear)
         yield (
-            f"{', '.join(collinear[-1].free)} cannot all be identified from these tows: the scaled condition number is "
-            f"{numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
-            f"(--terms {','.join(identifiable_terms(fits)) or 'none'})."
+            f"{', '.join(collinear[-1].estimated)} cannot all be identified from these tows: the scaled condition "
+            f"number is {numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
+            f"(--terms {','.join(identifiable_terms(fits, designs)) or 'none'})."
         )
     for fit in fits:
-        if fit.covariance is None or fit.correlation is None:
+        if fit.errors is None or fit.correlation is None:
             continue
         pairs = [
             f"{fit.unknowns[i]} and {fit.unknowns[j]} ({fit.correlation[i, j]:+.4f})"
@@ -116,10 +120,9 @@ def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
         ]
         if pairs:
             yield f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known."
-        errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
         uncertain = [
             f"{name} ({value:.3g}, standard error {error:.2g})"
-            for name, value, error in zip(fit.unknowns, fit.values, errors, strict=True)
+            for name, value, error in zip(fit.unknowns, fit.values, fit.errors, strict=True)
             if _TWO_SIDED_95 * error > abs(value)
         ]
         if uncertain:
@@ -148,8 +151,9 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
 
 def _added_mass(fit: TowFit) -> Iterator[str]:
     """An added mass that is none, or more than the mass, by more than its error."""
-    share = fit.added_mass_kg / fit.mass_kg
-    error = 0.0 if fit.covariance is None else _TWO_SIDED_95 * math.sqrt(max(fit.covariance[0, 0], 0.0)) / fit.mass_kg
+    mass_kg = fit.estimates["total_mass_kg"] - fit.added_mass_kg
+    share = fit.added_mass_kg / mass_kg
+    error = _TWO_SIDED_95 * fit.standard_errors.get("total_mass_kg", 0.0) / mass_kg
     low, high = ADDED_SHARES
     if low - error <= share <= high + error:
         if share < 0:
@@ -168,10 +172,10 @@ def _added_mass(fit: TowFit) -> Iterator[str]:
 
 
 def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[str]:
-    if len(fit.free) > len(speed.coef):
+    if len(fit.estimated) > len(speed.coef):
         yield (
-            f"{fit.method}: {len(fit.free)} unknowns are estimated from the {len(speed.coef)} coefficients of a speed "
-            f"polynomial of degree {speed.degree()}; the standard errors then reflect the arithmetic, not the "
+            f"{fit.method}: {len(fit.estimated)} unknowns are estimated from the {len(speed.coef)} coefficients of a "
+            f"speed polynomial of degree {speed.degree()}; the standard errors then reflect the arithmetic, not the "
             "drag."
         )
     speeds = speed(tows.time_s)
@@ -205,10 +209,10 @@ def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
 
 def _disagreement(fits: Sequence[TowFit]) -> Iterator[str]:
     for first, second in combinations(fits, 2):
-        if first.covariance is None or second.covariance is None:
+        if first.errors is None or second.errors is None:
             continue
         difference = abs(first.values[0] - second.values[0])
-        if difference > _TWO_SIDED_95 * np.sqrt(first.covariance[0, 0] + second.covariance[0, 0]):
+        if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
             yield (
                 f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
                 "errors explain; this is the accuracy of the mass."

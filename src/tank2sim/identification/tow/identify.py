@@ -15,19 +15,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from tank2sim.arrays import Array
 from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.dynamics.surge import DRAG_POWERS
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import SINGULAR_CONDITION, scaled_condition
 from tank2sim.identification.tow import equation_error, output_error
 from tank2sim.identification.tow.findings import tow_findings
-from tank2sim.identification.tow.fit import TowFit
+from tank2sim.identification.tow.fit import TowFit, TowSolution
 from tank2sim.identification.tow.force import as_force, checked_force, force_words, mean_force
 from tank2sim.identification.tow.output_error import AT_ONCE, TowOptions
 from tank2sim.records.tows import Tows
@@ -41,54 +39,49 @@ class TowIdentification:
 
     Parameters
     ----------
-    tows : Tows
-        The readings.
-    force : Polynomial
-        Towing force T(t), N over s.
+    tows : str
+        File of the readings.
+    force_N : float
+        Mean of the towing force over the time of the record.
+    force_polynomial : tuple of float
+        Coefficients of the towing force T(t) in rising powers of t, N over s.
     mass_kg : float
         Mass m of the body with the water in it.
     terms : tuple of str
         Drag terms, in the order of (1.5).
+    start_delay : bool
+        Whether a start delay is estimated.
+    given_total_mass_kg : float, optional
+        M, if it was given.
+    readings : int
+        Number of readings.
+    top_speed_mps : float
+        The highest reading.
     speed_polynomial : tuple of float
         Coefficients of v*(t) in rising powers of t, m/s over s (eq. 2.1).
-    fits : dict
+    methods : dict
         Method to its estimates.
-    options : TowOptions
-        Assumptions in addition to (1.5).
     warnings : tuple of str
         Messages for the user, in sentences.
     """
 
-    tows: Tows
-    force: Polynomial
+    tows: str
+    force_N: float
+    force_polynomial: tuple[float, ...]
     mass_kg: float
     terms: tuple[str, ...]
+    start_delay: bool
+    given_total_mass_kg: float | None
+    readings: int
+    top_speed_mps: float
     speed_polynomial: tuple[float, ...]
-    fits: dict[str, TowFit]
-    options: TowOptions
+    methods: dict[str, TowFit]
     warnings: tuple[str, ...]
 
     @property
-    def force_N(self) -> float:
-        """Mean of the towing force over the time of the record."""
-        return mean_force(self.force, self.tows.time_s)
-
-    def as_json(self) -> dict[str, Any]:
-        """The result as plain data; the unit of a number is in its key, J is in N s^(1/2)."""
-        return {
-            "tows": str(self.tows.path),
-            "force_N": self.force_N,
-            "force_polynomial": self.force.coef.tolist(),
-            "mass_kg": self.mass_kg,
-            "terms": list(self.terms),
-            "start_delay": self.options.start_delay,
-            "given_total_mass_kg": self.options.total_mass_kg,
-            "readings": int(np.sum(self.tows.counts)),
-            "top_speed_mps": self.tows.top_speed_mps,
-            "speed_polynomial": list(self.speed_polynomial),
-            "methods": {name: fit.as_json() for name, fit in self.fits.items()},
-            "warnings": list(self.warnings),
-        }
+    def force(self) -> Polynomial:
+        """Towing force T(t), N over s."""
+        return Polynomial(self.force_polynomial)
 
 
 def parse_terms(text: str) -> tuple[str, ...]:
@@ -141,23 +134,22 @@ def identify_tow(
     _check_solvable(tows, problem)
     solutions = _solutions(tows, speed, problem, pull, options)
     fits = {name: _fit(name, solution, (tows, mass, pull), problem) for name, solution in solutions.items()}
+    designs = {name: solution.design for name, solution in solutions.items()}
     notes = _notes(tows, force, mass, set(TOW_METHODS) - set(fits))
     return TowIdentification(
-        tows=tows,
-        force=pull,
+        tows=str(tows.path),
+        force_N=mean_force(pull, tows.time_s),
+        force_polynomial=tuple(pull.coef.tolist()),
         mass_kg=mass,
         terms=terms,
-        speed_polynomial=tuple(float(value) for value in speed.polynomial.coef),
-        fits=fits,
-        options=options,
-        warnings=(*notes, *tow_findings(tows, pull, speed.polynomial, fits)),
+        start_delay=options.start_delay,
+        given_total_mass_kg=options.total_mass_kg,
+        readings=int(np.sum(tows.counts)),
+        top_speed_mps=tows.top_speed_mps,
+        speed_polynomial=tuple(speed.polynomial.coef.tolist()),
+        methods=fits,
+        warnings=(*notes, *tow_findings(tows, pull, speed.polynomial, fits, designs)),
     )
-
-
-class _Solution(NamedTuple):
-    values: Array
-    design: Array
-    covariance: Array | None = None
 
 
 def _solutions(
@@ -166,35 +158,27 @@ def _solutions(
     problem: equation_error.EquationError,
     force: Polynomial,
     options: TowOptions,
-) -> dict[str, _Solution]:
+) -> dict[str, TowSolution]:
     design = problem.free_design
     values = equation_error.solve_by_qr(problem)
     found = {
-        "paper": _Solution(equation_error.solve_normal_equations(problem), design),
-        "qr": _Solution(values, design, equation_error.covariance(problem, values, speed)),
+        "paper": TowSolution(equation_error.solve_normal_equations(problem), design),
+        "qr": TowSolution(values, design, equation_error.covariance(problem, values, speed)),
     }
     fit = output_error.fit_speeds(tows, force, problem.terms, options)
     if fit is not None:
         covariance = np.zeros((len(problem.known) + len(fit.estimates),) * 2)
         covariance[len(problem.known) :, len(problem.known) :] = fit.covariance
-        found["output_error"] = _Solution(np.concatenate([problem.known, fit.estimates]), fit.design, covariance)
+        found["output_error"] = TowSolution(np.concatenate([problem.known, fit.estimates]), fit.design, covariance)
     return found
 
 
 def _fit(
-    method: str, solution: _Solution, known: tuple[Tows, float, Polynomial], problem: equation_error.EquationError
+    method: str, solution: TowSolution, known: tuple[Tows, float, Polynomial], problem: equation_error.EquationError
 ) -> TowFit:
     tows, mass_kg, force = known
-    fit = TowFit(
-        method=method,
-        terms=problem.terms,
-        values=solution.values,
-        covariance=solution.covariance,
-        mass_kg=mass_kg,
-        design=solution.design,
-        J=problem.J(solution.values[: 1 + len(problem.terms)]),
-        largest_speed_error_mps=0.0,
-    )
+    J = problem.J(solution.values[: 1 + len(problem.terms)])
+    fit = solution.fit(method, problem.terms, mass_kg, J)
     speeds = output_error.simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
     error = float(np.max(np.abs(speeds - tows.mean_speed_mps))) if np.isfinite(speeds).all() else math.inf
     return replace(fit, largest_speed_error_mps=error)
@@ -271,7 +255,7 @@ def tow_card_text(
     Parameters
     ----------
     fit : TowFit
-        One of ``result.fits``.
+        One of ``result.methods``.
     name, source : str
         Name of the body, and source of the numbers.
     length_m : float, optional
@@ -284,7 +268,7 @@ def tow_card_text(
             source=source,
             values={**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
             standard_errors={key: value for key, value in fit.standard_errors.items() if key in values},
-            top_speed_mps=result.tows.top_speed_mps,
+            top_speed_mps=result.top_speed_mps,
             length_m=length_m,
             notes=" ".join(result.warnings),
         )

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy import stats
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.dynamics.surge import SurgeCoefficients, drag
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, SINGULAR_CONDITION, scaled_condition
 from tank2sim.identification.tow import equation_error
-from tank2sim.identification.tow.fit import DELAY, TOW_PARAMETERS
+from tank2sim.identification.tow.fit import DELAY, surge_coefficients
 from tank2sim.identification.tow.output_error import OutputErrorFit, TowOptions, fit_speeds
 from tank2sim.records.tows import Tows
 
@@ -52,65 +52,68 @@ SIMPLE, SIMPLE_LATE = TowModel(("B3",)), TowModel(("B3",), start_delay=True)
 """The models that are also fitted to each tow: short tows determine their unknowns."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FittedModel:
-    """A model fitted to all readings by output error.
+    """A model fitted to all readings by output error; SI.
 
     Parameters
     ----------
-    model : TowModel
-        Unknowns of the fit.
-    fit : OutputErrorFit
-        Estimates in the order of ``model.unknowns``.
-    lowest_drag_N : float
-        Lowest drag up to the highest measured speed; negative for an impossible model.
+    unknowns : tuple of str
+        M, the drag terms in the order of (1.5), and ``delay`` if the body starts late.
+    estimates, half_widths_95 : dict
+        Unknown to its estimate, and to the half-width of its 95 % interval, for independent readings of equal variance.
+    covariance : array (unknowns, unknowns)
+        Covariance of the estimates.
+    freedom : int
+        Readings less estimates.
+    scatter_mps : float
+        Standard deviation of a reading about the fitted speed.
+    aic : float
+        Akaike's criterion; only differences matter.
+    condition_scaled : float
+        Condition number of the normal matrix with a diagonal of ones.
+    drag_nowhere_negative : bool
+        Whether M is positive and the drag not negative up to the highest measured speed.
+    determined : bool
+        Whether the scaled condition number is at most 900 and a delay is not at its bound, 0.
     """
 
-    model: TowModel
-    fit: OutputErrorFit
-    lowest_drag_N: float
+    unknowns: tuple[str, ...]
+    estimates: dict[str, float]
+    half_widths_95: dict[str, Number]
+    covariance: Array
+    freedom: int
+    scatter_mps: float
+    aic: float
+    condition_scaled: Unbounded
+    drag_nowhere_negative: bool
+    determined: bool
 
     @property
-    def plausible(self) -> bool:
-        """True if M is positive and the drag nowhere negative."""
-        return bool(self.fit.estimates[0] > 0 and self.lowest_drag_N >= 0)
+    def label(self) -> str:
+        """``M, B3, delay``."""
+        return ", ".join(self.unknowns)
 
     @property
-    def determined(self) -> bool:
-        """True if the scaled condition number is at most 900 and a delay is not at its bound, 0."""
-        late = not self.model.start_delay or self.fit.estimates[-1] > _NO_DELAY_S
-        return late and self.fit.condition_scaled <= COLLINEAR**2
+    def usable(self) -> bool:
+        """Whether the tows determine the model, and a hull can have its drag."""
+        return self.drag_nowhere_negative and self.determined
 
     @property
     def coefficients(self) -> SurgeCoefficients:
         """Mass and drag."""
-        values = dict(zip(self.model.unknowns, self.fit.estimates.tolist(), strict=True))
-        return SurgeCoefficients(**{TOW_PARAMETERS[name]: value for name, value in values.items() if name != DELAY})
-
-    @property
-    def delay_s(self) -> float:
-        """Time from t = 0 to the start of the body, s."""
-        return float(self.fit.estimates[-1]) if self.model.start_delay else 0.0
+        return surge_coefficients(self.unknowns, np.array(list(self.estimates.values())))
 
     @property
     def mass_interval_kg(self) -> tuple[float, float]:
         """95 % interval of M, for independent readings of equal variance."""
-        middle, half = self.fit.estimates[0], self.fit.half_widths[0]
-        return float(middle - half), float(middle + half)
+        middle, half = self.estimates["M"], self.half_widths_95["M"]
+        return middle - half, middle + half
 
-    def as_json(self) -> dict[str, Any]:
-        """The model as plain data; SI."""
-        names = self.model.unknowns
-        return {
-            "unknowns": list(names),
-            "estimates": dict(zip(names, self.fit.estimates.tolist(), strict=True)),
-            "half_widths_95": dict(zip(names, self.fit.half_widths.tolist(), strict=True)),
-            "scatter_mps": self.fit.scatter_mps,
-            "aic": self.fit.aic,
-            "condition_scaled": self.fit.condition_scaled,
-            "drag_nowhere_negative": self.plausible,
-            "determined": self.determined,
-        }
+
+def best_model(models: Sequence[FittedModel]) -> FittedModel | None:
+    """The usable model of the lowest AIC; None without any."""
+    return min((model for model in models if model.usable), key=lambda model: model.aic, default=None)
 
 
 def compare_models(tows: Tows, force: Polynomial, models: Sequence[TowModel] = MODELS) -> tuple[FittedModel, ...]:
@@ -119,12 +122,24 @@ def compare_models(tows: Tows, force: Polynomial, models: Sequence[TowModel] = M
     AIC assumes independent readings of equal variance. Readings of a tow are not quite independent: small differences
     are not significant.
     """
-    fitted = []
-    for model in models:
-        fit = _fit_or_none(tows, force, model)
-        if fit is not None:
-            fitted.append(FittedModel(model, fit, _lowest_drag(model, fit, tows.top_speed_mps)))
-    return tuple(fitted)
+    fits = ((model, _fit_or_none(tows, force, model)) for model in models)
+    return tuple(_fitted(model, fit, tows.top_speed_mps) for model, fit in fits if fit is not None)
+
+
+def _fitted(model: TowModel, fit: OutputErrorFit, top_speed_mps: float) -> FittedModel:
+    late = not model.start_delay or fit.estimates[-1] > _NO_DELAY_S
+    return FittedModel(
+        unknowns=model.unknowns,
+        estimates=dict(zip(model.unknowns, fit.estimates.tolist(), strict=True)),
+        half_widths_95=dict(zip(model.unknowns, fit.half_widths.tolist(), strict=True)),
+        covariance=fit.covariance,
+        freedom=fit.freedom,
+        scatter_mps=fit.scatter_mps,
+        aic=fit.aic,
+        condition_scaled=fit.condition_scaled,
+        drag_nowhere_negative=bool(fit.estimates[0] > 0 and _lowest_drag(model, fit, top_speed_mps) >= 0),
+        determined=bool(late and fit.condition_scaled <= COLLINEAR**2),
+    )
 
 
 def mass_range(fitted: Sequence[FittedModel]) -> tuple[float, float] | None:
@@ -132,82 +147,53 @@ def mass_range(fitted: Sequence[FittedModel]) -> tuple[float, float] | None:
 
     Models with an AIC far above the best of these are excluded.
     """
-    usable = [model for model in fitted if model.plausible and model.determined]
-    if not usable:
+    best = best_model(fitted)
+    if best is None:
         return None
-    best = min(model.fit.aic for model in usable)
-    intervals = [model.mass_interval_kg for model in usable if model.fit.aic <= best + _FAR_BEHIND]
+    intervals = [model.mass_interval_kg for model in fitted if model.usable and model.aic <= best.aic + _FAR_BEHIND]
     return min(low for low, _ in intervals), max(high for _, high in intervals)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class TowByTow:
-    """Estimates of one method, tow by tow.
+    """Estimates of one method, tow by tow; SI.
 
     Parameters
     ----------
-    label : str
-        Method and unknowns.
     unknowns : tuple of str
         Names of the unknowns.
-    together : array, (unknowns,)
-        From all tows, SI.
-    alone, held_out : arrays, (tows, unknowns)
+    together : array (unknowns,)
+        From all tows.
+    alone, left_out : arrays (tows, unknowns)
         From each tow alone, and from all tows except it; nan where impossible.
+    jackknife_standard_errors : array (unknowns,)
+        Jackknife standard errors over tows; nan if one of the fits failed. They are valid also for correlated readings
+        within a tow.
+    jackknife_half_widths_95 : array (unknowns,)
+        Half-widths of the jackknife 95 % intervals, with Student's t of n - 1 degrees of freedom.
+    spread_standard_errors : array (unknowns,)
+        Standard errors of the mean of the single tows' estimates: their spread over root n.
     """
 
-    label: str
     unknowns: tuple[str, ...]
     together: Array
     alone: Array
-    held_out: Array
-
-    @property
-    def jackknife_errors(self) -> Array:
-        """Jackknife standard errors over tows, (unknowns,); nan if one of the fits failed.
-
-        sqrt((n - 1)/n sum (x_i - mean x)^2) (Efron 1982, The jackknife, the bootstrap and other resampling plans). They
-        are valid also for correlated readings within a tow.
-        """
-        count = len(self.held_out)
-        errors: Array = np.sqrt((count - 1) / count * np.sum((self.held_out - self.held_out.mean(axis=0)) ** 2, axis=0))
-        return errors
-
-    @property
-    def half_widths(self) -> Array:
-        """Half-widths of the jackknife 95 % intervals, with Student's t of n - 1 degrees of freedom, (unknowns,)."""
-        half: Array = stats.t.ppf(0.975, len(self.held_out) - 1) * self.jackknife_errors
-        return half
-
-    @property
-    def spread_errors(self) -> Array:
-        """Standard errors of the mean of the single tows' estimates, (unknowns,): their spread over root n."""
-        errors: Array = np.std(self.alone, axis=0, ddof=1) / math.sqrt(len(self.alone))
-        return errors
-
-    def as_json(self) -> dict[str, Any]:
-        """The estimates as plain data; SI."""
-        return {
-            "unknowns": list(self.unknowns),
-            "together": self.together.tolist(),
-            "alone": self.alone.tolist(),
-            "left_out": self.held_out.tolist(),
-            "jackknife_standard_errors": self.jackknife_errors.tolist(),
-            "jackknife_half_widths_95": self.half_widths.tolist(),
-            "spread_standard_errors": self.spread_errors.tolist(),
-        }
+    left_out: Array
+    jackknife_standard_errors: Array
+    jackknife_half_widths_95: Array
+    spread_standard_errors: Array
 
 
 TowEstimator = Callable[[Tows], Array | None]
 
 
-def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degree: int = 2) -> tuple[TowByTow, ...]:
+def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degree: int = 2) -> dict[str, TowByTow]:
     """Single-tow and jackknife estimates by the paper's algorithm with `terms`, and by the simple models.
 
-    Empty for fewer than three tows, whose spread is not informative.
+    Empty for fewer than three tows, whose spread is not informative. Names are the methods with their unknowns.
     """
     if len(tows.names) < 3:
-        return ()
+        return {}
     ways: list[tuple[str, tuple[str, ...], TowEstimator]] = [
         (
             f"as published: {', '.join(('M', *terms))}",
@@ -217,20 +203,28 @@ def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degr
     ]
     for model in (SIMPLE, SIMPLE_LATE):
         ways.append((f"output error: {model.label}", model.unknowns, _by_output_error(force, model)))
-    return tuple(_each(tows, ways))
+    return {label: _each(tows, unknowns, estimate) for label, unknowns, estimate in ways}
 
 
-def _each(tows: Tows, ways: Sequence[tuple[str, tuple[str, ...], TowEstimator]]) -> Iterator[TowByTow]:
-    numbers = range(len(tows.names))
-    for label, unknowns, estimate in ways:
+def _each(tows: Tows, unknowns: tuple[str, ...], estimate: TowEstimator) -> TowByTow:
+    def row(tows: Tows) -> Array:
+        found = estimate(tows) if tows.top_speed_mps > 0 else None
+        return np.full(len(unknowns), np.nan) if found is None else found
 
-        def row(tows: Tows, estimate: TowEstimator = estimate, width: int = len(unknowns)) -> Array:
-            found = estimate(tows) if tows.top_speed_mps > 0 else None
-            return np.full(width, np.nan) if found is None else found
-
-        alone = np.array([row(tows.only(number)) for number in numbers])
-        held_out = np.array([row(tows.without(number)) for number in numbers])
-        yield TowByTow(label, unknowns, row(tows), alone, held_out)
+    count = len(tows.names)
+    alone = np.array([row(tows.only(number)) for number in range(count)])
+    left_out = np.array([row(tows.without(number)) for number in range(count)])
+    # sqrt((n - 1)/n sum (x_i - mean x)^2): Efron 1982, The jackknife, the bootstrap and other resampling plans.
+    errors = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean(axis=0)) ** 2, axis=0))
+    return TowByTow(
+        unknowns=unknowns,
+        together=row(tows),
+        alone=alone,
+        left_out=left_out,
+        jackknife_standard_errors=errors,
+        jackknife_half_widths_95=stats.t.ppf(0.975, count - 1) * errors,
+        spread_standard_errors=np.std(alone, axis=0, ddof=1) / math.sqrt(count),
+    )
 
 
 def _by_paper(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int) -> Array | None:

@@ -86,26 +86,7 @@ def _misfit(before: Mapping[str, Json], after: Mapping[str, Json]) -> list[KeyFi
     return [KeyFigure(label=label, value=value, verdict=verdict, note=f"{comparison}; {_NOISE}")]
 
 
-def _reduced(result: Mapping[str, Json]) -> list[KeyFigure]:
-    """How many derivatives, and the least sure of them."""
-    derivatives = result["derivatives"]
-    relative = {
-        name: 100 * abs(derivative["standard_error"] / derivative["value"])
-        for name, derivative in derivatives.items()
-        if is_number_value(derivative.get("standard_error"))
-        and is_number_value(derivative.get("value"))
-        and derivative["value"] != 0
-    }
-    figures = [KeyFigure(label="Derivatives found", value=len(derivatives))]
-    if relative:
-        worst = max(relative, key=lambda name: relative[name])
-        value = float(f"{relative[worst]:.3g}")
-        figures.append(KeyFigure(label="Largest standard error", value=value, unit="%", note=f"of the value, {worst}"))
-    return figures
-
-
 _TILES: Mapping[str, Callable[[Mapping[str, Json]], list[KeyFigure]]] = {
     "The missing effect": _gap,
     "Coefficients from trials": _identified,
-    "Captive tests": _reduced,
 }

@@ -65,17 +65,9 @@ RESULT_TYPES = (
     ),
     ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
-        "Captive tests to MMG",
-        "reduce",
-        ("campaign", "coefficients", "yaw_arm"),
-        ("coefficients.w_P0.value",),
-    ),
-    ResultType("Captive tests", "reduce", ("campaign", "derivatives"), ("test.speed_mps",)),
-    ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("Towed vehicle", "tow", ("tows", "methods", "mass_kg"), ("readings",)),
     ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
     ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
 from tank2sim.report.audit.page import audit_page
-from tank2sim.report.captive.mmg_page import mmg_reduction_page
-from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.design.page import campaign_design_page, trial_design_page
@@ -26,7 +24,6 @@ from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
-from tank2sim.report.tow.page import tow_page
 from tank2sim.report.validation.page import validation_page
 from tank2sim.report.yaw.page import yaw_page
 
@@ -78,14 +75,6 @@ _PAGES: Mapping[str, _Page] = {
             "notices": list,
         },
     ),
-    "Captive tests to MMG": _Page(
-        mmg_reduction_page,
-        {"coefficients": dict, "channels": dict, "readings": dict, "yaw_arm": dict, "conditions": list}
-        | {"model": str, "notices": list},
-    ),
-    "Towed vehicle": _Page(
-        tow_page, {"tows_of_the_paper": bool, "speeds": dict, "models": list, "tow_by_tow": dict, "methods": dict}
-    ),
     "Yaw rig": _Page(
         yaw_page, {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list, "notes": list}
     ),
@@ -119,11 +108,6 @@ _PAGES: Mapping[str, _Page] = {
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),
     "Captive run": _Page(run_page, {"runs": list, "repeats": list, "notices": list}),
-    "Captive tests": _Page(
-        reduction_page,
-        {"plots": dict, "leave_one_out": dict, "selection": dict, "prediction_errors": dict, "model": dict}
-        | {"runs": list, "not_used": object, "warnings": list},
-    ),
     "Coefficients from trials": _Page(
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}

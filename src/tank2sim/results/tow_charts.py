@@ -18,11 +18,11 @@ from tank2sim.answer.charts.parts import (
     plain,
     records,
     series_look,
-    vector,
 )
 from tank2sim.arrays import Array
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
-from tank2sim.report.json_values import Json
+from tank2sim.identification.tow.model_selection import FittedModel, TowByTow
+from tank2sim.identification.tow.study import Ellipse, TowSpeeds
 
 _SPEEDS = (
     Signal(name="speed", title="speed", unit="m/s"),
@@ -30,26 +30,25 @@ _SPEEDS = (
 )
 
 
-def tow_speed_chart(speeds: Json, *, title: str = "") -> alt.VConcatChart:
+def tow_speed_chart(speeds: TowSpeeds, *, title: str = "") -> alt.VConcatChart:
     """Readings as points and simulated speeds as lines; below, all of them less the first simulation.
 
     Parameters
     ----------
-    speeds : mapping
-        As ``speeds`` of the JSON has them: ``t_s`` and ``measured_mps`` by tow, ``simulated_t_s`` and
-        ``simulated_mps`` by name, not empty; null where nothing was read.
+    speeds : TowSpeeds
+        With at least one simulation.
     """
-    time, model_time = (vector(speeds[name]) for name in ("t_s", "simulated_t_s"))
-    simulated = {name: vector(values) for name, values in speeds["simulated_mps"].items()}
+    time, simulated = speeds.t_s, speeds.simulated_mps
     reference = next(iter(simulated.values()))
-    at_readings = np.interp(time, model_time, reference)
+    at_readings = np.interp(time, speeds.simulated_t_s, reference)
     runs = []
-    for label, values in speeds["measured_mps"].items():
-        speed = vector(values)
+    for label, speed in speeds.measured_mps.items():
         signals = {"speed": speed, "left": speed - at_readings}
         runs.append(History(label=label, time_s=time, values=signals, measured=True))
     for name, speed in simulated.items():
-        runs.append(History(label=name, time_s=model_time, values={"speed": speed, "left": speed - reference}))
+        runs.append(
+            History(label=name, time_s=speeds.simulated_t_s, values={"speed": speed, "left": speed - reference})
+        )
     return history_chart(runs, _SPEEDS, title=title, height_px=230)
 
 
@@ -108,22 +107,20 @@ def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) ->
 
 
 def ellipse_chart(
-    ellipses: Sequence[Mapping[str, Json]], by_tow: Mapping[str, Mapping[str, Json]], *, width_px: int = 620
+    ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow], *, width_px: int = 620
 ) -> alt.LayerChart:
-    """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point; both as the JSON has them."""
+    """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point."""
     lines: list[ChartRecord] = []
     points: list[ChartRecord] = []
     for ellipse in ellipses:
-        lines += records(
-            f"95 %: {ellipse['label']}", {"m": vector(ellipse["mass_kg"]), "b": vector(ellipse["B3_kgpm"])}
-        )
+        lines += records(f"95 %: {ellipse.label}", {"m": ellipse.mass_kg, "b": ellipse.B3_kgpm})
     for name, way in by_tow.items():
-        if way["unknowns"][:2] == ["M", "B3"] and name.startswith("output error"):
-            for number, row in enumerate(way["alone"], start=1):
-                if None not in row[:2]:
-                    label = f"each tow: {', '.join(way['unknowns'])}"
+        if way.unknowns[:2] == ("M", "B3") and name.startswith("output error"):
+            for number, row in enumerate(way.alone, start=1):
+                if np.isfinite(row[:2]).all():
+                    label = f"each tow: {', '.join(way.unknowns)}"
                     points.append({"run": label, "m": plain(row[0]), "b": plain(row[1]), "tow": number})
-    labels = [f"95 %: {ellipse['label']}" for ellipse in ellipses]
+    labels = [f"95 %: {ellipse.label}" for ellipse in ellipses]
     dots = list(dict.fromkeys(str(row["run"]) for row in points))
     look = series_look([*labels, *dots], as_points=dots)
     x = alt.X("m:Q", title="M (kg)", scale=alt.Scale(zero=False))
@@ -150,17 +147,16 @@ def ellipse_chart(
 _VERDICTS = ("usable", "not determined", "drag negative somewhere")
 
 
-def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) -> alt.HConcatChart:
-    """M with its 95 % interval, and AIC above the lowest, of each of the ``models`` of the JSON."""
-    lowest = min(model["aic"] for model in models)
-    names = [", ".join(model["unknowns"]) for model in models]
+def model_chart(models: Sequence[FittedModel], *, width_px: int = 340) -> alt.HConcatChart:
+    """M with its 95 % interval, and AIC above the lowest, of each model."""
+    lowest = min(model.aic for model in models)
+    names = [model.label for model in models]
     rows: list[ChartRecord] = []
     for name, model in zip(names, models, strict=True):
-        mass, half = model["estimates"]["M"], model["half_widths_95"]["M"]
-        ends = (None, None) if half is None else (plain(mass - half), plain(mass + half))
+        mass, half = model.estimates["M"], model.half_widths_95["M"]
         rows.append(
             {"name": name, "run": _verdict(model), "m": plain(mass)}
-            | {"low": ends[0], "high": ends[1], "aic": plain(model["aic"] - lowest)}
+            | {"low": plain(mass - half), "high": plain(mass + half), "aic": plain(model.aic - lowest)}
         )
     shown = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
     look = series_look(shown, as_points=shown)
@@ -192,5 +188,5 @@ def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) ->
     )
 
 
-def _verdict(model: Mapping[str, Json]) -> str:
-    return _VERDICTS[2] if not model["drag_nowhere_negative"] else _VERDICTS[0] if model["determined"] else _VERDICTS[1]
+def _verdict(model: FittedModel) -> str:
+    return _VERDICTS[0] if model.usable else _VERDICTS[1] if model.drag_nowhere_negative else _VERDICTS[2]

@@ -2,11 +2,9 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_png, chart_specification
-from tank2sim.report.captive.charts import (
+from tank2sim.identification.captive.plot_data import ForceLoop, ForceSeries, Harmonics
+from tank2sim.results.captive_charts import (
     Across,
-    ForceLoop,
-    ForceSeries,
-    Harmonics,
     Residual,
     force_chart,
     harmonic_chart,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Protocol
 
 import altair as alt
 import numpy as np
@@ -30,8 +31,8 @@ from tank2sim.answer.charts.parts import (
     with_unit,
 )
 from tank2sim.answer.charts.theme import BAND_OPACITY
+from tank2sim.identification.captive.plot_data import ForceLoop, ForceSeries, Harmonics
 from tank2sim.records.thinning import thin_line, thin_points
-from tank2sim.report.json_values import Json
 
 _CROWDED = 40
 _USUAL_LIMIT = 2.0
@@ -43,63 +44,6 @@ class Across:
 
     title: str
     unit: str = "1"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ForceSeries:
-    """One force against an angle or an amplitude.
-
-    Parameters
-    ----------
-    label : str
-        Of the series, such as ``pure sway, 0.45 rad/s``.
-    x, value : array, (n,)
-        Measured points.
-    half_width : array, (n,), optional
-        Half the 95 % interval of each point, in its unit.
-    fit_x, fit_value, fit_half_width : array, (m,), optional
-        The fit and half its 95 % band; a fit without half widths has no band.
-    """
-
-    label: str
-    x: ArrayLike
-    value: ArrayLike
-    half_width: ArrayLike | None = None
-    fit_x: ArrayLike = ()
-    fit_value: ArrayLike = ()
-    fit_half_width: ArrayLike | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ForceLoop:
-    """Forces over the motion in one run, in the order of time.
-
-    Parameters
-    ----------
-    label : str
-        Of the run.
-    motion : array, (n,)
-        Sway velocity or yaw rate.
-    forces : mapping
-        Name of a force to its values, (n,).
-    fitted : mapping
-        The same of the fit, over `fitted_motion` (m,).
-    """
-
-    label: str
-    motion: ArrayLike
-    forces: Mapping[str, ArrayLike]
-    fitted_motion: ArrayLike = ()
-    fitted: Mapping[str, ArrayLike] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Harmonics:
-    """Amplitudes of the harmonics (1, 2, 3, ... in this order) of a force in one run, and those of the fit if given."""
-
-    run: str
-    amplitude: ArrayLike
-    fitted: ArrayLike | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -350,20 +294,29 @@ def _at(amplitudes: ArrayLike | None, order: int) -> float | None:
     return plain(abs(float(values[order - 1]))) if order <= len(values) else None
 
 
-def derivative_certainty_chart(found: Mapping[str, Mapping[str, Json]], *, title: str) -> alt.LayerChart:
+class _Estimated(Protocol):
+    @property
+    def value(self) -> float: ...
+    @property
+    def standard_error(self) -> float: ...
+    @property
+    def origin(self) -> str: ...
+
+
+def derivative_certainty_chart(found: Mapping[str, _Estimated], *, title: str) -> alt.LayerChart:
     """Standard error of each number in % of its value, on a logarithmic scale, those without one left out.
 
     Parameters
     ----------
     found : mapping
-        Name to ``value``, ``standard_error`` and ``origin``.
+        Name to an object with ``value``, ``standard_error`` and ``origin``.
     title : str
         Title of the chart.
     """
     rows: list[ChartRecord] = [
-        {"name": name, "run": entry["origin"], "v": plain(100 * abs(entry["standard_error"] / entry["value"]))}
+        {"name": name, "run": entry.origin, "v": plain(100 * abs(entry.standard_error / entry.value))}
         for name, entry in found.items()
-        if entry["standard_error"] and entry["value"]
+        if entry.standard_error and entry.value
     ]
     origins = list(dict.fromkeys(str(row["run"]) for row in rows))
     look = series_look(origins, as_points=origins)

@@ -1,0 +1,221 @@
+"""Result of ``reduce --model mmg``: coefficients of the MMG method from steady captive tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import altair as alt
+
+from tank2sim.answer.charts.parts import NUMBER, Chart, data
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.cards import Card
+from tank2sim.identification.captive_mmg.regression import MmgFit
+from tank2sim.identification.captive_mmg.study import ChannelReadings, MmgCoefficient, MmgStudy
+from tank2sim.results.captive_charts import derivative_certainty_chart
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CHANNELS = {
+    "X": "surge force",
+    "Y": "sway force",
+    "N": "yaw moment",
+    "T": "thrust",
+    "F_N": "normal force of the rudder",
+    "T_left": "thrust of the left propeller",
+    "F_N_left": "normal force of the left rudder",
+    "Q": "torque of the propeller",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MmgReductionResult(Result[MmgStudy]):
+    """Coefficients of the MMG method from steady captive tests.
+
+    Parameters
+    ----------
+    study : MmgStudy
+    fit : MmgFit, optional
+        None, as card and ship, if the result was read from its JSON.
+    card : Card, optional
+        The MMG card found, with the covariance of its coefficients; ``card.save("ship.toml")`` writes it.
+    ship : Ship, optional
+        The ship of the card.
+    """
+
+    study: MmgStudy
+    fit: MmgFit | None = None
+    card: Card | None = None
+    ship: Any = None
+    command: ClassVar[str] = "reduce"
+
+    @property
+    def coefficients(self) -> dict[str, MmgCoefficient]:
+        """Coefficients by the names of an MMG card."""
+        return self.study.coefficients
+
+    @property
+    def derivatives(self) -> pd.DataFrame:
+        """Coefficients by name: value, standard error, origin; hull in prime II."""
+        import pandas as pd
+
+        columns = ("value", "standard_error", "origin")
+        rows = {name: {key: getattr(found, key) for key in columns} for name, found in self.coefficients.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    @property
+    def unexplained(self) -> tuple[float, ...]:
+        """rms of the residuals over rms of the readings, of each channel."""
+        return tuple(channel.unexplained for channel in self.study.channels.values())
+
+    @property
+    def title(self) -> str:
+        """The model."""
+        return f"{self.study.model}: coefficients of the MMG method"
+
+    @property
+    def subtitle(self) -> str:
+        """The tests."""
+        return f"From {len(self.study.conditions)} steady captive conditions"
+
+    @property
+    def _open(self) -> list[str]:
+        return [name for name, found in self.coefficients.items() if found.origin == "open"]
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Number of coefficients, and the worst residual."""
+        study, measured = self.study, sum(found.origin == "measured" for found in self.coefficients.values())
+        worst, channel = max(study.channels.items(), key=lambda channel: channel[1].unexplained)
+        opened = f"; {len(self._open)} are open, and those of ordinary ships" if self._open else ""
+        return (
+            f"{study.model}: {measured} coefficients of the MMG method are measured in {len(study.conditions)} steady "
+            f"conditions{opened}.",
+            f"The method follows every force within {100 * channel.unexplained:.2g} % of its rms; the "
+            f"{_CHANNELS[worst]} is the worst.",
+        )
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Residuals of the channels, and how many coefficients the tests leave open."""
+        return [
+            *(
+                KeyFigure(
+                    label=f"{_CHANNELS[name].capitalize()} followed within",
+                    value=float(f"{100 * channel.unexplained:.2g}"),
+                    unit="%",
+                    note=f"rms, {channel.standard_deviation:.3g} {channel.unit.replace('.', ' ')}",
+                )
+                for name, channel in self.study.channels.items()
+            ),
+            KeyFigure(
+                label="Left open by the tests",
+                value=len(self._open),
+                verdict=Verdict.CAUTION if self._open else Verdict.NONE,
+                note=", ".join(self._open) or "none",
+            ),
+        ]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Coefficients, computed and measured readings, the budget."""
+        certainty = []
+        known = {name: found for name, found in self.coefficients.items() if found.standard_error and found.value}
+        if known:
+            title = "Certainty of the coefficients"
+            certainty = [Illustration(chart=derivative_certainty_chart(known, title=title), name=title)]
+        readings = [
+            Illustration(chart=computed_chart(name, readings), half=True, name=_CHANNELS[name].capitalize())
+            for name, readings in self.study.readings.items()
+        ]
+        return [
+            Section(
+                heading="Coefficients",
+                text="One weighted regression of all readings.",
+                charts=certainty,
+                tables=[self._coefficients()],
+            ),
+            Section(
+                heading="Computed against measured",
+                text="Each point is a condition; on the line computed and measured reading agree.",
+                charts=readings,
+                tables=[self._residuals()],
+            ),
+            Section(
+                heading="Uncertainty budget",
+                text="After ITTC 7.5-02-06-04: the scatter of the tests, and errors common to all of them as "
+                "[uncertainty] of the campaign states them.",
+                tables=[self._budget()],
+                folded=True,
+            ),
+        ]
+
+    def _coefficients(self) -> Table:
+        rows: list[list[Cell]] = [
+            [name, found.value, found.standard_error, found.origin] for name, found in self.coefficients.items()
+        ]
+        arm = self.study.yaw_arm
+        rows.append(["x_R + a_H x_H", arm.value, arm.standard_error, "measured"])
+        heads = ("coefficient", "value", "standard error", "origin")
+        return table("Coefficients (hull: prime II, by 1/2 rho L d U²)", heads, rows)
+
+    def _residuals(self) -> Table:
+        words = {name: (_CHANNELS[name], channel) for name, channel in self.study.channels.items()}
+        words |= {name: (f"{name} (open water)", curve) for name, curve in self.study.open_water.items()}
+        rows: list[list[Cell]] = [
+            [title, found.unit.replace(".", " "), found.standard_deviation, 100 * found.unexplained]
+            for title, found in words.values()
+        ]
+        heads = ("channel", "unit", "standard deviation", "share of the rms (%)")
+        return table("Residuals of the readings", heads, rows, digits=3)
+
+    def _budget(self) -> Table:
+        sources = list(dict.fromkeys(source for found in self.coefficients.values() for source in found.type_b))
+        rows: list[list[Cell]] = [
+            [
+                name,
+                *(
+                    round(100 * (part / found.standard_error) ** 2, 2)
+                    for part in (found.type_a, *(found.type_b.get(source, 0.0) for source in sources))
+                ),
+                found.standard_error,
+                2 * found.standard_error,
+            ]
+            for name, found in self.coefficients.items()
+        ]
+        columns = [
+            *(Column(title="coefficient"), Column(title="scatter", unit="%", digits=3)),
+            *(Column(title=source.rpartition("_")[0], unit="%", digits=3) for source in sources),
+            *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+        ]
+        return table("Shares of the variance", columns, rows, on_screen=False)
+
+
+def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> alt.LayerChart:
+    """Computed over measured readings of one channel, with the line on which both are the same.
+
+    Parameters
+    ----------
+    name : str
+        Name of the channel.
+    readings : ChannelReadings
+    size_px : int
+        Width and height.
+    """
+    points = [{"m": m, "c": c} for m, c in zip(readings.measured.tolist(), readings.computed.tolist(), strict=True)]
+    unit = readings.unit.replace(".", " ")
+    x = alt.X("m:Q", title=f"{name} measured ({unit})")
+    y = alt.Y("c:Q", title=f"{name} computed ({unit})")
+    tooltip = [alt.Tooltip("m:Q", title="measured", format=NUMBER), alt.Tooltip("c:Q", title="computed", format=NUMBER)]
+    ends = [float(readings.measured.min()), float(readings.measured.max())]
+    line = Chart(data([{"m": end, "c": end} for end in ends])).mark_line(opacity=0.5).encode(x=x, y=y)
+    dots = Chart(data(points)).mark_circle(size=36, opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
+    return alt.layer(line, dots).properties(
+        title=_CHANNELS[name].capitalize(),
+        width=size_px,
+        height=size_px,
+        description=f"Computed and measured {_CHANNELS[name]}.",
+    )

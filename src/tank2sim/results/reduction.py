@@ -1,0 +1,319 @@
+"""Result of ``reduce``: hydrodynamic derivatives from captive tests, their certainty and how they were found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import altair as alt
+
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.cards import Card, parse_card
+from tank2sim.cards.covariance import Covariance
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.plot_data import ForcePlot, HarmonicsPlot, ReductionPlot
+from tank2sim.identification.captive.reduction import Reduction, reduction_covariance
+from tank2sim.identification.captive.result_card import Contents, reduced_card_text
+from tank2sim.identification.captive.study import ReductionStudy
+from tank2sim.results.captive_charts import (
+    Across,
+    Residual,
+    derivative_certainty_chart,
+    force_chart,
+    harmonic_chart,
+    loop_chart,
+    residual_chart,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FORCES = {"X": "surge force", "Y": "sway force", "N": "yaw moment"}
+_LOOPS = {"Y": "Y of the water (N)", "N": "N of the water (N m)"}
+_LEFT_OUT = ("collinear", "not determined")
+"""Reasons for which a term that the runs excite is not in the result."""
+
+_FEWEST_RUNS = 3
+"""Least number of runs of a type whose range gives a scale for the error of their prediction."""
+
+_AGAINST_MOTION = "Points: measured, bars: their 95 % intervals. Lines: the fit; shaded: its 95 % band."
+_CERTAINTY = "A derivative whose standard error is as large as its value (red) shows its order of magnitude only."
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReductionResult(Result[ReductionStudy]):
+    """Hydrodynamic derivatives from captive tests.
+
+    Parameters
+    ----------
+    study : ReductionStudy
+    reduction : Reduction, optional
+        None if the result was read from its JSON.
+    contents : Contents, optional
+        Contents of the card: what was measured, and what was taken from published estimates.
+    ship : Ship, optional
+        The ship of the card found; None if no card can be made of the derivatives.
+    """
+
+    study: ReductionStudy
+    reduction: Reduction | None = None
+    contents: Contents | None = None
+    ship: Any = None
+    command: ClassVar[str] = "reduce"
+
+    @cached_property
+    def card(self) -> Card:
+        """The card found, with the covariance of what was measured; ``card.save("ship.toml")`` writes it.
+
+        Raises
+        ------
+        InputError
+            The derivatives are not those of a ship, or the result was read from its JSON.
+        """
+        if self.reduction is None or self.contents is None:
+            raise InputError(self.study.campaign, "", "was not read with this result", "reduce the campaign again")
+        card = parse_card(
+            reduced_card_text(self.reduction, self.contents, self.study.card_scale or 1.0), "the reduced card"
+        )
+        # Estimates are independent of what was measured.
+        entries, estimated = self.contents.entries, self.contents.estimated
+        names = [name for name in entries if name in self.reduction.derivatives and name not in estimated]
+        matrix = reduction_covariance(self.reduction, names)
+        return replace(card, covariance=Covariance(tuple(f"derivatives.{name}" for name in names), matrix))
+
+    @property
+    def derivatives(self) -> pd.DataFrame:
+        """Derivatives by name: prime value, standard error, origin; rudder positive to starboard."""
+        import pandas as pd
+
+        every = self.study.derivatives | self.study.heel_derivatives
+        rows = [(name, found.value, found.standard_error, found.origin) for name, found in every.items()]
+        return pd.DataFrame(rows, columns=["name", "value", "standard_error", "origin"]).set_index("name")
+
+    @property
+    def budget(self) -> pd.DataFrame:
+        """Uncertainty budget by derivative (ITTC 7.5-02-06-04): share of the variance of each source; prime
+        ``combined`` and ``expanded`` (k = 2) uncertainty."""
+        import pandas as pd
+
+        rows = [
+            {"name": row.name, "value": row.value, "combined": row.combined, "expanded": row.expanded, **row.shares}
+            for row in self.study.uncertainty_budget.derivatives.values()
+        ]
+        return pd.DataFrame(rows).set_index("name")
+
+    @property
+    def title(self) -> str:
+        """The model."""
+        return str(self.study.model["name"])
+
+    @property
+    def subtitle(self) -> str:
+        """What was done."""
+        return "Captive model tests, reduced"
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """The warnings."""
+        return self.study.warnings
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Number of derivatives, errors of predicted runs, and the size of the card."""
+        text = f"{self._measured} of {len(self.study.derivatives)} derivatives are measured"
+        if worst := self._worst_predictions():
+            errors = ", ".join(f"{_FORCES[force]} within {percent:.2g} %" for force, (percent, _) in worst.items())
+            text += f". Each run is predicted from all the others, as a share of the range: {errors}"
+        return (f"{text}.", *self._size())
+
+    @property
+    def _measured(self) -> int:
+        return sum(found.origin == "measured" for found in self.study.derivatives.values())
+
+    def _size(self) -> list[str]:
+        """The size of the card, if the campaign states a ship and the card is of the model."""
+        length, scale = self.study.model["length_m"], self.study.model.get("scale")
+        if self.study.card_scale is not None or not isinstance(scale, float) or not isinstance(length, float):
+            return []
+        return [
+            f"The card is of the model, {length:.4g} m long; --scale ship makes it that of the ship of "
+            f"{length * scale:.4g} m."
+        ]
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Derivatives measured and estimated, errors of predicted runs."""
+        study = self.study
+        estimated = [name for name, found in study.derivatives.items() if found.origin == "estimated"]
+        return [
+            KeyFigure(
+                label="Derivatives measured",
+                value=f"{self._measured} of {len(study.derivatives)}",
+                note=f"by {len(study.runs)} runs; {len(study.not_used)} left out",
+            ),
+            *(
+                KeyFigure(
+                    label=f"{_FORCES[force].capitalize()} predicted within",
+                    value=float(f"{percent:.2g}"),
+                    unit="%",
+                    note=f"of its range, in {kind}, the worst type of run",
+                )
+                for force, (percent, kind) in self._worst_predictions().items()
+            ),
+            KeyFigure(
+                label="Derivatives estimated",
+                value=len(estimated),
+                verdict=Verdict.CAUTION if estimated else Verdict.NONE,
+                note=", ".join(estimated) or "none",
+            ),
+        ]
+
+    def _predictions(self) -> dict[str, dict[str, float]]:
+        """Root mean square error of predicted runs, % of their range, by type of run and force."""
+        return {
+            kind.replace("_", " "): {
+                force: 100 * error.relative for force, error in errors.items() if error.relative == error.relative
+            }
+            for kind, errors in self.study.prediction_errors.items()
+            if any(error.runs >= _FEWEST_RUNS for error in errors.values())
+        }
+
+    def _worst_predictions(self) -> dict[str, tuple[float, str]]:
+        """The largest prediction error of each force, % of its range, and the type of these runs."""
+        found: dict[str, tuple[float, str]] = {}
+        for force in _FORCES:
+            errors = [(percents[force], kind) for kind, percents in self._predictions().items() if force in percents]
+            if errors:
+                found[force] = max(errors)
+        return found
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Derivatives, forces against motion, predicted runs, terms left out, the budget."""
+        title = "Certainty of the derivatives"
+        certainty = Illustration(
+            chart=derivative_certainty_chart(self.study.derivatives, title=title), caption=_CERTAINTY, name="certainty"
+        )
+        return [
+            Section(
+                heading="Derivatives",
+                text="One weighted regression over the whole campaign; in the table, next to it the tests one after "
+                "the other.",
+                tables=[self._derivatives()],
+                charts=[certainty],
+            ),
+            *self._against_motion(),
+            self._predicted(),
+            *self._left_out(),
+            self._budget(),
+        ]
+
+    def _derivatives(self) -> Table:
+        rows: list[list[Cell]] = []
+        for name, found in (self.study.derivatives | self.study.heel_derivatives).items():
+            steps = found.paper_order
+            stepwise: list[Cell] = [None, None, ""]
+            if steps:
+                stepwise = [1e5 * steps.value, 1e5 * steps.standard_error, steps.found_in.replace("_", " ")]
+            rows.append([name, 1e5 * found.value, 1e5 * found.standard_error, *stepwise, found.origin])
+        heads = ("derivative", "whole campaign", "±", "test by test", "±", "from tests", "origin")
+        caption = f"Derivatives from {len(self.study.runs)} runs (prime, times 10⁵, rudder to starboard)"
+        return table(caption, heads, rows)
+
+    def _against_motion(self) -> list[Section]:
+        """A section for each force and its angles and amplitudes, and one for the loops."""
+        loops = "Loops of the oscillating runs"
+        groups: dict[str, list[Illustration]] = {}
+        for stem, plot in self.study.plots.items():
+            words = _FORCES.get(stem.rpartition("_")[2])
+            heading = f"{words.capitalize()} against motion" if words else loops
+            half = isinstance(plot, ForcePlot)
+            groups.setdefault(heading, []).append(Illustration(chart=_plot_chart(plot), half=half, name=stem))
+        return [
+            Section(
+                heading=heading,
+                text="" if heading == loops else _AGAINST_MOTION,
+                charts=charts,
+                folded=heading == loops,
+            )
+            for heading, charts in groups.items()
+        ]
+
+    def _predicted(self) -> Section:
+        residuals = [
+            Residual(run=row.run, kind=row.type.replace("_", " "), force=force, value=-row.error / row.standard_error)
+            for force, rows in self.study.leave_one_out.items()
+            for row in rows
+        ]
+        chart = residual_chart(residuals, title="Each run against its prediction from all the others")
+        rows: list[list[Cell]] = [
+            [kind, *(percents.get(force) for force in _FORCES)] for kind, percents in self._predictions().items()
+        ]
+        excited = [choice.name for choice in self.study.choices if choice.reason == "not excited"]
+        heads = ("runs of type", *(f"{force} (%)" for force in _FORCES))
+        caption = "Leave-one-out: root mean square error of each run predicted from the others, % of the force's range"
+        note = f"Not excited by any run: {', '.join(excited)}"
+        return Section(
+            heading="Each run predicted from the others",
+            tables=[table(caption, heads, rows, note, digits=2)],
+            charts=[Illustration(chart=chart, name="residuals")],
+        )
+
+    def _left_out(self) -> list[Section]:
+        rows: list[list[Cell]] = [
+            [choice.name, choice.reason, choice.explanation]
+            for choice in self.study.choices
+            if choice.reason in _LEFT_OUT
+        ]
+        if not rows:
+            return []
+        found = table("Terms that the runs excite and that were left out", ("term", "reason", "why"), rows)
+        return [Section(heading="Which terms, and why", tables=[found], folded=True)]
+
+    def _budget(self) -> Section:
+        budget = self.study.uncertainty_budget
+        sources: Mapping[str, str] = budget.sources
+        rows: list[list[Cell]] = [
+            [
+                name,
+                1e5 * row.value,
+                *(100 * row.shares[source] for source in sources),
+                1e5 * row.combined,
+                1e5 * row.expanded,
+            ]
+            for name, row in budget.derivatives.items()
+        ]
+        columns = [
+            *(Column(title="derivative"), Column(title="value")),
+            *(Column(title=source, unit="%", digits=3) for source in sources),
+            *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+        ]
+        notes = []
+        if budget.not_stated:
+            notes.append(f"Not stated in [uncertainty], and taken as zero: {', '.join(budget.not_stated)}.")
+        if budget.blockage_speed_relative and "blockage_relative" in budget.not_stated:
+            percent = 100 * budget.blockage_speed_relative
+            notes.append(f"By Schuster's formula the walls raise the speed past the model by {percent:.2g} %.")
+        caption = "Shares of the variance; values and uncertainties prime, times 10⁵"
+        return Section(
+            heading="Uncertainty budget",
+            text="After ITTC 7.5-02-06-04: the combined uncertainty is the standard error of the result.",
+            tables=[
+                table(caption, columns, rows, on_screen=False),
+                table("Sources", ("source", "cause"), [list(pair) for pair in sources.items()], on_screen=False),
+            ],
+            notes=notes,
+            folded=True,
+        )
+
+
+def _plot_chart(plot: ReductionPlot) -> alt.TopLevelMixin:
+    if isinstance(plot, HarmonicsPlot):
+        return harmonic_chart(plot.runs, plot.up, title=plot.title)
+    across = Across(title=plot.across, unit=plot.unit)
+    if isinstance(plot, ForcePlot):
+        return force_chart(plot.series, across, plot.up, title=plot.title)
+    return loop_chart(plot.loops, across, _LOOPS, title=plot.title)

@@ -1,0 +1,79 @@
+"""Results of reduced campaigns: tables and charts hold the numbers of the study."""
+
+from __future__ import annotations
+
+import pytest
+
+import tank2sim as t2s
+from tank2sim.results.mmg_reduction import MmgReductionResult
+from tank2sim.results.reduction import ReductionResult
+from tests.identification.captive.generator import Campaign, write
+from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
+from tests.report.drawn import line, rows_of
+
+
+@pytest.fixture(scope="module")
+def polynomial(tmp_path_factory: pytest.TempPathFactory) -> ReductionResult:
+    path = write(Campaign(seed=6, size="linear", rate_hz=5.0), tmp_path_factory.mktemp("campaign")).path
+    return t2s.reduce(path, fill="clarke1983")
+
+
+@pytest.fixture(scope="module")
+def mmg(tmp_path_factory: pytest.TempPathFactory) -> MmgReductionResult:
+    return t2s.reduce_to_mmg(write_campaign(tmp_path_factory.mktemp("mmg"), KVLCC2))
+
+
+def test_every_derivative_of_the_card_is_in_the_table(polynomial: ReductionResult) -> None:
+    shown = {row[0]: (row[1], row[2], row[-1]) for row in polynomial.sections[0].tables[0].rows}
+    entries, estimated = polynomial.contents.entries, polynomial.contents.estimated
+    assert shown == {
+        name: (1e5 * entry.value, 1e5 * entry.standard_error, "estimated" if name in estimated else "measured")
+        for name, entry in entries.items()
+    }
+    assert estimated and dict(polynomial.card.derivatives) == {name: entry.value for name, entry in entries.items()}
+
+
+def test_charts_have_the_stems_of_their_files_and_the_fits(polynomial: ReductionResult) -> None:
+    charts = polynomial.charts()
+    assert list(charts) == ["certainty", *polynomial.study.plots, "residuals"]
+    (series,) = polynomial.study.plots["static_drift_Y"].series
+    assert line(charts["static_drift_Y"], "v")[: len(series.x)]
+    fitted = {row["v"] for row in rows_of(charts["static_drift_Y"])}
+    assert min(abs(value - series.fit_value.max()) for value in fitted) < 1e-5 * abs(series.fit_value.max())
+    against = [section for section in polynomial.sections if "against motion" in section.heading]
+    assert against and all(section.charts and "95 % band" in section.text for section in against)
+
+
+def test_predicted_runs_are_shares_of_their_range(polynomial: ReductionResult) -> None:
+    (predicted,) = (each for each in polynomial.tables if each.caption.startswith("Leave-one-out"))
+    errors = polynomial.study.prediction_errors["static_drift"]
+    shown = {row[0]: row[1:] for row in predicted.rows}["static drift"]
+    assert shown == pytest.approx([100 * errors[force].relative for force in "XYN"])
+    worst = max(row[2] for row in predicted.rows if row[2] is not None)
+    assert f"sway force within {worst:.2g} %" in polynomial.headline[0]
+
+
+def test_coefficients_and_residuals_of_the_mmg_method_are_tables(mmg: MmgReductionResult) -> None:
+    coefficients, residuals, budget = mmg.tables
+    shown = {row[0]: tuple(row[1:]) for row in coefficients.rows}
+    assert shown.pop("x_R + a_H x_H") == (mmg.study.yaw_arm.value, mmg.study.yaw_arm.standard_error, "measured")
+    assert shown == {
+        name: (found.value, found.standard_error, found.origin) for name, found in mmg.coefficients.items()
+    }
+    assert [row[3] for row in residuals.rows[:5]] == pytest.approx([100 * share for share in mmg.unexplained])
+    assert [row[1] for row in budget.rows if row[0] == "w_P0"] == [100.0]  # no error common to the tests is stated
+
+
+def test_readings_are_drawn_as_computed_over_measured(mmg: MmgReductionResult) -> None:
+    points = rows_of(mmg.charts()["Sway force"])
+    readings = mmg.study.readings["Y"]
+    drawn = {(row["m"], row["c"]) for row in points}
+    assert set(zip(readings.measured.tolist(), readings.computed.tolist(), strict=True)) <= drawn
+
+
+@pytest.mark.parametrize("kind", [pytest.param("polynomial", marks=pytest.mark.slow), "mmg"])
+def test_a_result_read_from_its_json_has_the_same_page(kind: str, request: pytest.FixtureRequest) -> None:
+    result = request.getfixturevalue(kind)
+    again = type(result).read(result.to_dict(), "r.json")
+    assert again.to_dict() == result.to_dict() and again.page() == result.page()
+    assert t2s.make_report(result.to_dict()).page() == result.page()
