@@ -2,7 +2,6 @@
 
 from .answer.parts import Table as Table
 from .answer.result import Result as Result
-from .api.audit import AuditResult as AuditResult
 from .api.audit import audit as audit
 from .api.bridge import PilotCardResult as PilotCardResult
 from .api.bridge import PosterResult as PosterResult
@@ -73,6 +72,7 @@ from .api.yaw import YawResult as YawResult
 from .api.yaw import simulate_yaw as simulate_yaw
 from .api.yaw import yaw as yaw
 from .errors import InputError as InputError
+from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.convention import ConventionResult as ConventionResult

@@ -132,7 +132,7 @@ class Result(ABC, Generic[_S]):
         charts: dict[str, alt.TopLevelMixin] = {}
         for section in self.sections:
             for illustration in section.charts:
-                stem = illustration.name or _slug(illustration.title or section.heading)
+                stem = _slug(illustration.name or illustration.title or section.heading)
                 number = sum(re.fullmatch(rf"{re.escape(stem)}(_\d+)?", name) is not None for name in charts) + 1
                 charts[stem if number == 1 else f"{stem}_{number}"] = illustration.chart
         return charts

@@ -12,6 +12,7 @@ from tank2sim.errors import InputError
 from tank2sim.files import schema_command, schema_name
 
 RESULT_CLASSES: dict[str, tuple[str, ...]] = {
+    "audit": ("results.audit:AuditResult",),
     "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
     "check": ("results.fmu:CheckResult",),
     "convention": ("results.convention:ConventionResult",),

@@ -565,13 +565,6 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-class AuditKeys(_Keys):
-    """What is wrong with the data of trials."""
-
-    findings: list[dict[str, Any]]
-    trials: list[dict[str, Any]]
-
-
 class LogChannelKeys(_Part):
     """A stream and the quantity that it holds."""
 
@@ -956,7 +949,6 @@ class GuessKeys(_Keys):
 
 
 KEYS: dict[str, Any] = {
-    "audit": AuditKeys,
     "compare": CompareKeys,
     "demo": DemoKeys,
     "design": CampaignDesignKeys | TrialDesignKeys,

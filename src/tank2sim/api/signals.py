@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import Table
-from tank2sim.api.audit import MEASURED_SAMPLES
 from tank2sim.api.bounds import PositiveArgument, checked
 from tank2sim.api.result import OldResult, screen_table
 from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
 from tank2sim.arrays import Columns
 from tank2sim.errors import InputError
+from tank2sim.records.audit.study import MEASURED_SAMPLES
 from tank2sim.records.signals.analysis import ColumnAnalysis, SignalSettings, Steering, TrialAnalysis, analyse
 from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns, find_signal

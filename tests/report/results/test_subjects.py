@@ -43,18 +43,6 @@ SIMULATED = {"ship": "A ship", "manoeuvre": "turn:10", "figures": {"advance_m": 
 SIMULATED |= {"histories": HISTORIES}
 TURN = "Turning circle, 10° of rudder to starboard"
 ENSEMBLE = {"members": 5, "t_s": TIMES, "histories": {"u_mps": BAND, "x_m": BAND, "y_m": BAND}, "track": SIDES}
-AUDITED = {
-    "findings": [
-        {"file": "a/turn.csv", "column": "psi [deg]", "what": "2 spikes", "likely_truth": "disturbed readings"}
-        | {"kind": "note", "repaired": True, "evidence": {}, "places_s": [[1.0, 1.0]]},
-        {"file": "a/turn.csv", "column": "t_s", "what": "1 gaps", "likely_truth": "rows were not recorded"}
-        | {"kind": "note", "repaired": False, "evidence": {}, "places_s": [[2.0, 3.0]]},
-    ],
-    "trials": [
-        {"file": "a/turn.csv", "columns": ["psi [deg]", "u_mps"], "notices": []}
-        | {"histories": {key: HISTORIES[key] for key in ("t_s", "psi_deg", "u_mps")}}
-    ],
-}
 VALIDATED = {
     "kind": "validate",
     "ship": "A ship",
@@ -144,19 +132,6 @@ def test_an_older_result_without_histories_still_has_its_page() -> None:
     assert drawn({key: value for key, value in SIMULATED.items() if key != "histories"}) == {}
 
 
-def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of_the_time_in_all() -> None:
-    page = result_page(AUDITED, "audit.json")
-    (chart,) = page.sections[1].charts
-    specification = chart_specification(chart.chart)
-    marked = []
-    for panel in specification["vconcat"]:
-        layers = [layer for layer in panel["layer"] if layer["mark"].get("style") == "region"]
-        rows = [specification["datasets"][layer["data"]["name"]] for layer in layers]
-        marked.append([(row["t"], row["end"], row["text"]) for one in rows for row in one])
-    assert marked == [[(1.0, 1.0, "2 spikes"), (2.0, 3.0, "1 gaps")], [(2.0, 3.0, "1 gaps")]]
-    assert [row[0] for row in page.sections[0].tables[0].rows] == ["psi [deg]", "t_s"]
-
-
 def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -> None:
     charts = drawn(VALIDATED)
     (row,) = (row for row in rows_of(charts["Comparison error and validation uncertainty"].chart) if "e" in row)
@@ -223,7 +198,7 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
     yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
 ) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, yaw, glide]
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, VALIDATED, POSTER, yaw, glide]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

@@ -5,11 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
+from tank2sim.arrays import Number
 from tank2sim.records.trials import Trial
 
 Repair = Callable[[Trial], Trial]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnFinding:
+    """A finding about one column of a file.
+
+    Parameters
+    ----------
+    file, column : str
+    what, likely_truth, kind, evidence, places_s
+        As of :class:`Finding`.
+    repaired : bool
+        Whether the trial is corrected when it is read.
+    """
+
+    file: str
+    column: str
+    what: str
+    likely_truth: str
+    kind: Literal["fault", "note"]
+    repaired: bool
+    evidence: dict[str, Number]
+    places_s: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -62,15 +86,19 @@ class Finding:
         used."""
         return self.kind == "fault" and not (self.safe and self.repair is not None)
 
-    def as_json(self) -> list[dict[str, Any]]:
-        """One entry a column: file, column, what, likely_truth, kind, repaired (by the safe corrections), evidence,
-        places."""
-        content = {
-            "what": self.what,
-            "likely_truth": self.likely_truth,
-            "kind": self.kind,
-            "repaired": self.safe and self.repair is not None,
-            "evidence": dict(self.evidence),
-            "places_s": [list(place) for place in self.places_s],
-        }
-        return [{"file": str(self.source), "column": column, **content} for column in self.columns]
+    @property
+    def entries(self) -> tuple[ColumnFinding, ...]:
+        """The finding for each of its columns."""
+        return tuple(
+            ColumnFinding(
+                file=str(self.source),
+                column=column,
+                what=self.what,
+                likely_truth=self.likely_truth,
+                kind=self.kind,
+                repaired=self.safe and self.repair is not None,
+                evidence=dict(self.evidence),
+                places_s=self.places_s,
+            )
+            for column in self.columns
+        )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from tank2sim.answer.charts.columns import HIGH, LOW, MIDDLE
 from tank2sim.answer.parts import Cell, Column, Section, Table
 from tank2sim.marks import assumed_words
 from tank2sim.report.ensemble.charts import curve_charts
 from tank2sim.report.json_values import Json
-from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
 from tank2sim.units import in_words
 
 BEYOND_CARD_TEXT = "beyond the card"

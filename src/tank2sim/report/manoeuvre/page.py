@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tank2sim.answer.charts.columns import varying_histories
 from tank2sim.answer.charts.manoeuvre import (
     Motion,
     Quantiles,
@@ -24,7 +25,6 @@ from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.marks import assumed_words
 from tank2sim.report.json_values import Json, is_number_value, words
-from tank2sim.report.results.motions import varying_histories
 from tank2sim.simulation.card_range import entry_name, single_figures
 from tank2sim.simulation.figures import zero_rate_rudders
 

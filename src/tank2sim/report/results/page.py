@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.answer.charts.columns import motions
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Illustration, Section, Table
 from tank2sim.answer.study import not_as_written
@@ -31,7 +32,7 @@ from tank2sim.report.json_values import (
 from tank2sim.report.results import charts
 from tank2sim.report.results.headlines import headlines
 from tank2sim.report.results.json_path import drawn_from
-from tank2sim.report.results.motions import is_columns, motions
+from tank2sim.report.results.motions import is_columns
 from tank2sim.report.results.result_types import ResultType, kind_of
 from tank2sim.report.results.subjects import misshapen, render_charts, whole_page
 

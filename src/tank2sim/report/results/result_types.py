@@ -71,7 +71,6 @@ RESULT_TYPES = (
     ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
     ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
-    ResultType("Audit of trials", "audit", ("findings", "trials"), ()),
     ResultType("Underwater glider", "glide", ("glider", "states"), ()),
     ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),

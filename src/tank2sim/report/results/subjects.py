@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
-from tank2sim.report.audit.page import audit_page
 from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.design.page import campaign_design_page, trial_design_page
@@ -57,7 +56,6 @@ _SECTIONS: Mapping[str, _Sections] = {
 }
 
 _PAGES: Mapping[str, _Page] = {
-    "Audit of trials": _Page(audit_page, {"findings": list, "trials": list}),
     "Cards compared": _Page(
         compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),

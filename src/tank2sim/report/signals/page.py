@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 import altair as alt
 
+from tank2sim.answer.charts.columns import measured_histories
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import vector
 from tank2sim.answer.page import Page
@@ -15,7 +16,6 @@ from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.statistics import Stationary
 from tank2sim.report.json_values import Json
-from tank2sim.report.results.motions import measured_histories
 from tank2sim.report.signals.charts import (
     autocorrelation_chart,
     cross_correlation_chart,

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from tank2sim.analysis.validation.study import ComparisonOutcome
+from tank2sim.answer.charts.columns import motions
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
 from tank2sim.report.json_values import Json
-from tank2sim.report.results.motions import motions
 from tank2sim.report.stability.page import imo_section
 from tank2sim.report.validation.charts import COMPARISON_ERRORS, comparison_error_chart
 from tank2sim.units import in_words
