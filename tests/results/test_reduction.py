@@ -65,7 +65,7 @@ def test_coefficients_and_residuals_of_the_mmg_method_are_tables(mmg: MmgReducti
 
 
 def test_readings_are_drawn_as_computed_over_measured(mmg: MmgReductionResult) -> None:
-    points = rows_of(mmg.charts()["Sway force"])
+    points = rows_of(mmg.charts()["sway_force"])
     readings = mmg.study.readings["Y"]
     drawn = {(row["m"], row["c"]) for row in points}
     assert set(zip(readings.measured.tolist(), readings.computed.tolist(), strict=True)) <= drawn

@@ -132,7 +132,7 @@ class Result(ABC, Generic[_S]):
         charts: dict[str, alt.TopLevelMixin] = {}
         for section in self.sections:
             for illustration in section.charts:
-                stem = _slug(illustration.name or illustration.title or section.heading)
+                stem = _slug(illustration.name) or _slug(illustration.title or section.heading).lower()
                 number = sum(re.fullmatch(rf"{re.escape(stem)}(_\d+)?", name) is not None for name in charts) + 1
                 charts[stem if number == 1 else f"{stem}_{number}"] = illustration.chart
         return charts
@@ -214,4 +214,4 @@ class Result(ABC, Generic[_S]):
 
 
 def _slug(words: str) -> str:
-    return re.sub(r"\W+", "_", words.lower()).strip("_")
+    return re.sub(r"\W+", "_", words).strip("_")

@@ -126,9 +126,9 @@ class MmgReductionResult(Result[MmgStudy]):
         known = {name: found for name, found in self.coefficients.items() if found.standard_error and found.value}
         if known:
             title = "Certainty of the coefficients"
-            certainty = [Illustration(chart=derivative_certainty_chart(known, title=title), name=title)]
+            certainty = [Illustration(chart=derivative_certainty_chart(known, title=title))]
         readings = [
-            Illustration(chart=computed_chart(name, readings), half=True, name=_CHANNELS[name].capitalize())
+            Illustration(chart=computed_chart(name, readings), half=True, name=_CHANNELS[name].replace(" ", "_"))
             for name, readings in self.study.readings.items()
         ]
         return [

@@ -77,7 +77,7 @@ class ReducedDerivative(PrimeValue):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conventions:
+class DerivativeConventions:
     """Conventions of the derivatives, as a card states them."""
 
     scaling: str = "prime"
@@ -236,7 +236,7 @@ class ReductionStudy:
         Keys of these sections of the file to values.
     card_scale : float, optional
         Length of the card's ship over that of the model; None: the card is of the model.
-    conventions : Conventions
+    conventions : DerivativeConventions
     rigid_body : ReducedBody
     derivatives : dict
         Derivatives of the card.
@@ -274,7 +274,7 @@ class ReductionStudy:
     model: _SectionValues
     test: _SectionValues
     card_scale: float | None
-    conventions: Conventions
+    conventions: DerivativeConventions
     rigid_body: ReducedBody
     derivatives: dict[str, ReducedDerivative]
     heel_derivatives: dict[str, ReducedDerivative]
@@ -329,7 +329,7 @@ def study_reduction(
         model=campaign.model.model_dump(exclude_none=True),
         test=campaign.test.model_dump(exclude_none=True),
         card_scale=card_scale,
-        conventions=Conventions(speed_mps=campaign.test.speed_mps),
+        conventions=DerivativeConventions(speed_mps=campaign.test.speed_mps),
         rigid_body=ReducedBody(mass=card.mass, yaw_inertia=card.yaw_inertia, x_G=card.x_G),
         derivatives={name: _derivative(reduction, card, name) for name in card.entries},
         heel_derivatives={
