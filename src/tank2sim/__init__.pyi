@@ -20,12 +20,6 @@ from .api.craft_identification import (
 from .api.demo import DemoResult as DemoResult
 from .api.demo import run_demo as run_demo
 from .api.design import (
-    CampaignDesignResult as CampaignDesignResult,
-)
-from .api.design import (
-    TrialDesignResult as TrialDesignResult,
-)
-from .api.design import (
     design_campaign as design_campaign,
 )
 from .api.design import (
@@ -77,6 +71,8 @@ from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
+from .results.design import CampaignDesignResult as CampaignDesignResult
+from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult

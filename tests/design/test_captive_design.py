@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.design import _assumptions, design_campaign
+from tank2sim.api.design import design_campaign
 from tank2sim.cards import read_card
 from tank2sim.design.figure_slopes import (
     both_sides,
@@ -16,6 +16,7 @@ from tank2sim.design.figure_slopes import (
     hydrodynamic_derivatives,
     range_of_figures,
 )
+from tank2sim.design.planning import _assumptions
 from tank2sim.design.tank_form import TankFile
 from tank2sim.errors import InputError
 from tank2sim.marks import CHECK, marked
@@ -145,14 +146,14 @@ def test_the_other_side_of_a_figure_has_the_opposite_rudder():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"hours": -1.0}, "--hours"),
-        pytest.param({"hours": 0.05}, "--hours", marks=pytest.mark.slow),
+        ({"hours": -1.0}, "hours"),
+        pytest.param({"hours": 0.05}, "hours", marks=pytest.mark.slow),
         ({"figures": "advanc@35"}, "advance_m"),
         ({"figures": ""}, "no figure"),
         ({"carriage_length_m": 2.0}, "--carriage-length"),
         ({"carriage_length_m": float("nan")}, "carriage_length_m"),
         ({"model_length_m": 1000.0}, "--model-length"),
-        ({"largest": (12.0, 95.0, 0.5)}, "--largest"),
+        ({"largest": (12.0, 95.0, 0.5)}, "largest"),
         ({"tank": "nowhere.toml"}, "nowhere.toml"),
     ],
 )
@@ -183,7 +184,7 @@ def test_few_hours_are_compared_with_one_whole_usual_matrix_and_marked():
     assert few.design.usual_hours == once.design.usual_hours
     assert few.figures["usual"].to_numpy() == pytest.approx(once.figures["usual"].to_numpy(), rel=1e-9)
     assert few.content()["usual_matrix"]["repeats"] == 1.0
-    assert few.design.curve["usual_hours"] == [few.design.usual_hours]
+    assert few.design.curve.usual_time_s == (3600 * few.design.usual_hours,)
     assert any(text.startswith(CHECK) and "hours" in text for text in marked(few.notices))
     assert not any("too few" in text for text in once.notices)
 

@@ -80,12 +80,12 @@ def test_a_ship_that_is_unstable_on_a_straight_course_is_marked():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        pytest.param({"minutes": 0.01}, "--minutes", marks=pytest.mark.slow),
-        ({"minutes": -5.0}, "--minutes"),
+        pytest.param({"minutes": 0.01}, "minutes", marks=pytest.mark.slow),
+        ({"minutes": -5.0}, "minutes"),
         ({"sensors": {"q_degps": 1.0}}, "q_degps"),
         ({"sensors": {"r_degps": 0.0}}, "r_degps"),
-        ({"sensors": {}}, "--sensors"),
-        ({"figures": "nothing@35"}, "--figures"),
+        ({"sensors": {}}, "sensors"),
+        ({"figures": "nothing@35"}, "figures"),
     ],
 )
 def test_a_trial_that_cannot_be_designed_is_refused(options, words):

@@ -17,6 +17,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "check": ("results.fmu:CheckResult",),
     "convention": ("results.convention:ConventionResult",),
     "convert": ("results.conversion:ConversionResult",),
+    "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),
     "export": ("results.fmu:ExportResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "ships": ("results.ships:ShipsResult",),

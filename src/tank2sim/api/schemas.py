@@ -787,126 +787,6 @@ class YawKeys(_Keys):
     theory: list[dict[str, str | float | None]]
 
 
-class DesignFigureKeys(_Part):
-    """A figure and its standard errors by a design and by the usual programme."""
-
-    value: float
-    design: float
-    usual: float
-    variance_ratio: float
-
-
-class DesignCoefficientKeys(_Part):
-    """A coefficient (prime), its standard errors, and the share of each figure's variance by the design."""
-
-    value: float
-    design: float
-    usual: float
-    share_of_variance: dict[str, float]
-
-
-class CertaintyKeys(_Part):
-    """Standard errors of each figure over the time in the tank."""
-
-    hours: list[float]
-    usual_hours: list[float]
-    design: dict[str, list[JsonNumber]]
-    usual: dict[str, list[JsonNumber]]
-
-
-class PlannedRunKeys(_Part):
-    """A run of a plan; null where a column has no meaning for it."""
-
-    run: int
-    file: str
-    type: str
-    speed_mps: float
-    drift_deg: float
-    rudder_deg: float
-    frequency_radps: JsonNumber
-    period_s: JsonNumber
-    cycles: int | None
-    sway_amplitude_m: JsonNumber
-    yaw_rate_amplitude_degps: JsonNumber
-    heading_amplitude_deg: JsonNumber
-    record_s: float
-    tank_min: float
-    purpose: str
-
-
-class CampaignDesignKeys(_Keys):
-    """A designed captive campaign next to the usual matrix."""
-
-    ship: str
-    kind: str
-    hours: float
-    hours_used: float
-    hours_for_usual_certainty: JsonNumber
-    usual_matrix: dict[str, float]
-    model: dict[str, float]
-    range: dict[str, float]
-    gauges: dict[str, dict[str, JsonNumber]]
-    figures: dict[str, DesignFigureKeys]
-    coefficients: dict[str, DesignCoefficientKeys]
-    not_excited: list[str]
-    certainty: CertaintyKeys
-    runs: list[PlannedRunKeys]
-    notices: list[str]
-
-
-class TrialFigureKeys(_Part):
-    """A figure and its standard errors before a trial, by a design and by the usual set."""
-
-    value: float
-    before: float
-    design: float
-    usual: float
-
-
-class TrialCertaintyKeys(_Part):
-    """Standard errors of each figure over the time of a trial."""
-
-    minutes: list[float]
-    usual_minutes: list[float]
-    design: dict[str, list[JsonNumber]]
-    usual: dict[str, list[JsonNumber]]
-
-
-class UsualSetKeys(_Part):
-    """The usual set of manoeuvres: its time once, its manoeuvres, how often the time has room for it."""
-
-    minutes: float
-    manoeuvres: list[str]
-    repeats: float
-
-
-class TrialManoeuvreKeys(_Part):
-    """A manoeuvre of a designed trial."""
-
-    manoeuvre: str
-    repeats: int
-    duration_s: float
-    total_min: float
-    orders: str
-
-
-class TrialDesignKeys(_Keys):
-    """A designed sea trial next to the usual set of manoeuvres."""
-
-    ship: str
-    kind: str
-    minutes: float
-    minutes_used: float
-    minutes_for_usual_certainty: JsonNumber
-    usual_set: UsualSetKeys
-    sensors: dict[str, float]
-    figures: dict[str, TrialFigureKeys]
-    coefficients: dict[str, dict[str, float]]
-    certainty: TrialCertaintyKeys
-    manoeuvres: list[TrialManoeuvreKeys]
-    notices: list[str]
-
-
 class QuantileKeys(_Part):
     """Quantiles of 5, 50 and 95 %."""
 
@@ -951,7 +831,6 @@ class GuessKeys(_Keys):
 KEYS: dict[str, Any] = {
     "compare": CompareKeys,
     "demo": DemoKeys,
-    "design": CampaignDesignKeys | TrialDesignKeys,
     "gap": GapKeys,
     "glide": GlideKeys,
     "guess": GuessKeys,

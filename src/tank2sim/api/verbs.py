@@ -60,6 +60,8 @@ class Verb:
         Argument to a function that makes its value of the words on the command line.
     choices : mapping
         Argument to the words of its choices.
+    variants : mapping
+        Flag to another verb, which the command calls with this flag in place of the function.
     exit_code : callable
         Of the result: the code with which the command ends.
     """
@@ -69,6 +71,7 @@ class Verb:
     outputs: Sequence[Output] = ()
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
     choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    variants: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     exit_code: Callable[[Any], int] = lambda _: 0
 
 

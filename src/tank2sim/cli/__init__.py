@@ -77,6 +77,7 @@ VERBS = {
     "autopilot": "api.autopilot:autopilot",
     "convention": "api.convention:convention",
     "convert": "api.conversion:convert",
+    "design": "api.design:design_campaign",
 }
 """Commands that are derived from their function."""
 

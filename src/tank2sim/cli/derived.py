@@ -13,12 +13,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import click
+from click.core import ParameterSource
 from docstring_parser import Docstring, DocstringStyle, parse
 
 from tank2sim import arguments
 from tank2sim.api.verbs import Output, Verb
 from tank2sim.cli.options import OutputFile
-from tank2sim.files import JSON, PAGE, PICTURE
+from tank2sim.errors import InputError
+from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled
 from tank2sim.units import in_words
 
 
@@ -77,9 +79,13 @@ def command_of(name: str, verb: Verb) -> click.Command:
         Name of the command.
     verb : Verb
     """
-    documented, helps = _documented(verb.function)
-    own = [parameter for one in _arguments(verb.function) for parameter in _parameters(one, helps, verb)]
-    written = [parameter for output in verb.outputs for parameter in _output_parameters(output)]
+    others = {flag: other.verb for flag, other in verb.variants.items()}  # type: ignore[attr-defined]
+    own: dict[str | None, click.Parameter] = {}
+    for each in (verb, *others.values()):
+        for parameter in _own_parameters(each):
+            own.setdefault(parameter.name, parameter)
+    flags = [_option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.") for flag, other in others.items()]
+    documented, _ = _documented(verb.function)
     main = [] if any(output.option == "-o" for output in verb.outputs) else ["-o"]
     shared = [
         _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page."),
@@ -92,9 +98,29 @@ def command_of(name: str, verb: Verb) -> click.Command:
     text = "\n\n".join(part for part in (documented.short_description, documented.long_description) if part)
 
     def run(**given: Any) -> int:
-        return _run(verb, given)
+        chosen = next((flag for flag in others if given[flag]), "")
+        problem = f"does not go with --{chosen}" if chosen else f"needs {' or '.join(f'--{flag}' for flag in others)}"
+        _refuse_foreign(others.get(chosen, verb), problem, own)
+        return _run(others.get(chosen, verb), given)
 
-    return VerbCommand(name, params=[*own, *written, *shared], callback=run, help=text)
+    return VerbCommand(name, params=[*own.values(), *flags, *shared], callback=run, help=text)
+
+
+def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
+    """Arguments and options of a verb and its outputs."""
+    helps = _documented(verb.function)[1]
+    for one in _arguments(verb.function):
+        yield from _parameters(one, helps, verb)
+    for output in verb.outputs:
+        yield from _output_parameters(output)
+
+
+def _refuse_foreign(verb: Verb, problem: str, known: Mapping[str | None, click.Parameter]) -> None:
+    """Refuse options that were given and that belong to another variant of the command."""
+    context, own = click.get_current_context(), {one.name for one in _own_parameters(verb)}
+    for name, parameter in known.items():
+        if name not in own and context.get_parameter_source(name or "") is ParameterSource.COMMANDLINE:
+            raise InputError(parameter.opts[0], "", problem, "leave it out" if "not" in problem else "add it")
 
 
 def _documented(function: Callable[..., Any]) -> tuple[Docstring, dict[str, str]]:
@@ -155,6 +181,7 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         flags = [f"{option}/--no-{option[2:]}"] if one.default else names
         return [_option(flags, name=one.name, is_flag=True, **shown)]
     if one.name in verb.texts:
+        several = several or any(get_origin(part) is Mapping for part in _parts(kind))
         return [_option(names, name=one.name, multiple=bool(several), metavar=stem.upper(), **shown)]
     metavar = unit.upper().replace("/", "P") if unit else None
     shown["show_default"] = default not in (None, "", ())
@@ -214,6 +241,8 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
     from tank2sim.cli.progress import showing_stages
 
     values, changes = dict(given), given.get("set", ())
+    named = [_value_of(output, values) for output in verb.outputs]
+    refuse_doubled(path for path in (*named, values["page"], values["json"]) if path is not None)
     inputs: list[Path] = []
     with ExitStack() as stack:
         call = _values_for(verb.function, values, verb.texts, changes, inputs)
@@ -222,8 +251,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
         result = verb.function(**call)
         contents: dict[Path, str | bytes] = {}
         for output in verb.outputs:
-            name = "output" if output.option == "-o" else output.option.lstrip("-").replace("-", "_")
-            if (path := values.get(name)) is None:
+            if (path := _value_of(output, values)) is None:
                 continue
             own = {one.name for one, _ in _arguments(output.write) if one.kind is inspect.Parameter.KEYWORD_ONLY}
             options = _values_for(output.write, {name: values[name] for name in own}, {}, (), inputs)
@@ -237,6 +265,13 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
     written = write_outputs(result, contents, inputs, **given_files)
     show_result(result, written, quiet=values["quiet"], verbose=values["verbose"])
     return verb.exit_code(result)
+
+
+def _value_of(output: Output, values: Mapping[str, Any]) -> Path | None:
+    """Where an output goes, if it was asked for."""
+    name = "output" if output.option == "-o" else output.option.lstrip("-").replace("-", "_")
+    path: Path | None = values.get(name)
+    return path
 
 
 def _values_for(

@@ -17,6 +17,7 @@ from tank2sim.design.allocation import Allocation, InformationBlock, target_matr
 from tank2sim.design.captive_information import GaugeErrors, PlannedCampaign
 from tank2sim.design.captive_runs import PlannedRun, RunGroup, TankRuns, time_of
 from tank2sim.design.figure_slopes import FigureSlopes, figure_slopes, hydrodynamic_derivatives, range_of_figures
+from tank2sim.design.study import Certainty, PlannedCoefficient
 from tank2sim.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.equations import candidate_terms
@@ -108,9 +109,9 @@ class CaptiveDesign:
     gauge_shares: Mapping[str, Array]
     beyond_use: Mapping[str, float]
     ratios: Array
-    curve: Mapping[str, object]
+    curve: Certainty
     hours_needed: float | None
-    coefficients: Mapping[str, Mapping[str, object]]
+    coefficients: dict[str, PlannedCoefficient]
     not_excited: tuple[str, ...]
     too_strong: int
 
@@ -403,18 +404,19 @@ class CaptiveDesigner:
         blocks = zip(self.information, self._at_card.blocks, strict=True)
         return {force: Allocation((block,), self._at_card.cost).variances(counts) / total for force, block in blocks}
 
-    def _curve(self, plans: Mapping[float, Array]) -> dict[str, object]:
+    def _curve(self, plans: Mapping[float, Array]) -> Certainty:
         shares = sorted(plans)
         design = np.sqrt([self._at_card.variances(plans[share]) for share in shares])
         usual_s = sorted({max(share * self._budget, self.usual_s) for share in shares})
         usual = np.sqrt([self._at_card.variances(self.usual_counts * each / self.usual_s) for each in usual_s])
         cost = self._targets.cost
-        return {
-            "hours": [float(plans[share] @ cost) / 3600 for share in shares],
-            "usual_hours": [each / 3600 for each in usual_s],
-            "design": {figure.text: design[:, row].tolist() for row, figure in enumerate(self.slopes.figures)},
-            "usual": {figure.text: usual[:, row].tolist() for row, figure in enumerate(self.slopes.figures)},
-        }
+        figures = list(enumerate(self.slopes.figures))
+        return Certainty(
+            time_s=tuple(float(plans[share] @ cost) for share in shares),
+            usual_time_s=tuple(usual_s),
+            design={figure.text: tuple(design[:, row].tolist()) for row, figure in figures},
+            usual={figure.text: tuple(usual[:, row].tolist()) for row, figure in figures},
+        )
 
     def _needed(self, plans: Mapping[float, Array], relaxed: Array) -> float | None:
         """Least hours, to 2 % of all, of a plan with every figure as certain as by the usual matrix."""
@@ -436,9 +438,9 @@ class CaptiveDesigner:
                 low = middle
         return float(found @ self._targets.cost) / 3600
 
-    def _coefficients(self, counts: Array, usual: Array) -> dict[str, dict[str, object]]:
+    def _coefficients(self, counts: Array, usual: Array) -> dict[str, PlannedCoefficient]:
         """Standard errors of the coefficients, and the share of each figure's variance that each would take along."""
-        found: dict[str, dict[str, object]] = {}
+        found: dict[str, PlannedCoefficient] = {}
         totals = self._at_card.variances(counts)
         for (names, _), block in zip(self.information.values(), self._at_card.blocks, strict=True):
             by_plan, by_usual = block.covariance(counts), block.covariance(usual)
@@ -450,12 +452,12 @@ class CaptiveDesigner:
                         shares[figure.text] = float(
                             (by_plan[place] @ slope) ** 2 / (by_plan[place, place] * totals[row])
                         )
-                found[name] = {
-                    "value": self.planned.derivatives.get(name, 0.0),
-                    "design": math.sqrt(by_plan[place, place]),
-                    "usual": math.sqrt(by_usual[place, place]),
-                    "share_of_variance": shares,
-                }
+                found[name] = PlannedCoefficient(
+                    value=self.planned.derivatives.get(name, 0.0),
+                    design=math.sqrt(by_plan[place, place]),
+                    usual=math.sqrt(by_usual[place, place]),
+                    share_of_variance=shares,
+                )
         return found
 
     def _not_excited(self) -> tuple[str, ...]:

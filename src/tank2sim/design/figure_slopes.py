@@ -18,11 +18,9 @@ from tank2sim.cards.writing import TestedRange
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, joint_errors
 from tank2sim.dynamics.effects.derivatives import hydrodynamic
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
-
-FIGURES_OPTION = "--figures"
 
 _LEAST_RANGE = TestedRange(np.radians(4.0), np.radians(10.0), 0.2)
 """Range of the tests where the figures are those of a straight course. Project choice: the smallest angles that gauges
@@ -47,8 +45,8 @@ def figure_of_text(text: str) -> InfluenceFigure:
         if name not in FIGURE_KINDS and key in plain:
             name = plain[key]
     if name not in FIGURE_KINDS and (close := difflib.get_close_matches(name, FIGURE_KINDS, n=1)):
-        raise InputError(FIGURES_OPTION, text, "is not a figure", f"did you mean {close[0]}?")
-    return parse_figure(f"{name}{at}{argument}", FIGURES_OPTION)
+        raise ArgumentError("figures", text, "is not a figure", f"did you mean {close[0]}?")
+    return parse_figure(f"{name}{at}{argument}", "figures")
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +134,7 @@ def figure_slopes(
     if not np.isfinite(at_card).all():
         bad = figures[int(np.flatnonzero(~np.isfinite(at_card).all(axis=1))[0])]
         problem = f"{card.ship.name} shows it without a clean event: it has no slopes"
-        raise InputError(FIGURES_OPTION, bad.text, problem, "ask for another figure, or for another rudder")
+        raise ArgumentError("figures", bad.text, problem, "ask for another figure, or for another rudder")
     free = np.array([parameter.name in known for parameter in study.parameters])
     covariance = np.where(np.outer(free, free), errors.covariance, 0.0)
     rng = np.random.default_rng(seed)

@@ -3,74 +3,64 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import tomlkit
 
 from tank2sim.design.captive_design import CaptiveDesign
 from tank2sim.design.captive_runs import PlannedRun, RunGroup, TankRuns
+from tank2sim.design.study import PlannedManoeuvre, PlannedRow
 from tank2sim.errors import InputError
 from tank2sim.records.campaigns import read_campaign_form
 
-_HEADS = (
-    "run,file,type,speed_mps,drift_deg,rudder_deg,frequency_radps,period_s,cycles,sway_amplitude_m,"
-    "yaw_rate_amplitude_degps,heading_amplitude_deg,record_s,tank_min,purpose"
-)
 
-
-def run_rows(design: CaptiveDesign) -> list[dict[str, object]]:
-    """The runs in their order: the columns of the plan by name, None where a column has no meaning for a run."""
-    rows: list[dict[str, object]] = []
-    checks = {id(test.runs): test.check for test in design.tests}
-    of_run = {id(run): checks[id(test.runs)] for test in design.tests for run in test.runs}
+def run_rows(design: CaptiveDesign) -> tuple[PlannedRow, ...]:
+    """The runs in their order."""
+    rows = []
+    checks = {id(run): test.check for test in design.tests for run in test.runs}
     for number, run in enumerate(design.runs, start=1):
         swings, yaws = run.oscillates, run.oscillates and run.type != "pure_sway"
-        row = {
-            "run": number,
-            "file": f"run_{number:03d}.csv",
-            "type": run.type,
-            "speed_mps": run.speed_mps,
-            "drift_deg": math.degrees(run.drift_rad),
-            "rudder_deg": math.degrees(run.rudder_rad),
-            "frequency_radps": run.frequency_radps if swings else None,
-            "period_s": 2 * math.pi / run.frequency_radps if swings else None,
-            "cycles": run.cycles if swings else None,
-            "sway_amplitude_m": run.sway_amplitude_m if swings else None,
-            "yaw_rate_amplitude_degps": math.degrees(run.velocity) if yaws else None,
-            "heading_amplitude_deg": math.degrees(run.heading_amplitude_rad) if yaws else None,
-            "record_s": run.record_s,
-            "tank_min": run.tank_s / 60,
-            "purpose": "check" if of_run[id(run)] else "figures",
-        }
-        rows.append({key: _rounded(value) for key, value in row.items()})
-    return rows
+        row = PlannedRow(
+            run=number,
+            file=f"run_{number:03d}.csv",
+            type=run.type,
+            speed_mps=_rounded(run.speed_mps),
+            drift_deg=_rounded(math.degrees(run.drift_rad)),
+            rudder_deg=_rounded(math.degrees(run.rudder_rad)),
+            frequency_radps=_rounded(run.frequency_radps) if swings else None,
+            period_s=_rounded(2 * math.pi / run.frequency_radps) if swings else None,
+            cycles=run.cycles if swings else None,
+            sway_amplitude_m=_rounded(run.sway_amplitude_m) if swings else None,
+            yaw_rate_amplitude_degps=_rounded(math.degrees(run.velocity)) if yaws else None,
+            heading_amplitude_deg=_rounded(math.degrees(run.heading_amplitude_rad)) if yaws else None,
+            record_s=_rounded(run.record_s),
+            tank_min=_rounded(run.tank_s / 60),
+            purpose="check" if checks[id(run)] else "figures",
+        )
+        rows.append(row)
+    return tuple(rows)
 
 
-def _rounded(value: object) -> object:
-    return float(f"{value:.6g}") + 0.0 if isinstance(value, float) else value
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}") + 0.0
 
 
-def plan_csv(rows: list[dict[str, object]]) -> str:
-    """The plan as CSV, a row for each run; empty where a column has no meaning for it.
-
-    Parameters
-    ----------
-    rows : list of dict
-        Rows of :func:`run_rows`.
-    """
-    cells = [["" if value is None else f"{value}" for value in row.values()] for row in rows]
-    return "\n".join([_HEADS, *(",".join(row) for row in cells)]) + "\n"
+def plan_csv(rows: Sequence[PlannedRow | PlannedManoeuvre]) -> str:
+    """The plan as CSV, a row for each run or manoeuvre; empty where a column has no meaning for it."""
+    heads = ",".join(field.name for field in fields(rows[0]))
+    cells = [["" if value is None else f"{value}" for value in vars(row).values()] for row in rows]
+    return "\n".join([heads, *map(",".join, cells)]) + "\n"
 
 
-def campaign_template(design: CaptiveDesign, rows: list[dict[str, object]]) -> str:
+def campaign_template(design: CaptiveDesign, rows: Sequence[PlannedRow]) -> str:
     """``campaign.toml`` of the planned runs: it lacks only their files, and what the tank alone knows.
 
     Parameters
     ----------
     design : CaptiveDesign
-    rows : list of dict
-        Rows of :func:`run_rows`.
+    rows : sequence of PlannedRow
     """
     runs, ship, planned = design.tank_runs, design.card.ship, design.planned
     scale = runs.length_m / ship.length_m
@@ -83,7 +73,8 @@ def campaign_template(design: CaptiveDesign, rows: list[dict[str, object]]) -> s
         if (size := getattr(ship, key, None)) is not None:
             model[key] = _rounded(size * scale)
     body = planned.model
-    model |= {"mass_kg": _rounded(body.mass_kg), "yaw_inertia_kgm2": _rounded(body.yaw_inertia_kgm2)}
+    inertia = None if body.yaw_inertia_kgm2 is None else _rounded(body.yaw_inertia_kgm2)
+    model |= {"mass_kg": _rounded(body.mass_kg), "yaw_inertia_kgm2": inertia}
     model["x_G_m"] = _rounded(body.x_G_m)
     if scale < 1:
         model["scale"] = _rounded(1 / scale)
@@ -104,14 +95,15 @@ def campaign_template(design: CaptiveDesign, rows: list[dict[str, object]]) -> s
     return tomlkit.dumps(document)
 
 
-def _sheet(row: Mapping[str, object]) -> dict[str, object]:
-    sheet = {key: row[key] for key in ("file", "type", "drift_deg", "rudder_deg")}
-    if row["frequency_radps"] is not None:
-        sheet["frequency_radps"] = row["frequency_radps"]
-    if row["type"] == "pure_sway":
-        sheet["amplitude_m"] = row["sway_amplitude_m"]
-    elif row["yaw_rate_amplitude_degps"] is not None:
-        sheet["yaw_rate_amplitude_degps"] = row["yaw_rate_amplitude_degps"]
+def _sheet(row: PlannedRow) -> dict[str, object]:
+    sheet: dict[str, object] = {"file": row.file, "type": row.type}
+    sheet |= {"drift_deg": row.drift_deg, "rudder_deg": row.rudder_deg}
+    if row.frequency_radps is not None:
+        sheet["frequency_radps"] = row.frequency_radps
+    if row.type == "pure_sway":
+        sheet["amplitude_m"] = row.sway_amplitude_m
+    elif row.yaw_rate_amplitude_degps is not None:
+        sheet["yaw_rate_amplitude_degps"] = row.yaw_rate_amplitude_degps
     return sheet
 
 

@@ -18,9 +18,10 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.design.allocation import Allocation, InformationBlock, target_matrices
-from tank2sim.design.figure_slopes import FIGURES_OPTION, FigureSlopes, figure_slopes
+from tank2sim.design.figure_slopes import FigureSlopes, figure_slopes
+from tank2sim.design.study import Certainty, PlannedCoefficient
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip
 from tank2sim.gap.outcome.next_test_candidates import Candidate, candidate_manoeuvres, orders_csv
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
@@ -85,8 +86,7 @@ class TrialDesign:
         The usual set, once.
     prior_errors, standard_errors, usual_standard_errors : array (m,)
         Errors of each figure before the trial, after it, and after the usual set in the same time.
-    curve : mapping
-        ``minutes``, ``usual_minutes``, ``design`` and ``usual``: standard errors of each figure over the time.
+    curve : Certainty
     unstable : bool
         The card's ship is unstable on a straight course: its figures are not linear in the coefficients.
     minutes_needed : float or None
@@ -105,10 +105,10 @@ class TrialDesign:
     prior_errors: Array
     standard_errors: Array
     usual_standard_errors: Array
-    curve: Mapping[str, object]
+    curve: Certainty
     unstable: bool
     minutes_needed: float | None
-    coefficients: Mapping[str, Mapping[str, float]]
+    coefficients: dict[str, PlannedCoefficient]
     sensors: Mapping[str, float]
 
     @property
@@ -162,7 +162,7 @@ def design_of_trial(
     if not np.abs(target).max(axis=1).all():
         row = int(np.argmin(np.abs(target).max(axis=1)))
         problem = "does not depend on any coefficient of the card with an error"
-        raise InputError(FIGURES_OPTION, figures[row].text, problem, "state errors in [uncertainty] of the card")
+        raise ArgumentError("figures", figures[row].text, problem, "state errors in [uncertainty] of the card")
     cost = np.array([each.total_s for each in of])
     block = InformationBlock(np.eye(ship.axes.shape[1]), information, target_matrices([row[None] for row in target]))
     every = Allocation((block,), cost)
@@ -231,16 +231,17 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
 
 def _curve(
     slopes: FigureSlopes, every: Allocation, plans: Mapping[float, Array], usual: Array, budget: float
-) -> dict[str, object]:
+) -> Certainty:
     shares = sorted(plans)
     design = np.sqrt([every.variances(plans[share]) for share in shares])
     by_usual = np.sqrt([every.variances(usual * share * budget) for share in shares])
-    return {
-        "minutes": [float(plans[share] @ every.cost) / 60 for share in shares],
-        "usual_minutes": [share * budget / 60 for share in shares],
-        "design": {figure.text: design[:, row].tolist() for row, figure in enumerate(slopes.figures)},
-        "usual": {figure.text: by_usual[:, row].tolist() for row, figure in enumerate(slopes.figures)},
-    }
+    figures = list(enumerate(slopes.figures))
+    return Certainty(
+        time_s=tuple(float(plans[share] @ every.cost) for share in shares),
+        usual_time_s=tuple(share * budget for share in shares),
+        design={figure.text: tuple(design[:, row].tolist()) for row, figure in figures},
+        usual={figure.text: tuple(by_usual[:, row].tolist()) for row, figure in figures},
+    )
 
 
 def _least(targets: Allocation, budget: float, plans: Mapping[float, Array]) -> float | None:
@@ -261,16 +262,14 @@ def _least(targets: Allocation, budget: float, plans: Mapping[float, Array]) -> 
 
 def _coefficients(
     axes: Array, block: InformationBlock, counts: Array, usual: Array, free: Sequence[str], covariance: Array
-) -> dict[str, dict[str, float]]:
+) -> dict[str, PlannedCoefficient]:
     before = np.sqrt(np.diag(covariance))
     design, by_usual = (
         np.sqrt(np.einsum("ij,jk,ik->i", axes, block.covariance(each), axes)) / before for each in (counts, usual)
     )
     return {
-        name.removeprefix("derivatives."): {
-            "standard_error": float(before[place]),
-            "design": float(design[place]),
-            "usual": float(by_usual[place]),
-        }
+        name.removeprefix("derivatives."): PlannedCoefficient(
+            before=float(before[place]), design=float(design[place]), usual=float(by_usual[place])
+        )
         for place, name in enumerate(free)
     }

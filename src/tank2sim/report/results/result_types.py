@@ -57,12 +57,6 @@ RESULT_TYPES = (
         ("straight_run.stable", "straight_run.surge_time_constant_s"),
     ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
-    ResultType(
-        "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)
-    ),
-    ResultType(
-        "Sea trial, designed", "design", ("usual_set", "certainty", "manoeuvres"), ("minutes_for_usual_certainty",)
-    ),
     ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)

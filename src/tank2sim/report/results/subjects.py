@@ -9,7 +9,6 @@ from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
 from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
-from tank2sim.report.design.page import campaign_design_page, trial_design_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.glide.page import glide_page
@@ -92,16 +91,6 @@ _PAGES: Mapping[str, _Page] = {
     "Guessed ship": _Page(
         guess_page,
         {"figures": dict, "dimensions": dict, "parameters": dict, "next_figures": dict, "notices": list},
-    ),
-    "Captive campaign, designed": _Page(
-        campaign_design_page,
-        {"figures": dict, "coefficients": dict, "certainty": dict, "runs": list, "model": dict, "range": dict}
-        | {"notices": list},
-    ),
-    "Sea trial, designed": _Page(
-        trial_design_page,
-        {"figures": dict, "coefficients": dict, "certainty": dict, "manoeuvres": list, "usual_set": dict}
-        | {"notices": list},
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),

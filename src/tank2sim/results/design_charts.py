@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from collections.abc import Sequence
 import altair as alt
 
 from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, data, plain, series_look
-from tank2sim.report.json_values import Json
+from tank2sim.design.study import CampaignStudy, Certainty
 from tank2sim.units import in_words
 
 _WIDTH = 320
@@ -17,20 +18,19 @@ _HEIGHT = 240
 DESIGN, USUAL = "design", "usual"
 
 
-def run_planes(found: Json) -> list[alt.TopLevelMixin]:
+def run_planes(study: CampaignStudy) -> list[alt.TopLevelMixin]:
     """Runs in the plane of drift and rudder, and oscillations in that of frequency and amplitude; areas are numbers of
     runs."""
-    length, steady, swinging = found["model"]["length_m"], Counter[tuple[float, ...]](), Counter[tuple[object, ...]]()
-    for run in found["runs"]:
-        if run["frequency_radps"] is None:
-            steady[run["drift_deg"], run["rudder_deg"]] += 1
-        elif run["type"] == "pure_sway":
-            ratio = run["sway_amplitude_m"] * run["frequency_radps"] / run["speed_mps"]
-            swinging["pure sway (v')", plain(run["frequency_radps"]), plain(ratio)] += 1
-        else:
-            ratio = run["yaw_rate_amplitude_degps"] * 3.14159265 / 180 * length / run["speed_mps"]
-            kind = f"{run['type'].replace('_', ' ')} (r')"
-            swinging[kind, plain(run["frequency_radps"]), plain(ratio)] += 1
+    steady, swinging = Counter[tuple[float, ...]](), Counter[tuple[object, ...]]()
+    for run in study.runs:
+        if run.frequency_radps is None:
+            steady[run.drift_deg, run.rudder_deg] += 1
+            continue
+        kind, ratio = "pure sway (v')", (run.sway_amplitude_m or 0.0) * run.frequency_radps / run.speed_mps
+        if run.type != "pure_sway":
+            kind = f"{run.type.replace('_', ' ')} (r')"
+            ratio = math.radians(run.yaw_rate_amplitude_degps or 0.0) * study.model.length_m / run.speed_mps
+        swinging[kind, plain(run.frequency_radps), plain(ratio)] += 1
     planes: list[alt.TopLevelMixin] = []
     if swinging:
         rows = [{"run": kind, "x": x, "y": y, "runs": count} for (kind, x, y), count in swinging.items()]
@@ -76,16 +76,18 @@ def figure_words(figure: str) -> str:
     return f"{words}, {argument}{'' if '/' in argument else ' deg'}" if argument else words
 
 
-def certainty_charts(found: Json, across: str, unit: str) -> list[alt.TopLevelMixin]:
-    """Standard error of each figure over the time, by the design and by the usual programme."""
-    curve = found["certainty"]
+def certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[alt.TopLevelMixin]:
+    """Standard error of each figure over the time in a unit of so many `seconds`, by both programmes."""
     charts: list[alt.TopLevelMixin] = []
-    for figure in curve[DESIGN]:
+    for figure in curve.design:
         rows = [
-            {"run": kind, "x": plain(x), "y": plain(y)}
-            for kind, times in ((DESIGN, curve[across]), (USUAL, curve[f"usual_{across}"]))
-            for x, y in zip(times, curve[kind][figure], strict=True)
-            if y is not None
+            {"run": kind, "x": plain(time / seconds), "y": plain(error)}
+            for kind, times, errors in (
+                (DESIGN, curve.time_s, curve.design[figure]),
+                (USUAL, curve.usual_time_s, curve.usual[figure]),
+            )
+            for time, error in zip(times, errors, strict=True)
+            if math.isfinite(error)
         ]
         look = series_look([DESIGN, USUAL])
         base = Chart(data(rows)).encode(

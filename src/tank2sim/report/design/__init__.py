@@ -1,1 +1,0 @@
-"""The page of a designed campaign or sea trial."""
