@@ -5,7 +5,6 @@ from .answer.result import Result as Result
 from .api.audit import audit as audit
 from .api.bridge import PilotCardResult as PilotCardResult
 from .api.bridge import PosterResult as PosterResult
-from .api.captive_run import CaptiveRunResult as CaptiveRunResult
 from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import ComparisonResult as ComparisonResult
 from .api.comparison import compare as compare
@@ -77,6 +76,7 @@ from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
+from .results.captive_run import CaptiveRunResult as CaptiveRunResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult

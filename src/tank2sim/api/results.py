@@ -19,6 +19,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "convert": ("results.conversion:ConversionResult",),
     "export": ("results.fmu:ExportResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
+    "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
 }

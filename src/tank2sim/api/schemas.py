@@ -256,62 +256,6 @@ class CraftStabilityKeys(_Keys):
     notices: list[str]
 
 
-class FourierCoefficientKeys(_Part):
-    """A Fourier coefficient of a signal of a captive run."""
-
-    signal: str
-    unit: str
-    order: int
-    cosine: float
-    sine: float
-    cosine_error: JsonNumber
-    sine_error: JsonNumber
-    amplitude: float
-    amplitude_error: JsonNumber
-    phase_rad: float
-    phase_error_rad: JsonNumber
-
-
-class SingleRunKeys(_Part):
-    """A captive run reduced by itself."""
-
-    name: str
-    type: str
-    speed_mps: float
-    frequency_radps: float
-    periods: int
-    readings: int
-    coefficients: list[FourierCoefficientKeys]
-    cycles: dict[str, JsonColumns]
-    residual_rms: dict[str, JsonNumber]
-    derivatives: dict[str, Any] | None
-    history: JsonColumns
-    faults: list[str]
-
-
-class RepeatedCoefficientKeys(_Part):
-    """A Fourier coefficient in repeats of a run."""
-
-    signal: str
-    unit: str
-    order: int
-    part: str
-    values: list[JsonNumber]
-    mean: float
-    deviation: float
-    expected: float
-    chance: JsonNumber
-
-
-class RunKeys(_Keys):
-    """Captive runs reduced by themselves."""
-
-    runs: list[SingleRunKeys]
-    repeats: list[RepeatedCoefficientKeys]
-    inertia_removed: bool
-    notices: list[str]
-
-
 class EstimateKeys(_Part):
     """A coefficient identified from trials, and what was known of it before."""
 
@@ -960,7 +904,6 @@ KEYS: dict[str, Any] = {
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
-    "run": RunKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,
     "stability": StabilityKeys | CraftStabilityKeys,

@@ -63,7 +63,6 @@ RESULT_TYPES = (
     ResultType(
         "Sea trial, designed", "design", ("usual_set", "certainty", "manoeuvres"), ("minutes_for_usual_certainty",)
     ),
-    ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),

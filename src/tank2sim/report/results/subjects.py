@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
-from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.design.page import campaign_design_page, trial_design_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
@@ -105,7 +104,6 @@ _PAGES: Mapping[str, _Page] = {
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),
-    "Captive run": _Page(run_page, {"runs": list, "repeats": list, "notices": list}),
     "Coefficients from trials": _Page(
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}
