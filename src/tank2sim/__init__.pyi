@@ -67,21 +67,21 @@ from .api.trial import read_trial as read_trial
 from .api.turn_tuning import TurnTuningResult as TurnTuningResult
 from .api.validation import ValidationResult as ValidationResult
 from .api.validation import validate as validate
-from .api.yaw import YawResult as YawResult
 from .api.yaw import simulate_yaw as simulate_yaw
 from .api.yaw import yaw as yaw
 from .errors import InputError as InputError
 from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
+from .results.captive_run import CaptiveRunResult as CaptiveRunResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
-from .results.captive_run import CaptiveRunResult as CaptiveRunResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
 from .results.tow import TowResult as TowResult
+from .results.yaw import YawResult as YawResult
 
 __version__: str

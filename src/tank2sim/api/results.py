@@ -22,6 +22,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
+    "yaw": ("results.yaw:YawResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -709,28 +709,6 @@ class ValidateKeys(_Keys):
     notices: list[str]
 
 
-class YawKeys(_Keys):
-    """Added yaw inertia and dissipation from records of a yaw rig, by method."""
-
-    records: list[str]
-    medium: str
-    torque_constant_NmpA: float
-    body_inertia_kgm2: JsonNumber
-    body_inertia_standard_error_kgm2: JsonNumber
-    body_inertia_source: str | None
-    added_inertia_kgm2: dict[str, JsonNumber] | None
-    dissipation_J: dict[str, JsonNumber]
-    methods: dict[str, dict[str, Any]]
-    mirror_difference: list[JsonNumber]
-    histories: dict[str, dict[str, Any]]
-    energy_balance: dict[str, Any]
-    energy_residuals: list[dict[str, str | float]]
-    angle_residual: JsonColumns | None
-    air: dict[str, Any] | None
-    notes: list[str]
-    theory: list[dict[str, str | float | None]]
-
-
 class DesignFigureKeys(_Part):
     """A figure and its standard errors by a design and by the usual programme."""
 
@@ -909,7 +887,6 @@ KEYS: dict[str, Any] = {
     "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
     "validate": ValidateKeys | CraftValidateKeys,
-    "yaw": YawKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 

@@ -67,7 +67,6 @@ RESULT_TYPES = (
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
     ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Underwater glider", "glide", ("glider", "states"), ()),

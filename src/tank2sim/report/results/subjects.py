@@ -23,7 +23,6 @@ from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
-from tank2sim.report.yaw.page import yaw_page
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,6 @@ _PAGES: Mapping[str, _Page] = {
             "imo": list,
             "notices": list,
         },
-    ),
-    "Yaw rig": _Page(
-        yaw_page, {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list, "notes": list}
     ),
     "Underwater glider": _Page(
         glide_page, {"source": str, "states": list, "design": dict, "polar": dict, "notices": list}
