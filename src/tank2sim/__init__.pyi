@@ -33,7 +33,6 @@ from .api.design import (
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
-from .api.glide import GlideResult as GlideResult
 from .api.guess import GuessResult as GuessResult
 from .api.guess import guess as guess
 from .api.identification import IdentificationResult as IdentificationResult
@@ -78,6 +77,7 @@ from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
+from .results.glide import GlideResult as GlideResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult

@@ -18,6 +18,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "convention": ("results.convention:ConventionResult",),
     "convert": ("results.conversion:ConversionResult",),
     "export": ("results.fmu:ExportResult",),
+    "glide": ("results.glide:GlideResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),

@@ -585,26 +585,6 @@ class DemoKeys(_Keys):
     files: list[str]
 
 
-class GlideKeys(_Keys):
-    """Steady glides, the polar, and the path of a programme where one was given."""
-
-    glider: str
-    source: str
-    buoyancy_kg: float
-    states: list[dict[str, bool | float | list[JsonNumber] | None]]
-    design: dict[str, Any]
-    polar: JsonColumns
-    as_printed: NotRequired[list[dict[str, bool | float | list[JsonNumber] | None]]]
-    path: NotRequired[list[dict[str, JsonNumber]]]
-    length_m: NotRequired[JsonNumber]
-    path_histories: NotRequired[JsonColumns]
-    path_as_printed: NotRequired[list[dict[str, JsonNumber]]]
-    path_as_printed_histories: NotRequired[JsonColumns]
-    transient: NotRequired[dict[str, Any]]
-    quasi_steady_error: NotRequired[dict[str, list[dict[str, Any]]]]
-    notices: list[str]
-
-
 class InfluenceKeys(_Keys):
     """Sensitivity of figures to the numbers of a card, in per cent for 10 %; a tuning where one was asked for."""
 
@@ -875,7 +855,6 @@ KEYS: dict[str, Any] = {
     "demo": DemoKeys,
     "design": CampaignDesignKeys | TrialDesignKeys,
     "gap": GapKeys,
-    "glide": GlideKeys,
     "guess": GuessKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 import pytest
 
-from tank2sim.analysis.glide.study import GlideQuestion
-from tank2sim.analysis.glide.study import study as glide_study
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Illustration, Section
-from tank2sim.cards import read_card
 from tank2sim.files import json_text
 from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
@@ -142,17 +138,6 @@ def test_the_turning_circle_of_a_poster_is_drawn_with_the_way_ahead_up() -> None
     assert [(row["x"], row["y"]) for row in track[:3]] == list(zip(WAY["ahead_m"], WAY["starboard_m"], strict=True))
 
 
-@pytest.fixture(scope="module")
-def glide() -> dict[str, Any]:
-    asked = GlideQuestion(angles_rad=(math.radians(-30),))
-    return glide_study(read_card("kulikovsky-velikanov"), asked).as_json()
-
-
-def test_a_glider_has_its_polar(glide: dict[str, Any]) -> None:
-    speeds = line_of(drawn(glide)["Glide polar"], "y")
-    assert speeds == pytest.approx([-climb for climb in glide["polar"]["climb_mps"]], rel=1e-5)
-
-
 @pytest.mark.slow
 def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
     command = "influence mariner --figure criterion_C K_per_s --json i.json --page i.html".split()
@@ -168,8 +153,8 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
-def test_the_charts_of_every_kind_open_without_a_word_in_the_console(glide: dict[str, Any], tmp_path: Any) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, VALIDATED, POSTER, glide]
+def test_the_charts_of_every_kind_open_without_a_word_in_the_console(tmp_path: Any) -> None:
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, VALIDATED, POSTER]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

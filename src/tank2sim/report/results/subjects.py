@@ -11,7 +11,6 @@ from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.design.page import campaign_design_page, trial_design_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
-from tank2sim.report.glide.page import glide_page
 from tank2sim.report.guess.page import guess_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
@@ -70,9 +69,6 @@ _PAGES: Mapping[str, _Page] = {
             "imo": list,
             "notices": list,
         },
-    ),
-    "Underwater glider": _Page(
-        glide_page, {"source": str, "states": list, "design": dict, "polar": dict, "notices": list}
     ),
     "Steering catalogue": _Page(
         steering_catalogue_page,
