@@ -5,7 +5,6 @@ from .answer.result import Result as Result
 from .api.audit import audit as audit
 from .api.bridge import PilotCardResult as PilotCardResult
 from .api.bridge import PosterResult as PosterResult
-from .api.captive_run import CaptiveRunResult as CaptiveRunResult
 from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import ComparisonResult as ComparisonResult
 from .api.comparison import compare as compare
@@ -28,7 +27,6 @@ from .api.design import (
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
-from .api.glide import GlideResult as GlideResult
 from .api.guess import GuessResult as GuessResult
 from .api.guess import guess as guess
 from .api.identification import IdentificationResult as IdentificationResult
@@ -62,22 +60,24 @@ from .api.trial import read_trial as read_trial
 from .api.turn_tuning import TurnTuningResult as TurnTuningResult
 from .api.validation import ValidationResult as ValidationResult
 from .api.validation import validate as validate
-from .api.yaw import YawResult as YawResult
 from .api.yaw import simulate_yaw as simulate_yaw
 from .api.yaw import yaw as yaw
 from .errors import InputError as InputError
 from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
+from .results.captive_run import CaptiveRunResult as CaptiveRunResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
 from .results.design import CampaignDesignResult as CampaignDesignResult
 from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
+from .results.glide import GlideResult as GlideResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
 from .results.tow import TowResult as TowResult
+from .results.yaw import YawResult as YawResult
 
 __version__: str

@@ -36,7 +36,7 @@ def test_a_programme_gives_a_path_and_the_transient_next_to_it(tmp_path) -> None
     found = json.loads((tmp_path / "g.json").read_text())
     last = found["path"][-1]
     assert (last["x_m"], last["y_m"], last["height_m"]) == pytest.approx((119.215, 118.279, -24.432), abs=1e-3)
-    assert len(found["states"]) == 12 and len(found["path_as_printed"]) == 13
+    assert len(found["steps"]) == 12 and len(found["path_as_printed"]) == 13
     assert found["transient"]["distance_m"][6] < 1e-6 < found["transient"]["distance_m"][12] < 10
 
 

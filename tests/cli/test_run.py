@@ -122,12 +122,11 @@ def test_a_motion_that_no_carriage_makes_is_refused(tmp_path, columns, factor, p
 def test_zeros_that_drift_within_the_runs_are_said(tmp_path):
     names = [f"{number}.csv" for number in range(5)]
     files = [oscillation(tmp_path, name) for name in names]
-    steady = [run.reduced for run in reduce_runs(files, type="pure_yaw").runs]
-    assert not list(drifting_zeros(steady))
+    assert not list(drifting_zeros(reduce_runs(files, type="pure_yaw").reduced))
     for file in files:
         table = np.loadtxt(file, delimiter=",", skiprows=1)
         table[:, 4] += 2.0 * table[:, 0] / table[-1, 0]  # X, whose mean is -9 N
         disguised(file, file.name, lambda _, table=table: table)
-    (message,) = drifting_zeros([run.reduced for run in reduce_runs(files, type="pure_yaw").runs])
+    (message,) = drifting_zeros(reduce_runs(files, type="pure_yaw").reduced)
     assert "X gauge" in message
     assert float(re.search(r"by (\S+) N ", message)[1]) == pytest.approx(2.0 * 4 / 4.3, rel=0.05)  # over whole periods

@@ -91,12 +91,13 @@ class Result(ABC, Generic[_S]):
 
     def __getattr__(self, name: str) -> Any:
         """`ship`: the :class:`tank2sim.Ship` of the card found, of a result that has a `card`."""
-        if name != "ship" or (card := self.__dict__.get("card")) is None:
+        if name != "ship" or (card := getattr(self, "card", None)) is None:
             raise AttributeError(f"{type(self).__name__} has no {name}")
         return importlib.import_module("tank2sim.api.ship").Ship(card)  # the API is above this room
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *(["ship"] if self.__dict__.get("card") else [])]
+        found_on_demand = getattr(type(self), "card", None) is not None
+        return [*super().__dir__(), *(["ship"] if found_on_demand or self.__dict__.get("card") else [])]
 
     @property
     def tables(self) -> tuple[Table, ...]:

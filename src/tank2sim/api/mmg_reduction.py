@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from tank2sim.api.bounds import checked
-from tank2sim.api.ship import Ship
 from tank2sim.identification.captive_mmg.regression import fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tank2sim.identification.captive_mmg.study import mmg_card, study_mmg
@@ -31,5 +30,4 @@ def reduce_to_mmg(campaign: str | Path) -> MmgReductionResult:
         A file is missing or at fault, the tests do not show hull or rudder, or the method does not describe a channel.
     """
     fit = fit_mmg(read_steady_tests(Path(campaign)))
-    study, card = study_mmg(fit), mmg_card(fit)
-    return MmgReductionResult(study, fit, card, Ship(card))
+    return MmgReductionResult(study_mmg(fit), fit, mmg_card(fit))

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from tank2sim.api.bounds import checked
-from tank2sim.api.ship import Ship
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign
@@ -71,11 +70,7 @@ def reduce(
     contents = card_contents(reduction, fill)
     fillings = _fill_notices(contents, fill, ratio, read)
     warnings = (*reduction_findings(reduction), *fillings, *_heel_notices(reduction))
-    found = ReductionResult(study_reduction(reduction, contents, warnings, ratio), reduction, contents)
-    try:
-        return replace(found, ship=Ship(found.card))
-    except InputError:
-        return found
+    return ReductionResult(study_reduction(reduction, contents, warnings, ratio), reduction, contents)
 
 
 def _ratio(campaign: Campaign, given: float | str | None) -> float | None:

@@ -19,9 +19,12 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "convert": ("results.conversion:ConversionResult",),
     "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),
     "export": ("results.fmu:ExportResult",),
+    "glide": ("results.glide:GlideResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
+    "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
+    "yaw": ("results.yaw:YawResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -256,62 +256,6 @@ class CraftStabilityKeys(_Keys):
     notices: list[str]
 
 
-class FourierCoefficientKeys(_Part):
-    """A Fourier coefficient of a signal of a captive run."""
-
-    signal: str
-    unit: str
-    order: int
-    cosine: float
-    sine: float
-    cosine_error: JsonNumber
-    sine_error: JsonNumber
-    amplitude: float
-    amplitude_error: JsonNumber
-    phase_rad: float
-    phase_error_rad: JsonNumber
-
-
-class SingleRunKeys(_Part):
-    """A captive run reduced by itself."""
-
-    name: str
-    type: str
-    speed_mps: float
-    frequency_radps: float
-    periods: int
-    readings: int
-    coefficients: list[FourierCoefficientKeys]
-    cycles: dict[str, JsonColumns]
-    residual_rms: dict[str, JsonNumber]
-    derivatives: dict[str, Any] | None
-    history: JsonColumns
-    faults: list[str]
-
-
-class RepeatedCoefficientKeys(_Part):
-    """A Fourier coefficient in repeats of a run."""
-
-    signal: str
-    unit: str
-    order: int
-    part: str
-    values: list[JsonNumber]
-    mean: float
-    deviation: float
-    expected: float
-    chance: JsonNumber
-
-
-class RunKeys(_Keys):
-    """Captive runs reduced by themselves."""
-
-    runs: list[SingleRunKeys]
-    repeats: list[RepeatedCoefficientKeys]
-    inertia_removed: bool
-    notices: list[str]
-
-
 class EstimateKeys(_Part):
     """A coefficient identified from trials, and what was known of it before."""
 
@@ -641,26 +585,6 @@ class DemoKeys(_Keys):
     files: list[str]
 
 
-class GlideKeys(_Keys):
-    """Steady glides, the polar, and the path of a programme where one was given."""
-
-    glider: str
-    source: str
-    buoyancy_kg: float
-    states: list[dict[str, bool | float | list[JsonNumber] | None]]
-    design: dict[str, Any]
-    polar: JsonColumns
-    as_printed: NotRequired[list[dict[str, bool | float | list[JsonNumber] | None]]]
-    path: NotRequired[list[dict[str, JsonNumber]]]
-    length_m: NotRequired[JsonNumber]
-    path_histories: NotRequired[JsonColumns]
-    path_as_printed: NotRequired[list[dict[str, JsonNumber]]]
-    path_as_printed_histories: NotRequired[JsonColumns]
-    transient: NotRequired[dict[str, Any]]
-    quasi_steady_error: NotRequired[dict[str, list[dict[str, Any]]]]
-    notices: list[str]
-
-
 class InfluenceKeys(_Keys):
     """Sensitivity of figures to the numbers of a card, in per cent for 10 %; a tuning where one was asked for."""
 
@@ -765,28 +689,6 @@ class ValidateKeys(_Keys):
     notices: list[str]
 
 
-class YawKeys(_Keys):
-    """Added yaw inertia and dissipation from records of a yaw rig, by method."""
-
-    records: list[str]
-    medium: str
-    torque_constant_NmpA: float
-    body_inertia_kgm2: JsonNumber
-    body_inertia_standard_error_kgm2: JsonNumber
-    body_inertia_source: str | None
-    added_inertia_kgm2: dict[str, JsonNumber] | None
-    dissipation_J: dict[str, JsonNumber]
-    methods: dict[str, dict[str, Any]]
-    mirror_difference: list[JsonNumber]
-    histories: dict[str, dict[str, Any]]
-    energy_balance: dict[str, Any]
-    energy_residuals: list[dict[str, str | float]]
-    angle_residual: JsonColumns | None
-    air: dict[str, Any] | None
-    notes: list[str]
-    theory: list[dict[str, str | float | None]]
-
-
 class QuantileKeys(_Part):
     """Quantiles of 5, 50 and 95 %."""
 
@@ -832,20 +734,17 @@ KEYS: dict[str, Any] = {
     "compare": CompareKeys,
     "demo": DemoKeys,
     "gap": GapKeys,
-    "glide": GlideKeys,
     "guess": GuessKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
-    "run": RunKeys,
     "signals": SignalsKeys,
     "simulate": SimulateKeys,
     "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
     "validate": ValidateKeys | CraftValidateKeys,
-    "yaw": YawKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from tank2sim.answer.result import Result
     from tank2sim.api.bridge import PilotCardResult, PosterResult
     from tank2sim.api.craft_stability import CraftStabilityResult
-    from tank2sim.api.glide import GlideResult
     from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.manoeuvre import ManoeuvreResult
     from tank2sim.api.stability import StabilityResult
@@ -47,6 +46,7 @@ if TYPE_CHECKING:
     from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.dynamics.model import Model
     from tank2sim.results.fmu import ExportResult
+    from tank2sim.results.glide import GlideResult
     from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
 

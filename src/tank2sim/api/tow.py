@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from numpy.polynomial import Polynomial
 
 from tank2sim.api.bounds import NumberArgument, checked
-from tank2sim.api.ship import Ship
 from tank2sim.errors import InputError
 from tank2sim.identification.tow.identify import TOW_METHODS, identify_tow, parse_terms
 from tank2sim.identification.tow.output_error import TowOptions
@@ -79,8 +77,4 @@ def tow(
     result = identify_tow(read, force, mass_kg, terms=chosen, options=TowOptions(start_delay, total_mass_kg))
     size = {"length_m": length_m, "beam_m": beam_m, "volume_m3": volume_m3}
     study = study_tows(result, read, towed_body(read, result.mass_kg, size))
-    found = TowResult(study, method, name or read.path.stem)
-    try:
-        return replace(found, ship=Ship(found.card))
-    except InputError:
-        return found
+    return TowResult(study, method, name or read.path.stem)

@@ -3,202 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from tank2sim.answer.parts import Table
-from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument, checked
-from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.cards import Card, YawRigCard, parse_card
-from tank2sim.dynamics.yaw_theory import FloatingBody, TheoryValue, theory_values
+from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument, checked
+from tank2sim.cards import Card, YawRigCard
+from tank2sim.dynamics.yaw_theory import FloatingBody, theory_values
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
-from tank2sim.identification.yaw.card import (
-    BEST,
-    body_length,
-    known_added_inertia,
-    nrdot_prime,
-    rig_card_text,
-    tank_density,
-    with_nrdot,
-)
+from tank2sim.identification.yaw.card import BEST
 from tank2sim.identification.yaw.identify import (
     YAW_METHODS,
-    YawIdentification,
     YawOptions,
     identify_yaw,
     parse_yaw_terms,
     torque_constant,
 )
+from tank2sim.identification.yaw.study import study_yaw
 from tank2sim.records.yaw import Medium, read_yaw_record, yaw_record_text
 from tank2sim.records.yaw_programme import Similarity, YawProgramme, programme_of
+from tank2sim.results.yaw import YawResult
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller
-
-if TYPE_CHECKING:
-    import altair as alt
-    import pandas as pd
 
 CONTROLLERS: dict[str, Controller | None] = {"tuned": None, "adaptive": AdaptiveController()}
 """Names of the controllers (4), from the right inertia, and (6)."""
-
-
-class YawResult(OldResult):
-    """Added yaw inertia and dissipation of a body on the yaw rig, SI.
-
-    Parameters
-    ----------
-    identification : YawIdentification
-    method : str
-        Method whose numbers a card gets.
-    rig : YawRigCard, optional
-        What is known of the rig.
-    theory : sequence of TheoryValue
-        Added inertia from the form of the body.
-    """
-
-    command = "yaw"
-
-    def __init__(
-        self,
-        identification: YawIdentification,
-        method: str = BEST,
-        rig: YawRigCard | None = None,
-        theory: Sequence[TheoryValue] = (),
-    ) -> None:
-        self.identification, self.method, self.rig, self.theory = identification, method, rig, tuple(theory)
-        self.notices = identification.notes
-
-    @property
-    def estimates(self) -> pd.DataFrame:
-        """Estimates by method (index) with their standard errors: inertias in kg m2, dissipation B + D in J.
-
-        ``added_inertia_kgm2`` is missing where J_zz is not known; ``total_inertia_kgm2`` is J_zz + lambda661.
-        """
-        import pandas as pd
-
-        rows = []
-        for method, estimate in self.identification.estimates.items():
-            added, error = self.identification.added_inertia(method) or (None, None)
-            total = estimate.total_inertia_kgm2, estimate.inertia_error_kgm2
-            rows.append((method, added, error, *total, estimate.dissipation_J, estimate.dissipation_error_J))
-        names = ("added_inertia", "total_inertia", "dissipation")
-        units = ("kgm2", "kgm2", "J")
-        columns = [
-            f"{name}{error}_{unit}"
-            for name, unit in zip(names, units, strict=True)
-            for error in ("", "_standard_error")
-        ]
-        return pd.DataFrame(rows, columns=["method", *columns]).set_index("method")
-
-    @property
-    def added_inertia_kgm2(self) -> float | None:
-        """lambda661 by :attr:`method`; None where J_zz is not known."""
-        found = self.identification.added_inertia(self._known_method())
-        return found[0] if found else None
-
-    def nrdot(self, length_m: float | None = None) -> tuple[float, float | None]:
-        """N_rdot' (prime) of the body and its standard error.
-
-        Parameters
-        ----------
-        length_m : float, optional
-            Length of the body; by default as the records state.
-
-        Raises
-        ------
-        InputError
-            The added inertia or the length is not known, or the added inertia is negative.
-        """
-        found, method = self.identification, self._known_method()
-        known_added_inertia(found, method)  # before the length: without it no length helps
-        return nrdot_prime(found, method, body_length(found, length_m), tank_density(found))
-
-    def with_nrdot(self, card: Ship | Card | str | Path, length_m: float | None = None) -> Ship:
-        """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
-
-        Parameters
-        ----------
-        card : Ship, Card, str or path
-        length_m : float, optional
-            As in :meth:`nrdot`.
-
-        Raises
-        ------
-        InputError
-            As :meth:`nrdot`, or the card is not one of a ship that manoeuvres.
-        """
-        ship = as_ship(card).manoeuvring()
-        self.nrdot(length_m)
-        length = body_length(self.identification, length_m)
-        return Ship(with_nrdot(ship, self.identification, self._known_method(), length))
-
-    def rig_card(self, name: str = "yaw rig") -> Card:
-        """The card of the rig with its body, called `name`.
-
-        Raises
-        ------
-        InputError
-            The method gives no friction, or the added inertia is not known or negative.
-        """
-        found, method = self.identification, self._known_method()
-        source = f"tank2sim yaw {' '.join(record.path.name for record in found.records)}, method {method}"
-        known = self.rig.yaw_rig if self.rig else None
-        return parse_card(rig_card_text(found, method, name=name, source=source, known=known), "the card found")
-
-    def content(self) -> Mapping[str, object]:
-        """As :meth:`.OldResult.content`."""
-        return {**self.identification.as_json(), "theory": [asdict(value) for value in self.theory]}
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """None: the tables say it."""
-        return ()
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """Estimates by method, friction and water, and the theory if it was asked for."""
-        found = self.identification
-        rows = [
-            [
-                method.replace("_", " "),
-                _with_error(*(found.added_inertia(method) or (None, None))),
-                _with_error(estimate.total_inertia_kgm2, estimate.inertia_error_kgm2),
-                _with_error(estimate.dissipation_J, estimate.dissipation_error_J),
-            ]
-            for method, estimate in found.estimates.items()
-        ]
-        names = ", ".join(record.path.name for record in found.records)
-        body = f"; J_zz = {1e4 * found.body.value_kgm2:.5g}e-4 kg m2 ({found.body.source})" if found.body else ""
-        title = f"{names}: in {found.medium}, k_t = {found.torque_constant_NmpA:.4g} N m/A{body}"
-        columns = ("", "added inertia, 1e-4 kg m2", "total, 1e-4 kg m2", "B + D, 1e-4 J")
-        friction = next(iter(found.estimates.values())).friction
-        terms = [[term.replace("_", " "), _with_error(*value)] for term, value in friction.items()]
-        tables = [
-            screen_table(title, columns, rows),
-            screen_table("Friction and water, by energy least squares", ("", "1e-4 SI"), terms),
-        ]
-        if self.theory:
-            values: list[list[object]] = [
-                [each.formula, 1e4 * each.value_kgm2, each.printed_kgm2 and 1e4 * each.printed_kgm2, each.remark]
-                for each in self.theory
-            ]
-            columns = ("", "added inertia, 1e-4 kg m2", "published, Table 1", "remark")
-            tables.append(screen_table("From the form, by (7), (8) and (9) of Alyshev (2019)", columns, values))
-        return tuple(tables)
-
-    def charts(self) -> dict[str, alt.TopLevelMixin]:
-        """Charts of the page: estimates, energy balance, records, residuals."""
-        return section_charts(self.layout().sections)
-
-    def _known_method(self) -> str:
-        known = self.identification.estimates
-        if self.method not in known:
-            problem = f"{self.method} gave no estimate from these records"
-            raise InputError("--method", "", problem, f"take one of {', '.join(known)}")
-        return self.method
 
 
 @checked
@@ -276,7 +105,7 @@ def yaw(
     paths = [records] if isinstance(records, str | Path) else records
     found = identify_yaw([read_yaw_record(path) for path in paths], options)
     values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
-    return YawResult(found, method, known, values)
+    return YawResult(study_yaw(found, values), method, found, known, as_ship)
 
 
 @checked
@@ -372,11 +201,3 @@ def _floating_body(text: str) -> FloatingBody:
     length, beam, draught, depth = (size or 0.0 for size in sizes[:4])
     block = sizes[4] if len(sizes) > 4 else None
     return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)
-
-
-def _with_error(value: float | None, error: float | None) -> str:
-    """A value and its standard error, in units of 1e-4."""
-    if value is None:
-        return "-"
-    spread = "" if error is None else f" ± {float(f'{1e4 * error:.2g}'):g}"
-    return f"{1e4 * value:.5g}{spread}"

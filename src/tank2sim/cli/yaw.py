@@ -10,7 +10,7 @@ import click
 
 from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument
 from tank2sim.api.ship import load
-from tank2sim.api.yaw import CONTROLLERS, YawResult, simulate_yaw
+from tank2sim.api.yaw import CONTROLLERS, simulate_yaw
 from tank2sim.api.yaw import yaw as identify_yaw
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
@@ -20,6 +20,7 @@ from tank2sim.identification.yaw.card import BEST
 from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.records.yaw import Medium, read_yaw_record
+from tank2sim.results.yaw import YawResult
 
 _POSITIVE = number(PositiveArgument)
 

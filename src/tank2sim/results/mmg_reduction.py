@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import altair as alt
 
@@ -42,14 +42,11 @@ class MmgReductionResult(Result[MmgStudy]):
         None, as card and ship, if the result was read from its JSON.
     card : Card, optional
         The MMG card found, with the covariance of its coefficients; ``card.save("ship.toml")`` writes it.
-    ship : Ship, optional
-        The ship of the card.
     """
 
     study: MmgStudy
     fit: MmgFit | None = None
     card: Card | None = None
-    ship: Any = None
     command: ClassVar[str] = "reduce"
 
     @property

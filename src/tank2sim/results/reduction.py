@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import altair as alt
 
@@ -54,14 +54,11 @@ class ReductionResult(Result[ReductionStudy]):
         None if the result was read from its JSON.
     contents : Contents, optional
         Contents of the card: what was measured, and what was taken from published estimates.
-    ship : Ship, optional
-        The ship of the card found; None if no card can be made of the derivatives.
     """
 
     study: ReductionStudy
     reduction: Reduction | None = None
     contents: Contents | None = None
-    ship: Any = None
     command: ClassVar[str] = "reduce"
 
     @cached_property

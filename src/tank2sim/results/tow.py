@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import (
@@ -71,14 +71,11 @@ class TowResult(Result[TowStudy]):
         Method whose numbers the card gets.
     name : str
         Name of the body on the card.
-    ship : Ship, optional
-        The body of the card found; None if the estimates are not those of a body, or the result was read from its JSON.
     """
 
     study: TowStudy
     wanted: str = "output_error"
     name: str = "body"
-    ship: Any = None
     command: ClassVar[str] = "tow"
 
     @property

@@ -25,7 +25,7 @@ def test_coefficients_without_noise_are_exact(tmp_path):
             assert found.unit == ("N m" if force == "N" else "N")
     assert run.coefficient("r", 1).cosine == pytest.approx(RATE, rel=1e-7)
     assert run.coefficient("speed", 0).cosine == pytest.approx(SPEED)
-    assert run.reduced.motion.frequency_radps == pytest.approx(FREQUENCY, rel=1e-6)
+    assert run.frequency_radps == pytest.approx(FREQUENCY, rel=1e-6)
 
 
 def test_amplitude_and_phase_are_those_of_the_coefficients(tmp_path):
@@ -99,7 +99,7 @@ def test_the_inertia_of_the_model_is_removed_with_a_campaign(tmp_path):
     (run,) = t2s.reduce_runs(file, campaign=made.path).runs
     ship, d = made.ship, made.derivatives
     q, length, speed = ship.force_N, ship.length_m, ship.speed_mps
-    rate, omega = run.coefficient("r", 1).cosine, run.reduced.motion.frequency_radps
+    rate, omega = run.coefficient("r", 1).cosine, run.frequency_radps
     assert run.coefficient("N_water", 1).cosine == pytest.approx(q * length * d["Nr"] * rate * length / speed, rel=1e-4)
     acceleration = -rate * omega * length**2 / speed**2
     assert run.coefficient("N_water", 1).sine == pytest.approx(q * length * d["Nrdot"] * acceleration, rel=1e-3)
@@ -122,7 +122,7 @@ def test_the_inertia_of_the_model_is_removed_with_a_campaign(tmp_path):
 )
 def test_every_type_of_run_is_reduced(made_campaign, name, type_name, kind):
     (run,) = t2s.reduce_runs(made_campaign.path.parent / name, type=type_name, campaign=made_campaign.path).runs
-    assert run.reduced.run.type == kind
+    assert run.type == kind
     assert not run.faults
     assert bool(run.cycles) == kind.startswith(("pure", "yaw"))
 

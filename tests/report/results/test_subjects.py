@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 import pytest
 
-from tank2sim.analysis.glide.study import GlideQuestion
-from tank2sim.analysis.glide.study import study as glide_study
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Illustration, Section
-from tank2sim.cards import read_card
 from tank2sim.files import json_text
-from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
-from tank2sim.records.yaw import read_yaw_record
 from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
 from tests.report.drawn import line, panels, rows_of
 from tests.report.opened_page import CHROMIUM, opened
-from tests.yaw_truth import Truth, record, written
 
 TIMES = [0.0, 1.0, 2.0, 3.0]
 HISTORIES = {
@@ -145,41 +138,6 @@ def test_the_turning_circle_of_a_poster_is_drawn_with_the_way_ahead_up() -> None
     assert [(row["x"], row["y"]) for row in track[:3]] == list(zip(WAY["ahead_m"], WAY["starboard_m"], strict=True))
 
 
-@pytest.fixture(scope="module")
-def yaw(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    truth = Truth(humps=1)
-    path = written(tmp_path_factory.mktemp("yaw") / "water.csv", truth, record(truth))
-    return identify_yaw([read_yaw_record(path)], YawOptions(inertia_kgm2=0.0204)).as_json()
-
-
-def test_the_yaw_rig_has_estimates_balance_residuals_and_records(yaw: dict[str, Any]) -> None:
-    charts = drawn(yaw)
-    assert list(charts)[:4] == [
-        "Added inertia by method",
-        "Work of the motor, and what it goes into",
-        "Residuals of the energy balance",
-        "water.csv: programme and record",
-    ]
-    rows = [row for row in rows_of(charts["Residuals of the energy balance"].chart) if "hump" in row]
-    assert [row["v"] for row in rows] == pytest.approx(
-        [1e6 * one["left_J"] for one in yaw["energy_residuals"]], rel=1e-5
-    )
-    estimates = {row["name"]: row["v"] for row in rows_of(charts["Added inertia by method"].chart) if "name" in row}
-    for method, value in yaw["added_inertia_kgm2"].items():
-        assert estimates[method.replace("_", " ")] == pytest.approx(1e4 * value, rel=1e-5)
-
-
-@pytest.fixture(scope="module")
-def glide() -> dict[str, Any]:
-    asked = GlideQuestion(angles_rad=(math.radians(-30),))
-    return glide_study(read_card("kulikovsky-velikanov"), asked).as_json()
-
-
-def test_a_glider_has_its_polar(glide: dict[str, Any]) -> None:
-    speeds = line_of(drawn(glide)["Glide polar"], "y")
-    assert speeds == pytest.approx([-climb for climb in glide["polar"]["climb_mps"]], rel=1e-5)
-
-
 @pytest.mark.slow
 def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
     command = "influence mariner --figure criterion_C K_per_s --json i.json --page i.html".split()
@@ -195,10 +153,8 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
-def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
-    yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
-) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, VALIDATED, POSTER, yaw, glide]
+def test_the_charts_of_every_kind_open_without_a_word_in_the_console(tmp_path: Any) -> None:
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, VALIDATED, POSTER]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

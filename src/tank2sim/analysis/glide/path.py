@@ -78,29 +78,9 @@ class GlidePath:
         return np.array(rows)
 
     def histories(self) -> Columns:
-        """The path in points dense enough for a chart, for JSON."""
+        """Columns of the path in points dense enough for a chart: ``t_s``, ``x_m``, ``y_m``, ``height_m``."""
         rows = self.sampled()
         return drawn_columns({name: rows[:, k] for k, name in enumerate(("t_s", "x_m", "y_m", "height_m"))}, len(rows))
-
-    def states_as_json(self) -> list[dict[str, object]]:
-        """The glide of each step for JSON, with its duration."""
-        return [
-            {"duration_s": duration, **glide.as_json()}
-            for duration, glide in zip(self.durations_s, self.glides, strict=True)
-        ]
-
-    def as_json(self) -> list[dict[str, object]]:
-        """The places for JSON; the heading in degrees."""
-        return [
-            {
-                "t_s": place.time_s,
-                "x_m": place.north_m,
-                "y_m": place.east_m,
-                "height_m": place.height_m,
-                "heading_deg": math.degrees(place.heading_rad),
-            }
-            for place in self.places
-        ]
 
 
 def fly(card: GliderCard, programme: GlideProgramme, *, as_printed: bool = False) -> GlidePath:

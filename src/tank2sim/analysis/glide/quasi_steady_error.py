@@ -31,7 +31,7 @@ _PITCH, _ROLL, _BUOYANCY = math.radians(3.0), math.radians(2.0), 0.2
 """Amplitudes of the oscillations, the last as a share of the net buoyancy: project choice, within small incidences."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SwingError:
     """Effect of inertia in a kind of oscillation.
 
@@ -49,10 +49,6 @@ class SwingError:
     label: str
     period_s: Array
     share: Array
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return dict(vars(self))
 
 
 @dataclass(frozen=True)

@@ -83,26 +83,6 @@ class SteadyGlide:
         """v sin(epsilon), + up."""
         return self.speed_mps * math.sin(self.path_angle_rad)
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form: angles in degrees; an infinite radius is null."""
-        return {
-            "path_angle_deg": math.degrees(self.path_angle_rad),
-            "pitch_deg": math.degrees(self.pitch_rad),
-            "incidence_deg": math.degrees(self.incidence_rad),
-            "roll_deg": math.degrees(self.roll_rad),
-            "buoyancy_kg": self.buoyancy_kg,
-            "speed_mps": self.speed_mps,
-            "horizontal_speed_mps": self.horizontal_speed_mps,
-            "climb_mps": self.climb_mps,
-            "lift_coefficient": self.lift_coefficient,
-            "drag_coefficient": self.drag_coefficient,
-            "lift_N": self.lift_N,
-            "drag_N": self.drag_N,
-            "turning_radius_m": self.turning_radius_m if math.isfinite(self.turning_radius_m) else None,
-            "turn_rate_degps": math.degrees(self.turn_rate_radps),
-            "as_printed": self.as_printed,
-        }
-
 
 def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
     """m_b of (1), m0 = m - (m_h + m_b), kg; None if the card does not state the mass m_h of the hull.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -25,6 +26,7 @@ from tank2sim.analysis.glide.transient import (
     equilibrium,
     quasi_steady_error,
 )
+from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.cards.card import GliderCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
@@ -84,7 +86,7 @@ class Range:
         Work of expelling the budget against the pressure at depth, budget g h, without losses.
     """
 
-    path_angle_rad: float
+    path_angle_deg: float
     buoyancy_kg: float
     speed_mps: float
     depth_m: float
@@ -93,11 +95,6 @@ class Range:
     range_m: float
     duration_s: float
     energy_J: float
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form; the angle in degrees."""
-        values = {name: value for name, value in vars(self).items() if name != "path_angle_rad"}
-        return {"path_angle_deg": math.degrees(self.path_angle_rad), **values}
 
 
 def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:
@@ -116,7 +113,7 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
     size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
     cycles = budget_kg / (2 * size)
     return Range(
-        path_angle_rad=steep,
+        path_angle_deg=math.degrees(steep),
         buoyancy_kg=size,
         speed_mps=glide.speed_mps,
         depth_m=depth_m,
@@ -158,89 +155,194 @@ class GlideQuestion:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GlideStudy:
-    """Result of a study; tuples parallel to `glides` have its length.
+class GlideState:
+    """A steady glide.
 
     Parameters
     ----------
-    best, fastest : SteadyGlide
-        Dives with the card's buoyancy: the shallowest, and that of greatest speed over the ground.
-    glides, printed : tuples of SteadyGlide
-        At the requested angles; `printed` only on request.
-    radii_m : tuple of float
-        Turning radius of the transient model, which has the added mass.
-    path, printed_path, compared
-        Results of the programme; None without one.
-    ranges : tuple of Range
-        Ranges of the best and the fastest glide and the requested glides that do not turn.
-    polar : tuple of SteadyGlide
-    errors, swings
-        Empty unless views were requested.
+    path_angle_deg, pitch_deg : float
+        + up.
+    incidence_deg : float
+        + when the flow comes from below.
+    roll_deg : float
+        + starboard side down.
+    buoyancy_kg : float
+        Net buoyancy, + light.
+    speed_mps, horizontal_speed_mps, climb_mps : float
+        Along the path, over the ground, and + up.
+    lift_coefficient, drag_coefficient, lift_N, drag_N : float
+        The lift has the sign of the incidence.
+    turning_radius_m : float
+        Without sign; infinite without roll.
+    turn_rate_degps : float
+        + to starboard.
+    as_printed : bool
+        Whether it is by the equations as printed in the paper.
     """
 
-    card: GliderCard
-    best: SteadyGlide
-    fastest: SteadyGlide
-    glides: tuple[SteadyGlide, ...]
-    radii_m: tuple[float, ...]
-    printed: tuple[SteadyGlide, ...] = ()
-    path: GlidePath | None = None
-    printed_path: GlidePath | None = None
-    compared: Compared | None = None
-    ranges: tuple[Range, ...] = ()
-    polar: tuple[SteadyGlide, ...] = ()
-    errors: tuple[ProgrammeError, ...] = ()
-    swings: tuple[SwingError, ...] = ()
-    notices: tuple[str, ...] = field(default=())
-
-    @property
-    def smallest_angle_rad(self) -> float:
-        """The smallest angle of flight without roll."""
-        return abs(self.best.path_angle_rad)
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form. ``states`` has the glides at the requested angles, then those of the programme's steps."""
-        states = [
-            {**glide.as_json(), "turning_radius_with_added_mass_m": radius if math.isfinite(radius) else None}
-            | {"ballast_kg": ballast_kg(self.card, glide.buoyancy_kg)}
-            | {"force_residual_N": force_residual(self.card, glide)}
-            for glide, radius in zip(self.glides, self.radii_m, strict=True)
-        ]
-        result: dict[str, object] = {
-            "glider": self.card.ship.name,
-            "source": self.card.ship.source,
-            "buoyancy_kg": self.card.glider.buoyancy_kg,
-            "states": states,
-        }
-        result["design"] = {
-            "smallest_angle_deg": math.degrees(self.smallest_angle_rad),
-            "best_glide": self.best.as_json(),
-            "fastest_glide": self.fastest.as_json(),
-            "ranges": [row.as_json() for row in self.ranges],
-        }
-        names = ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
-        polar = [row.as_json() for row in self.polar]
-        result["polar"] = {name: [row[name] for row in polar] for name in names}
-        if self.printed:
-            result["as_printed"] = [
-                {**glide.as_json(), "force_residual_N": force_residual(self.card, glide)} for glide in self.printed
-            ]
-        if self.path:
-            result["states"] = [*states, *self.path.states_as_json()]
-            result |= {"path": self.path.as_json(), "length_m": self.path.length_m}
-            result |= {"path_histories": self.path.histories()}
-        if self.printed_path:
-            result["path_as_printed"] = self.printed_path.as_json()
-            result["path_as_printed_histories"] = self.printed_path.histories()
-        if self.compared:
-            result["transient"] = self.compared.as_json()
-        if self.errors:
-            steps, swings = ([row.as_json() for row in found] for found in (self.errors, self.swings))
-            result["quasi_steady_error"] = {"steps": steps, "swings": swings}
-        return result | {"notices": list(self.notices)}
+    path_angle_deg: float
+    pitch_deg: float
+    incidence_deg: float
+    roll_deg: float
+    buoyancy_kg: float
+    speed_mps: float
+    horizontal_speed_mps: float
+    climb_mps: float
+    lift_coefficient: float
+    drag_coefficient: float
+    lift_N: float
+    drag_N: float
+    turning_radius_m: Unbounded
+    turn_rate_degps: float
+    as_printed: bool
 
 
-def study(card: GliderCard, question: GlideQuestion) -> GlideStudy:
+@dataclass(frozen=True, kw_only=True)
+class BalancedGlide(GlideState):
+    """A steady glide, and the force (N) by which lift and drag of (6) and (7) are off balance in it."""
+
+    force_residual_N: tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleGlide(BalancedGlide):
+    """A steady glide at an angle that was given.
+
+    Parameters
+    ----------
+    turning_radius_with_added_mass_m : float
+        Turning radius of the transient model, which has the added mass; infinite without roll.
+    ballast_kg : float, optional
+        Ballast that gives the net buoyancy; None if the card does not state the mass of the hull.
+    """
+
+    turning_radius_with_added_mass_m: Unbounded
+    ballast_kg: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepGlide(GlideState):
+    """The steady glide of a step of a programme."""
+
+    duration_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlideDesign:
+    """Dives with the card's buoyancy: the shallowest, the fastest over the ground, and ranges on a budget of ballast.
+
+    Ranges are of these two and of the given glides that do not turn.
+    """
+
+    smallest_angle_deg: float
+    best_glide: GlideState
+    fastest_glide: GlideState
+    ranges: tuple[Range, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathPlace:
+    """A place of a path: north, east, height, and heading clockwise from north."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    height_m: float
+    heading_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransientPlace:
+    """A place of the transient motion: north, east, depth; and its speed."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    depth_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TransientPath:
+    """A programme flown by the transient model.
+
+    Parameters
+    ----------
+    path : tuple of TransientPlace
+        At the start and at the ends of the steps.
+    distance_m : array (steps + 1,)
+        Distance from the path of steady glides there.
+    distance_by_length : float
+        The largest distance, as a share of the length of the path.
+    histories, orders : dict
+        Columns of the motion, and of the orders with their steady glides.
+    """
+
+    path: tuple[TransientPlace, ...]
+    distance_m: Array
+    distance_by_length: Number
+    histories: Columns
+    orders: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class QuasiSteadyErrors:
+    """Errors of steady glides against the length of steps, and against the period of swings."""
+
+    steps: tuple[ProgrammeError, ...]
+    swings: tuple[SwingError, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GlideStudy:
+    """Steady glides, paths and ranges of a glider.
+
+    Parameters
+    ----------
+    glider, source : str
+        Name, and source of its numbers.
+    buoyancy_kg : float
+        Size of the net buoyancy of the card.
+    states : tuple of AngleGlide
+        Glides at the given angles.
+    design : GlideDesign
+    polar : dict
+        Columns ``path_angle_deg``, ``horizontal_speed_mps``, ``climb_mps``.
+    as_printed : tuple of BalancedGlide
+        The glides by the equations as printed; empty if they were not asked for.
+    steps : tuple of StepGlide
+        Glides of the programme's steps.
+    path, path_as_printed : tuple of PathPlace
+        Start and ends of the steps; empty without a programme.
+    length_m : float, optional
+        Length of the path through the water.
+    path_histories, path_as_printed_histories : dict
+        Columns ``t_s``, ``x_m``, ``y_m``, ``height_m`` to draw.
+    transient : TransientPath, optional
+    quasi_steady_error : QuasiSteadyErrors, optional
+        Only if views were asked for.
+    notices : tuple of str
+    """
+
+    glider: str
+    source: str
+    buoyancy_kg: float
+    states: tuple[AngleGlide, ...]
+    design: GlideDesign
+    polar: Columns
+    as_printed: tuple[BalancedGlide, ...]
+    steps: tuple[StepGlide, ...]
+    path: tuple[PathPlace, ...]
+    length_m: float | None
+    path_histories: Columns
+    path_as_printed: tuple[PathPlace, ...]
+    path_as_printed_histories: Columns
+    transient: TransientPath | None
+    quasi_steady_error: QuasiSteadyErrors | None
+    notices: tuple[str, ...]
+
+
+def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
     """Run the study.
 
     Raises
@@ -250,28 +352,95 @@ def study(card: GliderCard, question: GlideQuestion) -> GlideStudy:
     """
     model = build(card)
     glides = tuple(_glides(card, question))
-    printed = tuple(_glides(card, question, as_printed=True)) if question.as_printed else ()
+    printed = _glides(card, question, as_printed=True) if question.as_printed else ()
     path = fly(card, question.programme) if question.programme else None
     printed_path = (
         fly(card, question.programme, as_printed=True) if question.programme and question.as_printed else None
     )
     integrator = Integrator(model) if path or question.views else None
     best, fastest = best_glide(card), fastest_glide(card)
+    polar = [_state(glide) for glide in glide_polar(card)]
+    errors = None
+    if question.views and integrator:
+        errors = QuasiSteadyErrors(steps=quasi_steady_error(card, integrator), swings=swing_errors(card, integrator))
     return GlideStudy(
-        card=card,
-        best=best,
-        fastest=fastest,
-        glides=glides,
-        radii_m=tuple(_radius(model, glide) for glide in glides),
-        printed=printed,
-        path=path,
-        printed_path=printed_path,
-        compared=compare_with_steady(integrator, path) if path and integrator else None,
-        ranges=tuple(_ranges(card, question, (best, fastest, *glides))),
-        polar=glide_polar(card),
-        errors=quasi_steady_error(card, integrator) if question.views and integrator else (),
-        swings=swing_errors(card, integrator) if question.views and integrator else (),
+        glider=card.ship.name,
+        source=card.ship.source,
+        buoyancy_kg=card.glider.buoyancy_kg,
+        states=tuple(
+            AngleGlide(
+                **_state_fields(glide),
+                force_residual_N=force_residual(card, glide),
+                turning_radius_with_added_mass_m=_radius(model, glide),
+                ballast_kg=ballast_kg(card, glide.buoyancy_kg),
+            )
+            for glide in glides
+        ),
+        design=GlideDesign(
+            smallest_angle_deg=math.degrees(abs(best.path_angle_rad)),
+            best_glide=_state(best),
+            fastest_glide=_state(fastest),
+            ranges=tuple(_ranges(card, question, (best, fastest, *glides))),
+        ),
+        polar={
+            name: np.array([getattr(state, name) for state in polar])
+            for name in ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
+        },
+        as_printed=tuple(
+            BalancedGlide(**_state_fields(glide), force_residual_N=force_residual(card, glide)) for glide in printed
+        ),
+        steps=tuple(
+            StepGlide(**_state_fields(glide), duration_s=duration)
+            for glide, duration in (zip(path.glides, path.durations_s, strict=True) if path else ())
+        ),
+        path=_places(path),
+        length_m=path.length_m if path else None,
+        path_histories=path.histories() if path else {},
+        path_as_printed=_places(printed_path),
+        path_as_printed_histories=printed_path.histories() if printed_path else {},
+        transient=_transient(compare_with_steady(integrator, path)) if path and integrator else None,
+        quasi_steady_error=errors,
         notices=(*model.notices, *([NO_COMPILER] if integrator and not integrator.compiled else [])),
+    )
+
+
+def _state_fields(glide: SteadyGlide) -> dict[str, Any]:
+    """Fields of :class:`GlideState`."""
+    angles = ("path_angle", "pitch", "incidence", "roll")
+    found = {f"{name}_deg": math.degrees(getattr(glide, f"{name}_rad")) for name in angles}
+    found |= {"turn_rate_degps": math.degrees(glide.turn_rate_radps)}
+    return found | {part.name: getattr(glide, part.name) for part in fields(GlideState) if part.name not in found}
+
+
+def _state(glide: SteadyGlide) -> GlideState:
+    return GlideState(**_state_fields(glide))
+
+
+def _places(path: GlidePath | None) -> tuple[PathPlace, ...]:
+    return tuple(
+        PathPlace(
+            t_s=place.time_s,
+            x_m=place.north_m,
+            y_m=place.east_m,
+            height_m=place.height_m,
+            heading_deg=math.degrees(place.heading_rad),
+        )
+        for place in (path.places if path else ())
+    )
+
+
+def _transient(found: Compared) -> TransientPath:
+    motion = found.motion
+    named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
+    return TransientPath(
+        path=tuple(
+            TransientPlace(t_s=place.time_s, **{key: motion.at(name, place.time_s) for key, name in named.items()})
+            for place in found.path.places
+        ),
+        distance_m=found.distance_m,
+        distance_by_length=found.share,
+        histories=found.histories(),
+        orders=found.orders(),
     )
 
 

@@ -122,29 +122,27 @@ class Compared:
         """The largest distance, as a share of the length of the path."""
         return float(self.distance_m.max()) / self.path.length_m if self.path.length_m else math.nan
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form: the transient places at the ends of steps, and the distances."""
-        times = [place.time_s for place in self.path.places]
-        named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
-        rows = [{"t_s": time} | {key: self.motion.at(name, time) for key, name in named.items()} for time in times]
-        result = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
-        return result | {"histories": self._histories(), "orders": self._orders()}
-
-    def _histories(self) -> Columns:
-        """The transient motion, thinned for a chart."""
+    def histories(self) -> Columns:
+        """Columns of the transient motion, thinned for a chart."""
         run, degrees = self.motion, math.degrees(1.0)
         angles = {"pitch_deg": "pitch.angle", "roll_deg": "roll.angle", "incidence_deg": "motion.incidence"}
         columns = {"t_s": run.t, "x_m": run["motion.x"], "y_m": run["motion.y"], "height_m": -run["motion.z"]}
         columns |= {"buoyancy_kg": run["buoyancy.mass"]} | {key: degrees * run[name] for key, name in angles.items()}
         return drawn_columns(columns | {"speed_mps": run["motion.speed"]})
 
-    def _orders(self) -> Columns:
-        """The orders and their steady glides, each constant through its step."""
+    def orders(self) -> Columns:
+        """Columns of the orders and their steady glides, each constant through its step."""
         ends = np.array([place.time_s for place in self.path.places])
-        steps = [glide.as_json() for glide in self.path.glides]
-        names = ("buoyancy_kg", "pitch_deg", "roll_deg", "incidence_deg", "speed_mps")
-        held = {name: np.repeat(np.array([step[name] for step in steps], dtype=float), 2) for name in names}
+        steps, degrees = self.path.glides, math.degrees(1.0)
+        columns = {
+            "buoyancy_kg": [glide.buoyancy_kg for glide in steps],
+            "pitch_deg": [degrees * glide.pitch_rad for glide in steps],
+            "roll_deg": [degrees * glide.roll_rad for glide in steps],
+            "incidence_deg": [degrees * glide.incidence_rad for glide in steps],
+            "speed_mps": [glide.speed_mps for glide in steps],
+        }
         times = np.repeat(ends, 2)[1:-1]
+        held = {name: np.repeat(np.array(values), 2) for name, values in columns.items()}
         return drawn_columns({"t_s": times, **held}, len(times))
 
 
@@ -158,7 +156,7 @@ def compare_with_steady(integrator: Integrator, path: GlidePath) -> Compared:
     return Compared(path, motion, np.array(distance))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ProgrammeError:
     """The quasi-steady error of a kind of programme.
 
@@ -176,10 +174,6 @@ class ProgrammeError:
     duration_s: Array
     distance_m: Array
     share: Array
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return dict(vars(self))
 
 
 def quasi_steady_error(

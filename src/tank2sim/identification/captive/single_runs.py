@@ -10,19 +10,21 @@ but by n times its angle. Standard errors include coloured noise within the run
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns, Number
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun, reduced_run
 from tank2sim.identification.captive.motion import harmonic_basis
 from tank2sim.identification.captive.oscillation import OscillationDerivatives, oscillations
 from tank2sim.identification.captive.run_faults import motion_faults, record_faults, reduced_faults
+from tank2sim.marks import CHECK
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+from tank2sim.records.thinning import drawn_columns
 
 CYCLE_BINS = 72
 """Parts of the averaged cycle, of 5 deg each. Project choice: the fifth harmonic then has 14 points."""
@@ -47,9 +49,14 @@ class FourierCoefficient:
     order : int
         0 for the mean.
     cosine, sine : float
-        Coefficients; those of the mean are the mean and 0.
+        For order 0 ``cosine`` is the mean, and ``sine`` is 0.
     cosine_error, sine_error : float
         Standard errors; 0 for motions, which are fitted as the mechanism makes them.
+    amplitude, amplitude_error : float
+        Amplitude (for order 0 the size of the mean), and its standard error to first order.
+    phase_rad, phase_error_rad : float
+        Phase by which it lags the leading velocity, a cos(n omega t - phase), and its standard error to first order;
+        pi without an amplitude.
     """
 
     signal: str
@@ -57,33 +64,12 @@ class FourierCoefficient:
     order: int
     cosine: float
     sine: float
-    cosine_error: float
-    sine_error: float
-
-    @property
-    def amplitude(self) -> float:
-        """Amplitude; the size of the mean for order 0."""
-        return math.hypot(self.cosine, self.sine)
-
-    @property
-    def amplitude_error(self) -> float:
-        """Standard error of the amplitude, to first order."""
-        if self.amplitude == 0.0:
-            return math.hypot(self.cosine_error, self.sine_error)
-        return math.hypot(self.cosine * self.cosine_error, self.sine * self.sine_error) / self.amplitude
-
-    @property
-    def phase_rad(self) -> float:
-        """Phase by which it lags the leading velocity: a cos(n omega t - phase)."""
-        return math.atan2(self.sine, self.cosine)
-
-    @property
-    def phase_error_rad(self) -> float:
-        """Standard error of the phase, to first order; pi without an amplitude."""
-        if self.amplitude == 0.0:
-            return math.pi
-        error = math.hypot(self.sine * self.cosine_error, self.cosine * self.sine_error) / self.amplitude**2
-        return min(error, math.pi)
+    cosine_error: Number
+    sine_error: Number
+    amplitude: float
+    amplitude_error: Number
+    phase_rad: float
+    phase_error_rad: Number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -113,23 +99,35 @@ class SingleRun:
 
     Parameters
     ----------
-    reduced : ReducedRun
+    name, type : str
+    speed_mps, frequency_radps : float
+        Mean speed; frequency of the oscillation, 0 in a steady run.
+    periods, readings : int
+        Whole periods that are used, and their readings.
     coefficients : tuple of FourierCoefficient
-    cycles : mapping
+    cycles : dict
         ``X``, ``Y``, ``N`` to the averaged cycle; empty for a steady run.
-    residual_rms : mapping
+    residual_rms : dict
         Force to the root mean square of record less harmonics and trend, N or N m.
     derivatives : OscillationDerivatives or None
         Derivatives of an oscillating run whose model is known, by its first and third harmonics.
+    history : dict
+        Columns ``t_s``, and record, fit and residual of each force (``X_N``, ``X_fit_N``, ``X_residual_N``), to draw.
     faults : tuple of str
         What contradicts the record.
     """
 
-    reduced: ReducedRun
+    name: str
+    type: str
+    speed_mps: float
+    frequency_radps: float
+    periods: int
+    readings: int
     coefficients: tuple[FourierCoefficient, ...]
-    cycles: Mapping[str, AveragedCycle]
-    residual_rms: Mapping[str, float]
+    cycles: dict[str, AveragedCycle]
+    residual_rms: dict[str, float]
     derivatives: OscillationDerivatives | None
+    history: Columns
     faults: tuple[str, ...]
 
     def coefficient(self, signal: str, order: int) -> FourierCoefficient:
@@ -171,11 +169,75 @@ class RepeatedCoefficient:
     values: tuple[float, ...]
     mean: float
     deviation: float
-    expected: float
-    chance: float
+    expected: Number
+    chance: Number
+
+    @property
+    def differs(self) -> bool:
+        """Whether the runs differ by more than the noise within them."""
+        return self.chance < REPEATS_DIFFER
 
 
-def single_run(run: CaptiveRun, campaign: Campaign | None) -> SingleRun:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CaptiveRunStudy:
+    """Captive runs reduced by themselves.
+
+    Parameters
+    ----------
+    runs : tuple of SingleRun
+    repeats : tuple of RepeatedCoefficient
+        Scatter of the coefficients between the runs; empty for a single one and for runs of different tests.
+    inertia_removed : bool
+        Whether the model is known, and its inertia removed.
+    notices : tuple of str
+    """
+
+    runs: tuple[SingleRun, ...]
+    repeats: tuple[RepeatedCoefficient, ...]
+    inertia_removed: bool
+    notices: tuple[str, ...]
+
+
+def study_runs(
+    runs: Sequence[CaptiveRun], campaign: Campaign | None, remarks: Sequence[str] = ()
+) -> tuple[CaptiveRunStudy, tuple[ReducedRun, ...]]:
+    """Reduce runs, each by itself, and compare repeats.
+
+    Parameters
+    ----------
+    runs : sequence of CaptiveRun
+    campaign : Campaign or None
+        Model and test; without them no inertia is removed and no derivatives are given.
+    remarks : sequence of str
+        Notices on the records.
+
+    Raises
+    ------
+    InputError
+        As of :func:`single_run`.
+    """
+    single, reduced = zip(*(single_run(run, campaign) for run in runs), strict=True)
+    alike = len(runs) > 1 and same_test(single)
+    repeats = repeated_coefficients(single) if alike else ()
+    notices = [*remarks, *(f"{CHECK} {fault}" for run in single for fault in run.faults)]
+    if campaign is None:
+        notices.append(
+            "Without a campaign the forces are as recorded, with the reaction of the model's inertia, and no "
+            "derivatives are given: --campaign campaign.toml."
+        )
+    if len(runs) > 1 and not alike:
+        notices.append("The runs are of different tests (angles, frequency, amplitude or speed): not compared.")
+    notices += [
+        f"Repeats differ in {row.signal} {row.part} {row.order or ''}".rstrip()
+        + f" by {row.deviation:.3g} {row.unit}, and their noise explains {row.expected:.2g} (chance {row.chance:.1g})."
+        for row in repeats
+        if row.differs
+    ]
+    study = CaptiveRunStudy(runs=single, repeats=repeats, inertia_removed=campaign is not None, notices=tuple(notices))
+    return study, reduced
+
+
+def single_run(run: CaptiveRun, campaign: Campaign | None) -> tuple[SingleRun, ReducedRun]:
     """Reduce one run.
 
     Parameters
@@ -206,14 +268,32 @@ def single_run(run: CaptiveRun, campaign: Campaign | None) -> SingleRun:
             water[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
             errors = np.sqrt(np.diag(fit.covariance))
             coefficients += _pairs(f"{force}_water", _unit_of(force), water, errors)
+    motion = reduced.motion
     return SingleRun(
-        reduced=reduced,
+        name=run.name,
+        type=run.type,
+        speed_mps=motion.mean_speed_mps,
+        frequency_radps=motion.frequency_radps,
+        periods=motion.periods,
+        readings=len(motion.time_s),
         coefficients=tuple(coefficients),
         cycles={force: averaged_cycle(reduced, force) for force in FORCE_COLUMNS} if run.oscillates else {},
         residual_rms={force: float(np.sqrt(np.mean(reduced.residual(force) ** 2))) for force in FORCE_COLUMNS},
         derivatives=oscillations(campaign, [reduced])[0] if campaign is not None and run.oscillates else None,
+        history=_history(reduced),
         faults=tuple(str(fault) for fault in faults),
-    )
+    ), reduced
+
+
+def _history(reduced: ReducedRun) -> Columns:
+    """Record, fit and residual of each force, thinned to draw."""
+    kept = reduced.motion.kept
+    columns = {"t_s": reduced.run.time_s[kept]}
+    for force in FORCE_COLUMNS:
+        record, fit, unit = reduced.run.force(force)[kept], reduced.fitted(force), _unit_of(force).replace(" ", "")
+        named = {force: record, f"{force}_fit": fit, f"{force}_residual": record - fit}
+        columns |= {f"{name}_{unit}": values for name, values in named.items()}
+    return drawn_columns(columns)
 
 
 def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
@@ -254,18 +334,16 @@ def same_test(runs: Sequence[SingleRun]) -> bool:
     """True for repeats of one test: motions whose Fourier coefficients are the same within :data:`SAME_MOTION`."""
     first, *others = runs
     for other in others:
-        if other.reduced.run.type != first.reduced.run.type:
+        if other.type != first.type:
             return False
-        pair = first.reduced.motion, other.reduced.motion
-        frequencies = [motion.frequency_radps for motion in pair]
+        frequencies = [run.frequency_radps for run in (first, other)]
         if abs(frequencies[1] - frequencies[0]) > SAME_MOTION * frequencies[0]:
             return False
         for signal, order, scale in (("v", 0, 0.1), ("v", 1, 0.1), ("r", 0, 0.1), ("r", 1, 0.1), ("speed", 0, 0.0)):
             if order > 0 and not frequencies[0]:
                 continue
             a, b = (run.coefficient(signal, order).amplitude for run in (first, other))
-            speed = pair[0].mean_speed_mps
-            if abs(b - a) > SAME_MOTION * max(a, scale * speed):
+            if abs(b - a) > SAME_MOTION * max(a, scale * first.speed_mps):
                 return False
         if abs(first.coefficient("delta", 0).cosine - other.coefficient("delta", 0).cosine) > math.radians(0.2):
             return False
@@ -323,16 +401,27 @@ def _pairs(signal: str, unit: str, values: Array, errors: Array) -> list[Fourier
     """Mean and pairs of cosine and sine; what follows the last pair (the trend) is left out."""
     found = []
     for order in range((len(values) - 1) // 2 + 1):
-        cosine, sine = (0, None) if order == 0 else (2 * order - 1, 2 * order)
+        places = [0] if order == 0 else [2 * order - 1, 2 * order]
+        cosine, sine = [*values[places].tolist(), 0.0][:2]
+        cosine_error, sine_error = [*errors[places].tolist(), 0.0][:2]
+        amplitude = math.hypot(cosine, sine)
+        amplitude_error, phase_error = math.hypot(cosine_error, sine_error), math.pi
+        if amplitude:
+            amplitude_error = math.hypot(cosine * cosine_error, sine * sine_error) / amplitude
+            phase_error = min(math.hypot(sine * cosine_error, cosine * sine_error) / amplitude**2, math.pi)
         found.append(
             FourierCoefficient(
                 signal=signal,
                 unit=unit,
                 order=order,
-                cosine=float(values[cosine]),
-                sine=0.0 if sine is None else float(values[sine]),
-                cosine_error=float(errors[cosine]),
-                sine_error=0.0 if sine is None else float(errors[sine]),
+                cosine=cosine,
+                sine=sine,
+                cosine_error=cosine_error,
+                sine_error=sine_error,
+                amplitude=amplitude,
+                amplitude_error=amplitude_error,
+                phase_rad=math.atan2(sine, cosine),
+                phase_error_rad=phase_error,
             )
         )
     return found

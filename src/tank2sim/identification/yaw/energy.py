@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.form import YawRig
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms, scaled_condition
-from tank2sim.identification.yaw.intervals import ENERGY_TERMS, Interval, motor_work, work_rows
+from tank2sim.identification.yaw.intervals import Interval, motor_work, work_rows
 from tank2sim.records.yaw import YawRecord
 from tank2sim.records.yaw_programme import dissipation_from_work, inertia_from_work
 
@@ -59,23 +59,6 @@ class YawEstimate:
     bias_kgm2: float | None = None
     bias_from: Mapping[str, float] = field(default_factory=dict)
     by_hump_kgm2: tuple[float, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """The estimate as plain data; the unit of a number is in its key."""
-        result: dict[str, Any] = {
-            "total_inertia_kgm2": self.total_inertia_kgm2,
-            "total_inertia_standard_error_kgm2": self.inertia_error_kgm2,
-            "dissipation_J": self.dissipation_J,
-            "dissipation_standard_error_J": self.dissipation_error_J,
-        }
-        for term, (value, error) in self.friction.items():
-            unit = ENERGY_TERMS[term][1]
-            result[f"{term}_{unit}"], result[f"{term}_standard_error_{unit}"] = value, error
-        if self.bias_kgm2 is not None:
-            result["bias_against_least_squares_kgm2"] = self.bias_kgm2
-            result["bias_from_kgm2"] = dict(self.bias_from)
-            result["total_inertia_by_hump_kgm2"] = list(self.by_hump_kgm2)
-        return result
 
 
 IntervalPair = tuple[Interval, Interval]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import f as f_test
@@ -33,12 +32,6 @@ from tank2sim.identification.yaw.energy import (
 )
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS, Interval, intervals, mirror_difference
 from tank2sim.identification.yaw.output_error import AngleFit, fit_angle
-from tank2sim.identification.yaw.plot_data import (
-    angle_residual_as_json,
-    balance_as_json,
-    record_histories,
-    residuals_as_json,
-)
 from tank2sim.records.yaw import Medium, YawRecord, refuse_copied_records
 
 YAW_METHODS = (
@@ -152,37 +145,6 @@ class YawIdentification:
         parts = [estimate.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
         known = [part for part in parts if part is not None]
         return added, math.hypot(*known) if estimate.inertia_error_kgm2 is not None else None
-
-    def as_json(self) -> dict[str, Any]:
-        """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, more in ``methods``;
-        histories, balance and residuals for charts (:mod:`tank2sim.identification.yaw.plot_data`)."""
-        added = {method: self.added_inertia(method) for method in self.estimates}
-        methods = {}
-        for method, estimate in self.estimates.items():
-            value = added[method]
-            methods[method] = {
-                "added_inertia_kgm2": value[0] if value else None,
-                "added_inertia_standard_error_kgm2": value[1] if value else None,
-                **estimate.as_json(),
-            }
-        return {
-            "records": [str(record.path) for record in self.records],
-            "medium": self.medium,
-            "torque_constant_NmpA": self.torque_constant_NmpA,
-            "body_inertia_kgm2": self.body.value_kgm2 if self.body else None,
-            "body_inertia_standard_error_kgm2": self.body.error_kgm2 if self.body else None,
-            "body_inertia_source": self.body.source if self.body else None,
-            "added_inertia_kgm2": {method: value[0] if value else None for method, value in added.items()},
-            "dissipation_J": {method: value.dissipation_J for method, value in self.estimates.items()},
-            "methods": methods,
-            "mirror_difference": list(self.mirror),
-            "histories": record_histories(self.records, self.fit),
-            "energy_balance": balance_as_json(self.fit),
-            "energy_residuals": residuals_as_json(self.fit),
-            "angle_residual": angle_residual_as_json(self.angle),
-            "air": self.air.as_json() if self.air else None,
-            "notes": list(self.notes),
-        }
 
 
 def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawIdentification:

@@ -57,15 +57,12 @@ RESULT_TYPES = (
         ("straight_run.stable", "straight_run.surge_time_constant_s"),
     ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
-    ResultType("Captive run", "run", ("runs", "repeats", "inertia_removed"), ()),
     ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
     ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
-    ResultType("Underwater glider", "glide", ("glider", "states"), ()),
     ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),

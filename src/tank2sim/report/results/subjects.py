@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
-from tank2sim.report.captive.run_page import run_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
-from tank2sim.report.glide.page import glide_page
 from tank2sim.report.guess.page import guess_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
@@ -23,7 +21,6 @@ from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
-from tank2sim.report.yaw.page import yaw_page
 
 
 @dataclass(frozen=True)
@@ -72,12 +69,6 @@ _PAGES: Mapping[str, _Page] = {
             "notices": list,
         },
     ),
-    "Yaw rig": _Page(
-        yaw_page, {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list, "notes": list}
-    ),
-    "Underwater glider": _Page(
-        glide_page, {"source": str, "states": list, "design": dict, "polar": dict, "notices": list}
-    ),
     "Steering catalogue": _Page(
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
@@ -94,7 +85,6 @@ _PAGES: Mapping[str, _Page] = {
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),
-    "Captive run": _Page(run_page, {"runs": list, "repeats": list, "notices": list}),
     "Coefficients from trials": _Page(
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}

@@ -10,6 +10,9 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.analysis.glide.quasi_steady_error import SwingError
+from tank2sim.analysis.glide.study import GlideState, PathPlace, TransientPath
+from tank2sim.analysis.glide.transient import ProgrammeError
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import (
     HOVER_SAMPLES,
@@ -25,9 +28,8 @@ from tank2sim.answer.charts.parts import (
     series_look,
     vector,
 )
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Columns
 from tank2sim.records.thinning import thin_line
-from tank2sim.report.json_values import Json
 from tank2sim.units import to_si
 
 
@@ -41,14 +43,15 @@ class SpacePath:
     height_m: ArrayLike
 
 
-def space_path(label: str, columns: Mapping[str, Sequence[float]]) -> SpacePath:
-    """A path from columns ``x_m``, ``y_m``, ``height_m`` of the JSON."""
+def space_path(label: str, columns: Columns) -> SpacePath:
+    """A path from columns ``x_m``, ``y_m``, ``height_m``."""
     return SpacePath(label=label, north_m=columns["x_m"], east_m=columns["y_m"], height_m=columns["height_m"])
 
 
-def corners_of(places: Sequence[Mapping[str, float]]) -> SpacePath:
-    """The start and the ends of the steps, from ``path`` of the JSON."""
-    return space_path("steps", {name: [place[name] for place in places] for name in ("x_m", "y_m", "height_m")})
+def corners_of(places: Sequence[PathPlace]) -> SpacePath:
+    """The start and the ends of the steps."""
+    north, east, height = zip(*((place.x_m, place.y_m, place.height_m) for place in places), strict=True)
+    return SpacePath(label="steps", north_m=north, east_m=east, height_m=height)
 
 
 def plan_chart(paths: Sequence[SpacePath], *, title: str = "") -> alt.LayerChart:
@@ -99,10 +102,9 @@ def _arms(length: float) -> list[ChartRecord]:
     return rows
 
 
-def polar_chart(polar: Json, marked: Mapping[str, Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
-    """The polar: speed down against speed over the ground, with marked glides; both as the JSON has them."""
-    across, down = vector(polar["horizontal_speed_mps"]), -vector(polar["climb_mps"])
-    angle = np.abs(vector(polar["path_angle_deg"]))
+def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str = "") -> alt.LayerChart:
+    """The polar: speed down against speed over the ground, with marked glides."""
+    across, down, angle = polar["horizontal_speed_mps"], -polar["climb_mps"], np.abs(polar["path_angle_deg"])
     x = alt.X("x:Q", title="speed over the ground (m/s)", scale=alt.Scale(zero=True))
     y = alt.Y("y:Q", title="speed down (m/s)", scale=alt.Scale(zero=True, reverse=True))
     tooltip = [
@@ -113,12 +115,12 @@ def polar_chart(polar: Json, marked: Mapping[str, Mapping[str, Json]], *, title:
     rows = records("polar", {"x": across, "y": down, "angle": angle})
     line = Chart(data(rows)).mark_line(clip=True).encode(x=x, y=y, order="i:Q").properties(name="plot")
     hover = Chart(data(every(rows, HOVER_SAMPLES))).mark_point(opacity=0, filled=True, size=110)
-    points = [
+    points: list[ChartRecord] = [
         {
             "run": label,
-            "x": glide["horizontal_speed_mps"],
-            "y": -glide["climb_mps"],
-            "angle": abs(glide["path_angle_deg"]),
+            "x": glide.horizontal_speed_mps,
+            "y": -glide.climb_mps,
+            "angle": abs(glide.path_angle_deg),
         }
         for label, glide in marked.items()
     ]
@@ -148,25 +150,25 @@ _PROGRAMME = {
 }
 
 
-def programme_chart(transient: Json, *, title: str = "") -> alt.VConcatChart:
-    """Orders and what the transient model makes of them over time, from ``transient`` of the JSON."""
+def programme_chart(transient: TransientPath, *, title: str = "") -> alt.VConcatChart:
+    """Orders and the motion of the transient model over time."""
     histories = []
-    for label, columns in (("orders and steady glides", transient["orders"]), ("transient", transient["histories"])):
-        values = {name: to_si(name, 1.0)[1] * vector(columns[name]) for name in _PROGRAMME}
+    for label, columns in (("orders and steady glides", transient.orders), ("transient", transient.histories)):
+        values = {name: to_si(name, 1.0)[1] * columns[name] for name in _PROGRAMME}
         histories.append(History(label=label, time_s=columns["t_s"], values=values))
     panels = [Signal(name=name, title=words, unit=unit) for name, (words, unit) in _PROGRAMME.items()]
     return history_chart(histories, panels, title=title, height_px=90)
 
 
-def quasi_steady_chart(errors: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+def quasi_steady_chart(errors: Sequence[ProgrammeError], *, title: str = "") -> alt.LayerChart:
     """Largest distance from the transient path, per cent of the way, against the length of a step."""
-    series = [(error["label"], vector(error["duration_s"]), vector(error["share"])) for error in errors]
+    series = [(error.label, error.duration_s, error.share) for error in errors]
     return _errors(series, ("length of a step (s)", "distance of the paths (% of the way)"), title=title)
 
 
-def swing_chart(errors: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+def swing_chart(errors: Sequence[SwingError], *, title: str = "") -> alt.LayerChart:
     """Error of velocity or rate of turn, per cent, against the period of a swing."""
-    series = [(error["label"], vector(error["period_s"]), vector(error["share"])) for error in errors]
+    series = [(error.label, error.period_s, error.share) for error in errors]
     return _errors(series, ("period of the swing (s)", "error (%)"), title=title)
 
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look, vector
-from tank2sim.report.json_values import Json
+from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
+from tank2sim.arrays import Columns
+from tank2sim.identification.yaw.study import EnergyBalance, EnergyResidual, YawMethodEstimate
 
 _NORMAL = 1.959964
 _SIGNALS = (
@@ -18,13 +19,12 @@ _SIGNALS = (
 )
 
 
-def record_chart(name: str, columns: Mapping[str, Json]) -> alt.VConcatChart:
-    """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record; from
-    ``histories`` of the JSON."""
+def record_chart(name: str, columns: Columns) -> alt.VConcatChart:
+    """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record."""
     time = columns["t_s"]
     columns_shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
-    values = {key: vector(columns[column]) for key, column in columns_shown.items()}
-    programme = {"rate": vector(columns["programme_rate_radps"])}
+    values = {key: columns[column] for key, column in columns_shown.items()}
+    programme = {"rate": columns["programme_rate_radps"]}
     histories = [
         History(label=name, time_s=time, values=values),
         History(label="programme", time_s=time, values=programme),
@@ -32,19 +32,18 @@ def record_chart(name: str, columns: Mapping[str, Json]) -> alt.VConcatChart:
     return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
 
 
-def balance_chart(balance: Json, *, width_px: int = 340) -> alt.HConcatChart:
-    """Work of the motor in each subinterval (points) and what it is spent on (bars), the mean over all pairs; from
-    ``energy_balance`` of the JSON."""
-    terms = {term.replace("_", " "): parts for term, parts in balance["spent_J"].items()}
+def balance_chart(balance: EnergyBalance, *, width_px: int = 340) -> alt.HConcatChart:
+    """Work of the motor in each subinterval (points) and what it is spent on (bars), the mean over all pairs."""
+    terms = {term.replace("_", " "): parts for term, parts in balance.spent_J.items()}
     look = series_look([*terms, "motor"], as_points=["motor"])
     panels = []
     for name in ("accelerating", "braking"):
         bars = [
             {"part": place, "run": term, "v": plain(1e3 * value)}
             for term, parts in terms.items()
-            for place, value in enumerate(parts[name], start=1)
+            for place, value in enumerate(parts[name].tolist(), start=1)
         ]
-        motor = enumerate(balance["motor_J"][name], start=1)
+        motor = enumerate(balance.motor_J[name].tolist(), start=1)
         points = [{"part": place, "run": "motor", "v": plain(1e3 * value)} for place, value in motor]
         x = alt.X("part:O", title=f"{name}: part of the interval", axis=alt.Axis(labelAngle=0))
         y = alt.Y("v:Q", title="work (mJ)")
@@ -68,14 +67,12 @@ def balance_chart(balance: Json, *, width_px: int = 340) -> alt.HConcatChart:
     )
 
 
-def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int = 560) -> alt.LayerChart:
-    """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known; from
-    ``methods`` of the JSON."""
+def estimates_chart(methods: Mapping[str, YawMethodEstimate], *, width_px: int = 560) -> alt.LayerChart:
+    """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known."""
     rows: list[ChartRecord] = []
-    names = []
-    kind = "total" if any(method["added_inertia_kgm2"] is None for method in methods.values()) else "added"
+    names, kind = [], "added"
     for method, estimate in methods.items():
-        value, error = estimate[f"{kind}_inertia_kgm2"], estimate[f"{kind}_inertia_standard_error_kgm2"]
+        kind, value, error = estimate.inertia
         spread = _NORMAL * (error or 0.0)
         names.append(method.replace("_", " "))
         rows.append(
@@ -104,15 +101,14 @@ def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int 
     )
 
 
-def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: int = 720) -> alt.LayerChart:
-    """What the least squares leave of each subinterval's work, against the rate in its middle; from
-    ``energy_residuals`` of the JSON."""
+def energy_residual_chart(residuals: Sequence[EnergyResidual], *, width_px: int = 720) -> alt.LayerChart:
+    """Residual work of each subinterval, against the rate in its middle."""
     rows: list[ChartRecord] = [
         {
-            "run": residual["stage"],
-            "hump": residual["hump"],
-            "w": plain(residual["rate_degps"]),
-            "v": plain(1e6 * residual["left_J"]),
+            "run": residual.stage,
+            "hump": residual.hump,
+            "w": plain(residual.rate_degps),
+            "v": plain(1e6 * residual.left_J),
         }
         for residual in residuals
     ]
@@ -142,9 +138,10 @@ def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: 
     )
 
 
-def angle_residual_chart(residual: Mapping[str, Json]) -> alt.VConcatChart:
-    """What the integrated equation leaves of the angle, over time; from ``angle_residual`` of the JSON."""
-    residual_rad = vector(residual["residual_rad"])
-    history = History(label="integrated less measured", time_s=residual["t_s"], values={"left": residual_rad})
+def angle_residual_chart(residual: Columns) -> alt.VConcatChart:
+    """Residual angle of the integrated equation over time."""
+    history = History(
+        label="integrated less measured", time_s=residual["t_s"], values={"left": residual["residual_rad"]}
+    )
     signal = Signal(name="left", title="angle, integrated less measured", unit="rad")
     return history_chart([history], [signal], title="Residuals of the nonlinear least squares")
