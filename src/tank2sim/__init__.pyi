@@ -35,7 +35,6 @@ from .api.fmu import check_fmu as check_fmu
 from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
 from .api.glide import GlideResult as GlideResult
-from .api.guess import GuessResult as GuessResult
 from .api.guess import guess as guess
 from .api.identification import IdentificationResult as IdentificationResult
 from .api.identification import identify as identify
@@ -54,7 +53,6 @@ from .api.ship import load as load
 from .api.ship import ships as ships
 from .api.signals import SignalsResult as SignalsResult
 from .api.signals import signals as signals
-from .api.stability import StabilityResult as StabilityResult
 from .api.steering_models import (
     SteeringModelsResult as SteeringModelsResult,
 )
@@ -79,9 +77,11 @@ from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
+from .results.guess import GuessResult as GuessResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
+from .results.stability import StabilityResult as StabilityResult
 from .results.tow import TowResult as TowResult
 
 __version__: str

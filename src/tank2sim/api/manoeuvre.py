@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,7 +82,7 @@ class ManoeuvreResult(PagedResult):
     ) -> None:
         self.ship, self.words, self.run, self.bands, self.other_side = ship, words, run, bands, other_side
         self._of_run = (*_doubt_of_radians(run), *run.notices)
-        self.notices = tuple(dict.fromkeys([*self._of_run, *(bands.asked.notices if bands else ())]))
+        self.notices = tuple(dict.fromkeys([*self._of_run, *(bands.notices if bands else ())]))
 
     @property
     def figures(self) -> dict[str, float]:
@@ -122,7 +123,7 @@ class ManoeuvreResult(PagedResult):
             **self.run.reading.as_json(),
             "notices": self._of_run,
             "histories": histories(self.run.trajectory),
-            **({"ensemble": self.bands.as_json()} if self.bands else {}),
+            **({"ensemble": asdict(self.bands)} if self.bands else {}),
             **({"other_side": {"figures": other.figures, "histories": histories(other.trajectory)}} if other else {}),
         }
 
@@ -148,9 +149,9 @@ class ManoeuvreResult(PagedResult):
         figures = screen_table(self._title, columns, rows)
         if self.bands is None:
             return (figures,)
-        from tank2sim.api.ensemble import band_table
+        from tank2sim.results.ensembles import band_table
 
-        return figures, band_table(self.bands.figures, self.bands.asked)
+        return figures, band_table(self.bands, self.bands.figures)
 
     @property
     def _title(self) -> str:

@@ -21,6 +21,8 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
+    "guess": ("results.guess:GuessResult",),
+    "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

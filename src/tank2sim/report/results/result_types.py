@@ -44,18 +44,6 @@ _GAP_NOTE = (
 RESULT_TYPES = (
     ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
     ResultType("Simulated manoeuvre", "simulate", ("ship", "manoeuvre", "figures"), ("manoeuvre",)),
-    ResultType(
-        "Stability",
-        "stability",
-        ("stability_criterion", "nomoto"),
-        ("stability_criterion.stable", "stability_criterion.C_prime"),
-    ),
-    ResultType(
-        "Stability of a craft",
-        "stability",
-        ("straight_run", "difference_turns"),
-        ("straight_run.stable", "straight_run.surge_time_constant_s"),
-    ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType(
         "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)
@@ -69,7 +57,6 @@ RESULT_TYPES = (
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
-    ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Underwater glider", "glide", ("glider", "states"), ()),
     ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),

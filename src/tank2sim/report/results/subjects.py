@@ -13,7 +13,6 @@ from tank2sim.report.design.page import campaign_design_page, trial_design_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.glide.page import glide_page
-from tank2sim.report.guess.page import guess_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
@@ -21,7 +20,6 @@ from tank2sim.report.logs.page import log_page
 from tank2sim.report.manoeuvre.page import manoeuvre_page
 from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
-from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
 from tank2sim.report.yaw.page import yaw_page
@@ -59,20 +57,6 @@ _PAGES: Mapping[str, _Page] = {
     "Cards compared": _Page(
         compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),
-    "Stability": _Page(
-        stability_page,
-        {
-            "operating_point": dict,
-            "margins": dict,
-            "trim": dict,
-            "responses": list,
-            "steady_turning": dict,
-            "characteristic": dict,
-            "spirals": dict,
-            "imo": list,
-            "notices": list,
-        },
-    ),
     "Yaw rig": _Page(
         yaw_page, {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list, "notes": list}
     ),
@@ -88,10 +72,6 @@ _PAGES: Mapping[str, _Page] = {
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
         | {"imo": list, "replays": list, "notices": list},
-    ),
-    "Guessed ship": _Page(
-        guess_page,
-        {"figures": dict, "dimensions": dict, "parameters": dict, "next_figures": dict, "notices": list},
     ),
     "Captive campaign, designed": _Page(
         campaign_design_page,
