@@ -96,7 +96,7 @@ class Chance:
     beyond_card : int
         Usable members whose trial left the card's range before it was known; they count by the value found.
     band : Band or None
-        Of the values found.
+        Band of the values found.
     tail : Tail, optional
         The probability of not meeting it by importance sampling, where fewer than
         :data:`tank2sim.analysis.ensemble.tails.FEW_FAILING` members fail.
@@ -122,7 +122,7 @@ class ChanceOfAll:
     criteria : tuple of str
         Their names.
     probability_met, interval_95, tail
-        As of :class:`Chance`.
+        As in :class:`Chance`.
     """
 
     criteria: tuple[str, ...]

@@ -67,7 +67,7 @@ class CraftAtSpeed:
     surge_time_constant_s : float
         -1 over the slope of du/dt by u; None where nothing brakes the craft.
     K, T_s, T1_s, T2_s, T3_s : float
-        Of r/d; K in rad/s by rad/s; T1 and T2 are None for an oscillating pair.
+        Constants of r/d; K in rad/s by rad/s; T1 and T2 are None for an oscillating pair.
     stable : bool
         True if the straight run is stable with revolutions held: every mode decays.
     """

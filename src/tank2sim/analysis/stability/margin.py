@@ -99,7 +99,7 @@ class Margin:
     margin_percent : float
         C' in per cent of |Y'_v (N'_r - m' x'_G)|, its stabilising part.
     slopes_prime : array (2, 2)
-        Of Y' and N' by v' and r', the inertia of (3.1) included.
+        Slopes of Y' and N' by v' and r', the inertia of (3.1) included.
     derivatives : tuple of MarginInfluence
         The strongest first.
     speed : CriterionBySpeed or None

@@ -55,7 +55,7 @@ class StabilityStudy(StraightLine):
     Parameters
     ----------
     margins, trim, responses
-        Of the straight course.
+        Results of the straight course.
     steady_turning, characteristic : optional
         At the speed of expansion; None without a steady motion, which `notices` state.
     spirals : Spirals
