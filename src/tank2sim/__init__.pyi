@@ -42,7 +42,6 @@ from .api.influence import InfluenceResult as InfluenceResult
 from .api.influence import TuningResult as TuningResult
 from .api.log import LogResult as LogResult
 from .api.log import log as log
-from .api.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
 from .api.reduction import reduce as reduce
 from .api.report import ReportResult as ReportResult
@@ -78,6 +77,7 @@ from .results.conversion import ConversionResult as ConversionResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.guess import GuessResult as GuessResult
+from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult

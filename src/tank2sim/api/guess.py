@@ -8,7 +8,6 @@ from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, POSTER_MANOEUVRE
 from tank2sim.analysis.guess.prior import ShipDimensions
 from tank2sim.analysis.guess.study import guess_ship, parse_figures
 from tank2sim.api.bounds import GuessedShips, PositiveArgument, Seed, checked
-from tank2sim.api.ship import Ship
 from tank2sim.arguments import DEFAULT_MEMBERS
 from tank2sim.errors import InputError
 from tank2sim.memory import refuse_beyond_memory
@@ -76,4 +75,4 @@ def guess(
             raise InputError("figures", "", problem, f"there are: {', '.join(POSTER_MANOEUVRES)}")
         given += parse_figures(manoeuvre, text)
     study, card = guess_ship(ship, given, name, members, seed)
-    return GuessResult(study, card, Ship(card))
+    return GuessResult(study, card)

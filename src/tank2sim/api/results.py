@@ -22,6 +22,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
     "guess": ("results.guess:GuessResult",),
+    "simulate": ("results.manoeuvre:ManoeuvreResult",),
     "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""

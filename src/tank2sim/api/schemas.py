@@ -71,18 +71,6 @@ class EnsembleKeys(_Part):
     figures: dict[str, BandKeys]
 
 
-class ManoeuvreEnsembleKeys(EnsembleKeys):
-    """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track; integration steps of
-    the first members and of later ones, and whether these are in single precision."""
-
-    steps_s: list[JsonNumber]
-    single_precision: bool
-
-    t_s: list[JsonNumber]
-    histories: dict[str, JsonColumns]
-    track: dict[str, list[list[JsonNumber]]] | None
-
-
 class ComparedFigureKeys(_Part):
     """A figure of a trial next to the simulated one: D, S, E, standard uncertainties, U_val and outcome."""
 
@@ -120,31 +108,6 @@ class ReplayKeys(_Part):
     errors: list[dict[str, str | float | None]]
     measured: JsonColumns
     simulated: JsonColumns
-
-
-class OtherSideKeys(_Part):
-    """A pull-out from the other side."""
-
-    figures: FigureValues
-    histories: JsonColumns
-
-
-class SimulateKeys(_Keys):
-    """A simulated manoeuvre; `limits` by name of figure, of IMO MSC.137(76)."""
-
-    ship: str
-    length_m: JsonNumber
-    beam_m: JsonNumber
-    manoeuvre: str
-    figures: FigureValues
-    limits: dict[str, float]
-    left_card_range_s: JsonNumber
-    left_card_range_by: str
-    outside_card_range: list[str]
-    notices: list[str]
-    histories: JsonColumns
-    ensemble: NotRequired[ManoeuvreEnsembleKeys]
-    other_side: NotRequired[OtherSideKeys]
 
 
 class FourierCoefficientKeys(_Part):
@@ -811,7 +774,6 @@ KEYS: dict[str, Any] = {
     "poster": BridgeKeys,
     "run": RunKeys,
     "signals": SignalsKeys,
-    "simulate": SimulateKeys,
     "steer": SteerKeys,
     "validate": ValidateKeys | CraftValidateKeys,
     "yaw": YawKeys,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import altair as alt
 import numpy as np
@@ -34,13 +34,10 @@ class GuessResult(Result[GuessStudy]):
     study : GuessStudy
     card : ManoeuvringCard, optional
         The card; ``card.save("ship.toml")`` writes it and its covariance. None if the result was read from its JSON.
-    ship : Ship, optional
-        The ship of the card (:class:`tank2sim.Ship`).
     """
 
     study: GuessStudy
     card: ManoeuvringCard | None = None
-    ship: Any = None
     command: ClassVar[str] = "guess"
 
     @property

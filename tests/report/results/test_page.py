@@ -80,31 +80,6 @@ def test_a_gap_has_its_verdict_its_notices_and_a_map_to_switch():
     assert switch["bind"]["options"] == ["before", "after", "both"] and switch["value"] == "both"
 
 
-<<<<<<< HEAD
-def test_stability_has_its_diagrams_and_the_criteria_their_verdicts():
-    page = result_page(STABILITY, "stability.json")
-    assert page.figures[0].verdict is Verdict.PASSED
-    table = section(page, "IMO criteria").tables[0]
-    place = [column.title for column in table.columns].index("passed")
-    assert [row[place] for row in table.rows] == [Verdict.PASSED, Verdict.FAILED]
-    assert len(section(page, "Eigenvalues").charts) == 1
-    assert len(section(page, "Responses").charts) == 2
-    turning = section(page, "Steady turning").charts[0]
-    assert "Dashed where stable is false" in turning.caption
-    rows = next(iter(turning.chart.to_dict()["datasets"].values()))
-    unstable = {round(row["y0"], 9) for row in rows if not row["truth"]}
-    assert max(map(abs, unstable)) == pytest.approx(0.4)  # the line is drawn on to the first stable point
-=======
-def test_named_values_with_standard_errors_are_compared():
-    names = {"Yv": (-0.01, 1e-4), "Yr": (0.002, 1e-4), "Nv": (-0.003, 3e-4)}
-    derivatives = {name: {"value": value, "standard_error": error} for name, (value, error) in names.items()}
-    page = result_page({"campaign": "c.toml", "derivatives": derivatives}, "r.json")
-    (chart,) = section(page, "Derivatives").charts
-    rows = next(iter(chart.chart.to_dict()["datasets"].values()))
-    assert [(row["name"], row["percent"]) for row in rows] == [("Yv", 1.0), ("Yr", 5.0), ("Nv", 10.0)]
->>>>>>> 7ea12828 (Guess, stability and ensembles: studies and results are declared once)
-
-
 @pytest.mark.parametrize("result", [{}, [], 3, None, {"name": "package", "version": "1"}])
 def test_what_no_command_wrote_is_refused(result):
     with pytest.raises(InputError, match="is not a result of a tank2sim command"):
@@ -134,12 +109,6 @@ def test_the_tiles_of_coefficients_say_whether_the_trials_held_out_are_followed_
     misfit = {"fit": 1.0, "holdout": found, "before": {"fit": 2.0, "holdout": 0.997}}
     tile = result_page({"method": "output_error", "derivatives": {}, "misfit": misfit}, "r.json").figures[0]
     assert (tile.value, tile.verdict) == (f"0.997 → {found:g}", verdict) and tile.note.startswith(reported)
-
-
-def test_the_tiles_of_a_zigzag_are_its_overshoots():
-    figures = {"period_s": 215.0, "overshoots_deg": [7.8, 6.3]}
-    page = result_page({"ship": "A", "manoeuvre": "zigzag:20/20", "figures": figures}, "r.json")
-    assert [one.value for one in page.figures] == ["zigzag:20/20", 7.8, 6.3, 215.0]
 
 
 def test_a_unit_that_is_in_the_key_above_is_that_of_each_value_below():

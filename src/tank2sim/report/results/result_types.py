@@ -43,7 +43,6 @@ _GAP_NOTE = (
 
 RESULT_TYPES = (
     ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
-    ResultType("Simulated manoeuvre", "simulate", ("ship", "manoeuvre", "figures"), ("manoeuvre",)),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType(
         "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)

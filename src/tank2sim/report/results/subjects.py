@@ -17,7 +17,6 @@ from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
-from tank2sim.report.manoeuvre.page import manoeuvre_page
 from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
@@ -67,7 +66,6 @@ _PAGES: Mapping[str, _Page] = {
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
     ),
-    "Simulated manoeuvre": _Page(manoeuvre_page, {"ship": str, "histories": dict, "figures": dict, "manoeuvre": str}),
     "Validation": _Page(
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
