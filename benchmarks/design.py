@@ -6,7 +6,6 @@ steering diagram takes, continuation through the unstable branch included, besid
 
 from __future__ import annotations
 
-import math
 import time
 from importlib.util import find_spec
 
@@ -40,20 +39,22 @@ def main() -> None:
 
 def _stability(model: Model) -> None:
     found = stability_study(model)
-    assert found.turning is not None
-    folds = ", ".join(f"{math.degrees(fold.rudder_rad):.3f} deg" for fold in found.turning.folds) or "none"
-    own, margin = found.stability, found.margin
-    verdict = "stable" if own.stable else "unstable"
-    print(f"  {own.speed_mps:.4g} m/s, drift {own.drift_deg:.3g} deg, rudder {own.rudder_deg:.3g} deg: {verdict}")
+    turning = found.steady_turning
+    assert turning is not None
+    folds = ", ".join(f"{fold.rudder_deg:.3f} deg" for fold in turning.folds) or "none"
+    own, margin, verdict = found.operating_point, found.margins, found.stability_criterion
+    words = "stable" if verdict.stable else "unstable"
+    print(f"  {own.speed_mps:.4g} m/s, drift {own.drift_deg:.3g} deg, rudder {own.rudder_deg:.3g} deg: {words}")
     print(
-        f"  C' = {own.criterion:.4g}, margin {margin.percent:.3g} %, levers {margin.lever:.3g} L apart; folds: {folds}"
+        f"  C' = {verdict.C_prime:.4g}, margin {margin.margin_percent:.3g} %, levers "
+        f"{margin.lever_margin_lengths:.3g} L apart; folds: {folds}"
     )
-    ends = (math.degrees(rate) for rate in found.turning.yaw_rate_radps[[0, -1]])
+    ends = turning.points.yaw_rate_degps[[0, -1]]
     print(f"  steady turns at 35 deg to port and to starboard: {' and '.join(f'{rate:.3g}' for rate in ends)} deg/s")
-    loop = found.turning.loop
+    loop = turning.loop
     if loop:
-        height = "unknown" if loop.height_radps is None else f"{math.degrees(loop.height_radps):.3f} deg/s"
-        print(f"  hysteresis loop: {math.degrees(loop.width_rad):.2f} deg of rudder wide, {height} high")
+        height = "unknown" if loop.height_degps is None else f"{loop.height_degps:.3f} deg/s"
+        print(f"  hysteresis loop: {loop.width_deg:.2f} deg of rudder wide, {height} high")
     integrator = Integrator(model)
     simulate(model, parse_manoeuvre("turn:35"), integrator=integrator)  # compiled by now
     begin = time.perf_counter()

@@ -62,12 +62,12 @@ def main() -> int:
     begun = seconds_of_processors()
     bands = stability_bands(card, criteria, EnsembleRequest(asked.members, 1))
     worked = seconds_of_processors() - begun
-    chance = next(one for one in bands.chances if one.criterion.name == ADVANCE)
+    chance = next(one for one in bands.imo if one.name == ADVANCE)
     tail = chance.tail
-    assert chance.met is not None and tail is not None
+    assert chance.probability_met is not None and chance.interval_95 is not None and tail is not None
     print(
-        f"  {asked.members} members: {1 - chance.met:.2e} fail (95 %: {1 - chance.between[1]:.1e} to "
-        f"{1 - chance.between[0]:.1e})"
+        f"  {asked.members} members: {1 - chance.probability_met:.2e} fail (95 %: "
+        f"{1 - chance.interval_95[1]:.1e} to {1 - chance.interval_95[0]:.1e})"
     )
     if tail.probability is None or tail.standard_error is None:
         print(f"  importance sampling: {tail.remark}")
@@ -81,9 +81,9 @@ def main() -> int:
         f"  if the advance were linear: {tail.linear_probability:.2e} at {tail.distance:.2f} sd; there it is "
         f"{tail.figure:.3f} L, not {tail.linear_figure:.3f}"
     )
-    for one in bands.chances:
+    for one in bands.imo:
         if one.tail and one.tail.remark:
-            print(f"  {one.criterion.name}: {one.tail.remark}")
+            print(f"  {one.name}: {one.tail.remark}")
 
     draws, _ = draws_of(card, 2)
     begun, wall = seconds_of_processors(), time.perf_counter()

@@ -27,7 +27,6 @@ from .api.design import (
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
-from .api.guess import GuessResult as GuessResult
 from .api.guess import guess as guess
 from .api.identification import IdentificationResult as IdentificationResult
 from .api.identification import identify as identify
@@ -35,7 +34,6 @@ from .api.influence import InfluenceResult as InfluenceResult
 from .api.influence import TuningResult as TuningResult
 from .api.log import LogResult as LogResult
 from .api.log import log as log
-from .api.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
 from .api.reduction import reduce as reduce
 from .api.report import ReportResult as ReportResult
@@ -46,7 +44,6 @@ from .api.ship import load as load
 from .api.ship import ships as ships
 from .api.signals import SignalsResult as SignalsResult
 from .api.signals import signals as signals
-from .api.stability import StabilityResult as StabilityResult
 from .api.steering_models import (
     SteeringModelsResult as SteeringModelsResult,
 )
@@ -74,9 +71,12 @@ from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.glide import GlideResult as GlideResult
+from .results.guess import GuessResult as GuessResult
+from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
+from .results.stability import StabilityResult as StabilityResult
 from .results.tow import TowResult as TowResult
 from .results.yaw import YawResult as YawResult
 

@@ -56,7 +56,8 @@ class _InJson:
         if self.dtype is np.complex128 and numbers.dtype != np.complex128:
             if numbers.size and numbers.shape[-1:] != (2,):
                 raise ValueError("should hold pairs of a real and an imaginary part")
-            numbers = np.asarray(numbers.reshape(*numbers.shape[:-1], 2) @ np.array([1, 1j]))
+            pairs = numbers if numbers.size else np.zeros((0, 2))
+            numbers = np.asarray(pairs @ np.array([1, 1j]))
         if not self.scalar:
             return numbers
         if numbers.ndim:

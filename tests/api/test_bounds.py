@@ -115,7 +115,7 @@ def test_what_is_out_of_bounds_is_refused_by_name(call: Callable[[], object], na
 
 
 def test_numbers_of_numpy_and_whole_floats_are_taken() -> None:
-    assert SHIP.turn(np.float32(35), duration_s=np.int64(20), members=np.int32(0)).words == "turn:35"
+    assert SHIP.turn(np.float32(35), duration_s=np.int64(20), members=np.int32(0)).study.manoeuvre == "turn:35"
     assert (
         ArgumentBounds(0, whole=True).checked("x", 2000.0) == 2000
         and ArgumentBounds(1, 5).checked("x", np.float64(5)) == 5.0
@@ -177,7 +177,7 @@ def test_an_ensemble_that_has_no_room_is_refused_with_the_number_that_has(monkey
         SHIP.turn(35, members=9_000)
     most = int(caught.value.remedy.split()[-1].replace(",", ""))
     assert caught.value.source == "members" and 1_000 < most < 9_000
-    assert SHIP.turn(35, duration_s=1.0, members=3).bands is not None
+    assert SHIP.turn(35, duration_s=1.0, members=3).study.ensemble is not None
     with pytest.raises(t2s.InputError, match="members"):
         t2s.guess(**GUESSED, members=2_000)
 

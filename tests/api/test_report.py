@@ -9,7 +9,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.api.results import RESULT_CLASSES
-from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
+from tank2sim.report.results.result_types import RESULT_TYPES
 from tests.cli.command_line import refused, tank2sim
 
 
@@ -40,12 +40,6 @@ def test_a_report_fits_a_screen_and_has_a_picture(turn: t2s.ManoeuvreResult) -> 
     found = t2s.make_report(turn)
     assert len(repr(found).splitlines()) <= 24
     assert "data:image/png;base64," in found._repr_html_()
-
-
-def test_a_schema_decides_where_keys_would_say_something_else(turn: t2s.ManoeuvreResult) -> None:
-    keys = dict.fromkeys(("ship", "manoeuvre", "figures", "verdict", "could_hide"))
-    assert kind_of(keys, "x.json").commands == "gap"
-    assert kind_of({**keys, "schema": "tank2sim/simulate/1"}, "x.json").commands == "simulate"
 
 
 @pytest.mark.parametrize("schema", ["tank2sim/simulate/2", "tank2sim/dance/1", "simulate", 3])

@@ -92,7 +92,7 @@ def test_what_is_not_such_a_result_does_not_hold(result) -> None:
 
 
 def test_report_refuses_a_schema_that_is_not_known_or_that_the_keys_contradict(result) -> None:
-    for schema, place in (("tank2sim/stability/1", ""), ("tank2sim/simulate/99", "schema"), ("other", "schema")):
+    for schema, place in (("tank2sim/gap/1", ""), ("tank2sim/simulate/99", "schema"), ("other", "schema")):
         with pytest.raises(t2s.InputError) as raised:
             kind_of(result("simulate") | {"schema": schema}, "r.json")
         assert raised.value.place == place

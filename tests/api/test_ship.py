@@ -121,7 +121,7 @@ def test_states_that_are_left_out_follow_the_others_at_once(ship) -> None:
     hull = ship.state_space(states=["motion.v", "motion.r"], **signals)
     whole = ship.state_space(**signals)
     assert np.abs(hull.B).min() > 0  # without rudder.angle the order is the rudder
-    assert hull.dcgain() == pytest.approx(ship.stability(spirals=False).study.stability.nomoto.K_per_s, rel=0.02)
+    assert hull.dcgain() == pytest.approx(ship.stability(spirals=False).study.nomoto.dimensional.K_per_s, rel=0.02)
     slow = 1e-4j
     assert hull(slow) == pytest.approx(whole(slow), rel=0.02)
     by_angle = ship.state_space(states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])

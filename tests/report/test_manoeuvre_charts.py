@@ -1,6 +1,6 @@
 """Figures are drawn on a manoeuvre where its motion has them."""
 
-import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,10 +18,9 @@ from tank2sim.answer.charts.manoeuvre import (
     zigzag_chart,
 )
 from tank2sim.answer.charts.picture import SpiralData, chart_specification, spiral_chart
-from tank2sim.answer.page import render_page
 from tank2sim.answer.parts import Verdict
-from tank2sim.files import json_text
-from tank2sim.report.results.page import result_page
+from tank2sim.results.manoeuvre import ManoeuvreResult
+from tank2sim.simulation.bands import Band
 
 RADIUS, LENGTH, BEAM = 300.0, 100.0, 15.0
 QUARTER = 90.0
@@ -83,7 +82,7 @@ def test_the_marked_advance_is_that_of_a_simulated_track():
 
 
 def test_the_bars_of_an_ensemble_are_the_quantiles_of_its_table():
-    bands = {"advance_m": {"p5": 280.0, "p50": 300.0, "p95": 330.0}}
+    bands = {"advance_m": Band(280.0, 300.0, 330.0, 15.0, 20)}
     specification = chart_specification(turn_chart(circle(), FIGURES, bands=bands))
     (bar,) = in_style(specification, "interval")
     assert (bar["x"], bar["x2"], bar["y"]) == (280.0, 330.0, RADIUS)
@@ -112,7 +111,7 @@ def test_overshoots_reach_from_the_heading_of_the_order_to_the_peak(side):
     psi = side * 17.0 * np.sin(2 * np.pi * time / 100.0)  # peaks of 17 deg at 25, 75, 125 s
     motion = motion_of(columns(time, time, 0 * time, psi))
     figures = {"overshoots_deg": [7.0, 7.0], "execute_times_s": [10.0, 60.0], "overshoot_times_s": [15.0, 15.0]}
-    bands = {"overshoot_2_deg": {"p5": 6.0, "p95": 9.0}}
+    bands = {"overshoot_2_deg": Band(6.0, 7.0, 9.0, 1.0, 20)}
     first, second = overshoot_marks(motion, figures, 10.0, bands)
     assert (first["t"], first["from"], first["v"]) == pytest.approx((25.0, side * 10.0, side * 17.0))
     assert (second["t"], second["from"], second["v"]) == pytest.approx((75.0, -side * 10.0, -side * 17.0))
@@ -141,11 +140,14 @@ def test_a_pull_out_is_simulated_to_both_sides():
         "from a turn to starboard",
         "from a turn to port",
     }
-    result = json.loads(json_text(found.to_dict()))
-    assert "is stable" in result_page(result, "m.json").verdict
-    for side in (result, result["other_side"]):
-        side["figures"]["residual_rate_degps"] = 0.5 * side["figures"]["steady_rate_degps"]
-    assert "stay apart" in result_page(result, "m.json").verdict
+    assert "is stable" in found.headline[0]
+    apart = {
+        side: {**figures, "residual_rate_degps": 0.5 * figures["steady_rate_degps"]}
+        for side, figures in (("own", found.study.figures), ("other", found.other_side.figures))
+    }
+    other = replace(found.other_side, figures=apart["other"])
+    unstable = ManoeuvreResult(replace(found.study, figures=apart["own"], other_side=other))
+    assert "stay apart" in unstable.headline[0]
 
 
 def test_a_stop_shows_speed_and_revolutions_over_the_distance_along_the_track():
@@ -177,15 +179,17 @@ def test_limits_are_those_of_the_trials_of_the_standard():
 
 
 def test_a_figure_outside_the_range_of_the_card_has_no_claim_of_a_limit_met():
-    result = t2s.load("mariner-nominal").turn(35).to_dict()
-    first = result_page(result, "r.json").figures[0]
+    found = t2s.load("mariner-nominal").turn(35)
+    first = found.key_figures[0]
     assert (first.verdict, first.limit) == (Verdict.PASSED, pytest.approx(4.5 * 160.93))
-    outside = result_page({**result, "outside_card_range": ["advance_m"]}, "r.json").figures[0]
-    assert outside.verdict == Verdict.CAUTION
+    outside = ManoeuvreResult(replace(found.study, outside_card_range=("advance_m",)))
+    assert outside.key_figures[0].verdict == Verdict.CAUTION
+    figures = outside.tables[0].df
+    assert figures["range of the card"].to_list()[0] == "outside"
 
 
 def test_the_mark_of_a_stop_beyond_the_card_is_on_its_page():
-    result = t2s.load("mariner-nominal").turn(35, duration_s=10).to_dict()
+    found = t2s.load("mariner-nominal").turn(35, duration_s=10)
     mark = "EXTRAPOLATED beyond what the card was measured in"
-    page = result_page({**result, "notices": [mark]}, "r.json")
-    assert mark in render_page(page).partition("<main")[0]
+    page = ManoeuvreResult(replace(found.study, notices=(mark,))).page()
+    assert mark in page.partition("<main")[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
@@ -35,7 +35,7 @@ def validation_json(**changes: object) -> Any:
             "propulsion": True,
             **Validation(FIGURES, 40).as_json(),
             "verification": [{**vars(verified), "U_num": verified.numerical}],
-            "imo": [ImoCriterion("advance", 3.6, 4.5, "L").as_json()],
+            "imo": [asdict(ImoCriterion.judged("advance", 3.6, 4.5, "L"))],
             "replays": [],
             "notices": ["a notice"],
         }
@@ -82,8 +82,8 @@ def test_a_trial_that_made_the_card_is_no_validation() -> None:
 
 
 def test_a_criterion_beyond_the_card_has_no_verdict() -> None:
-    beyond = ImoCriterion("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True)
-    page = validation_page(validation_json(imo=[beyond.as_json()]))
+    beyond = ImoCriterion.judged("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True)
+    page = validation_page(validation_json(imo=[asdict(beyond)]))
     table = next(one for one in page.sections if one.heading == "Standard manoeuvres").tables[0]
     assert table.rows[0][4] == "beyond the card"
 

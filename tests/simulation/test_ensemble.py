@@ -79,7 +79,7 @@ def test_members_that_cannot_be_used_are_counted_and_reported() -> None:
     found = ensemble(Linear(), DRAWS, 200)
     expected = sum(DRAWS.member(k)["a"] > 4 for k in range(200))
     assert expected > 3 and found.unusable == {"a is too large": expected}
-    assert found.usable == 200 - expected == figure_bands(found)["slope"].shown
+    assert found.usable == 200 - expected == figure_bands(found)["slope"].shown_by
     assert found.notices == [f"{expected} of 200 members cannot be used: a is too large"]
 
 
@@ -149,9 +149,9 @@ def test_bands_are_numpys_quantiles_and_end_where_members_end() -> None:
     found = Ensemble(100, 0, {"f": np.append(values[:99, 0, 0], np.nan).astype(float)}, values)
     times, bands, track = history_bands(found, np.arange(5.0), ("x_m", "r_degps"))
     assert len(times) == 4 and track is None
-    np.testing.assert_allclose(bands["r_degps"].high, np.quantile(values[:99, 1, :4].astype(float), 0.95, axis=0))
+    np.testing.assert_allclose(bands["r_degps"].p95, np.quantile(values[:99, 1, :4].astype(float), 0.95, axis=0))
     band = figure_bands(found)["f"]
-    assert band.shown == 99 and band.low == pytest.approx(np.quantile(values[:99, 0, 0].astype(float), 0.05))
+    assert band.shown_by == 99 and band.p5 == pytest.approx(np.quantile(values[:99, 0, 0].astype(float), 0.05))
 
 
 def test_the_band_of_a_track_lies_across_its_course() -> None:
@@ -162,9 +162,9 @@ def test_the_band_of_a_track_lies_across_its_course() -> None:
     found = Ensemble(201, 0, {}, np.stack([x, y], axis=1).astype(np.float32))
     _, _, track = history_bands(found, t, ("x_m", "y_m"))
     assert track is not None
-    away = (track.high - track.middle) @ np.array([-1, 1]) / np.sqrt(2)  # to starboard of north-east
+    away = (track.high_m - track.middle_m) @ np.array([-1, 1]) / np.sqrt(2)  # to starboard of north-east
     np.testing.assert_allclose(away, 0.9, atol=1e-5)
-    np.testing.assert_allclose((track.low - track.middle) @ np.array([-1, 1]) / np.sqrt(2), -0.9, atol=1e-5)
+    np.testing.assert_allclose((track.low_m - track.middle_m) @ np.array([-1, 1]) / np.sqrt(2), -0.9, atol=1e-5)
 
 
 def test_the_band_of_a_track_ends_before_its_edges_run_back() -> None:
@@ -176,8 +176,8 @@ def test_the_band_of_a_track_ends_before_its_edges_run_back() -> None:
     assert track is not None
     # The inmost reach the centre at a = 1; with 1 of 100 of them it ends.
     assert angle[track.count - 1] == pytest.approx(1 / 0.98, abs=0.05)
-    assert np.isfinite(track.high[: track.count]).all() and np.isnan(track.low[track.count :]).all()
-    assert len(track.low) == len(angle)
+    assert np.isfinite(track.high_m[: track.count]).all() and np.isnan(track.low_m[track.count :]).all()
+    assert len(track.low_m) == len(angle)
 
 
 def test_the_band_of_tracks_is_of_where_members_go_and_not_of_when() -> None:
@@ -189,7 +189,11 @@ def test_the_band_of_tracks_is_of_where_members_go_and_not_of_when() -> None:
     _, _, track = history_bands(Ensemble(41, 0, {}, xy.astype(np.float32)), t, ("x_m", "y_m"))
     assert track is not None
     assert 0.9 * len(t) < track.count < len(t)  # those astern do not come to the end
-    for line, place in ((track.high, 2), (track.middle, 20), (track.low, 38)):  # 5, 50 and 95 % of 41, from inside
+    for line, place in (
+        (track.high_m, 2),
+        (track.middle_m, 20),
+        (track.low_m, 38),
+    ):  # 5, 50 and 95 % of 41, from inside
         x, y = line[: track.count].T
         away = y > 100  # where they touch all are one
         np.testing.assert_allclose((x**2 + y**2)[away] / (2 * y[away]), radius[place], atol=0.2)
@@ -200,7 +204,7 @@ def test_a_member_that_stops_short_ends_the_band_of_the_track_where_it_stops() -
     x = np.minimum(t, np.linspace(50, 90, 51)[:, None])
     xy = np.stack([x, np.linspace(-1, 1, 51)[:, None] * t / 100], axis=1)
     _, _, track = history_bands(Ensemble(51, 0, {}, xy.astype(np.float32)), t, ("x_m", "y_m"))
-    assert track is not None and track.middle[track.count - 1, 0] == pytest.approx(50, abs=1.5)
+    assert track is not None and track.middle_m[track.count - 1, 0] == pytest.approx(50, abs=1.5)
 
 
 def test_bands_end_where_the_first_members_do() -> None:
@@ -225,7 +229,7 @@ def test_a_member_is_followed_for_ten_steps_to_the_next_normal_and_not_further()
     def length(aside: float) -> int:
         other = np.vstack([straight[:1], straight[:-1] + np.array([0.0, aside])])
         band = track_band(np.array([straight] * 8 + [other] * 2), 20)
-        return int(np.isfinite(band.middle).all(axis=1).sum())
+        return int(np.isfinite(band.middle_m).all(axis=1).sum())
 
     assert length(FOLLOWED - 1.0) == 20  # with the step ahead exactly as far as is followed
     assert length(FOLLOWED - 0.75) == 1

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import ENSEMBLE
-from tank2sim.api.result import screen_table
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.memory import refuse_beyond_memory
-from tank2sim.units import in_words
-
-if TYPE_CHECKING:
-    from tank2sim.analysis.ensemble.results import Members
-    from tank2sim.simulation.bands import Band
-
 
 FEW = 64
 """Members that are computed in this process: fewer are done before others have started. Project choice."""
@@ -72,14 +63,3 @@ class EnsembleOptions:
             return
         with executing(self.executor) as found:
             yield found
-
-
-def band_table(bands: Mapping[str, Band], members: Members) -> Table:
-    """Quantiles (5, 50, 95 %) of figures over the members of an ensemble."""
-    rows: list[list[object]] = []
-    for name, band in bands.items():
-        kind, at, argument = name.partition("@")
-        words, unit = in_words(kind)
-        rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
-    title = f"Ensemble of {members.members}, seed {members.seed}: 90 % of the members lie between 5 and 95 %"
-    return screen_table(title, ("figure", "unit", "5 %", "50 %", "95 %", "shown by"), rows)

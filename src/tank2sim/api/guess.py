@@ -3,101 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from tank2sim.analysis.guess.conditioning import LEAST_MEMBERS, POSTER_MANOEUVRES
 from tank2sim.analysis.guess.prior import ShipDimensions
-from tank2sim.analysis.guess.study import Guess, figure_unit, guess_ship, parse_figures
-from tank2sim.answer.parts import Table
+from tank2sim.analysis.guess.study import guess_ship, parse_figures
 from tank2sim.api.bounds import GuessedShips, PositiveArgument, Seed, checked
-from tank2sim.api.result import PagedResult, screen_table
-from tank2sim.api.ship import Ship
 from tank2sim.arguments import DEFAULT_MEMBERS
-from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.memory import refuse_beyond_memory
-
-if TYPE_CHECKING:
-    import pandas as pd
-
+from tank2sim.results.guess import GuessResult
 
 _BYTES = 15_000
 """Bytes of a ship of the prior, measured: 14 kB."""
-
-
-class GuessResult(PagedResult):
-    """A guessed ship: the card with its covariance, what the figures settle, and what is predicted.
-
-    Parameters
-    ----------
-    guess : Guess
-    """
-
-    command = "guess"
-
-    def __init__(self, guess: Guess) -> None:
-        self.guess = guess
-        self.notices = guess.notices
-
-    @property
-    def card(self) -> ManoeuvringCard:
-        """The card; ``card.save("ship.toml")`` writes it and its covariance."""
-        return self.guess.card
-
-    @property
-    def ship(self) -> Ship:
-        """The ship of the card."""
-        return Ship(self.card)
-
-    @property
-    def figures(self) -> pd.DataFrame:
-        """Figures by key (m, deg): given, and quantiles of 5, 50 and 95 % by the dimensions alone and found."""
-        import pandas as pd
-
-        rows = {}
-        for key, entry in self._figures().items():
-            before, after = entry["by_dimensions"], entry["found"]
-            spread = {f"by_dimensions_{name}": value for name, value in before.items()} | dict(after)
-            rows[key] = {"given": entry["given"], **spread}
-        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("figure")
-
-    def content(self) -> Mapping[str, object]:
-        """As :meth:`.OldResult.content`."""
-        return {**self.guess.as_json(), "notices": self.notices}
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """How many figures, and what they settle."""
-        settled = [name for name, row in self.guess.parameters.items() if row[-1]]
-        words = f"{len(self.guess.given)} figures settle {', '.join(settled)}" if settled else "nothing is settled"
-        return (f"{self.card.ship.name}: {words}",)
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """Figures given and predicted; numbers of the card before and after; what would help most."""
-        rows: list[list[object]] = []
-        for key, entry in self._figures().items():
-            before, after = entry["by_dimensions"], entry["found"]
-            spread = f"{before['p5']:.4g} to {before['p95']:.4g}"
-            rows.append([key, figure_unit(key), entry["given"], spread, *after.values()])
-        columns = ("figure", "unit", "given", "by dimensions", "5 %", "50 %", "95 %")
-        numbers: list[list[object]] = [
-            [name, f"{row[0]:.3g} ± {row[1]:.2g}", f"{row[2]:.3g} ± {row[3]:.2g}", "settled" if row[4] else "open"]
-            for name, row in self.guess.parameters.items()
-        ]
-        helpful: list[list[object]] = [[key, 100 * share] for key, share in self.guess.next_figures.items()]
-        return (
-            screen_table("Figures: nine of ten such ships lie between 5 and 95 %", columns, rows),
-            screen_table(
-                "Numbers of the card", ("number", "by dimensions", "with the figures", ""), numbers, wide=True
-            ),
-            screen_table("Which further figure would help most", ("figure", "variance gone (%)"), helpful),
-        )
-
-    def _figures(self) -> dict[str, dict[str, dict[str, float]]]:
-        found = self.guess.as_json()["figures"]
-        assert isinstance(found, dict)
-        return found
 
 
 @checked
@@ -157,4 +74,5 @@ def guess(
             problem = f"{manoeuvre!r} is not a manoeuvre of a poster"
             raise InputError("figures", "", problem, f"there are: {', '.join(POSTER_MANOEUVRES)}")
         given += parse_figures(manoeuvre, text)
-    return GuessResult(guess_ship(ship, given, name, members, seed))
+    study, card = guess_ship(ship, given, name, members, seed)
+    return GuessResult(study, card)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,13 +19,14 @@ from tank2sim.analysis.tuning.targets import TARGET_OPTION, Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.analysis.validation.standard_trials import craft_trials
 from tank2sim.answer.parts import Table
-from tank2sim.api.ensemble import FEW_IN_LANES, EnsembleOptions, band_table
+from tank2sim.api.ensemble import FEW_IN_LANES, EnsembleOptions
 from tank2sim.api.result import PagedResult, screen_table
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, CraftCard
 from tank2sim.cards.covariance_reading import derived_card
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
+from tank2sim.results.ensembles import band_table
 from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 
@@ -79,7 +81,7 @@ class InfluenceResult(PagedResult):
         self.ship, self.found, self.bands = ship, found, bands
         compiler = [] if find_compiler() else [NO_COMPILER]
         self._notices = tuple(dict.fromkeys([*found.notices, *self._card_notices(), *compiler]))
-        self.notices = tuple(dict.fromkeys([*self._notices, *(bands.asked.notices if bands else ())]))
+        self.notices = tuple(dict.fromkeys([*self._notices, *(bands.notices if bands else ())]))
 
     @property
     def figures(self) -> pd.DataFrame:
@@ -117,7 +119,7 @@ class InfluenceResult(PagedResult):
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.OldResult.content`."""
-        ensemble = {"ensemble": self.bands.as_json()} if self.bands else {}
+        ensemble = {"ensemble": asdict(self.bands)} if self.bands else {}
         return {**self.found.as_json(), **ensemble, "notices": self._notices}
 
     @property
@@ -128,7 +130,7 @@ class InfluenceResult(PagedResult):
     @property
     def tables(self) -> tuple[Table, ...]:
         """Figures, coefficients, joint variation; bands of an ensemble."""
-        bands = (band_table(self.bands.figures, self.bands.asked),) if self.bands else ()
+        bands = (band_table(self.bands, self.bands.figures),) if self.bands else ()
         return *_influence_tables(self.found), *bands
 
     @property

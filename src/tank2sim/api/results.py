@@ -25,6 +25,9 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),
     "yaw": ("results.yaw:YawResult",),
+    "guess": ("results.guess:GuessResult",),
+    "simulate": ("results.manoeuvre:ManoeuvreResult",),
+    "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -71,71 +71,6 @@ class EnsembleKeys(_Part):
     figures: dict[str, BandKeys]
 
 
-class ManoeuvreEnsembleKeys(EnsembleKeys):
-    """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track; integration steps of
-    the first members and of later ones, and whether these are in single precision."""
-
-    steps_s: list[JsonNumber]
-    single_precision: bool
-
-    t_s: list[JsonNumber]
-    histories: dict[str, JsonColumns]
-    track: dict[str, list[list[JsonNumber]]] | None
-
-
-class TailKeys(_Part):
-    """A small probability of not meeting a criterion, by importance sampling."""
-
-    distance: float
-    linear_probability: float
-    linear_figure: float
-    figure: JsonNumber
-    effective_size: float
-    remark: str
-    probability: JsonNumber
-    standard_error: JsonNumber
-    members: int
-    failing: int
-    not_shown: int
-    unusable: int
-    beyond_card: int
-    unusable_probability: float
-    failing_ships: dict[str, float]
-
-
-class ChanceKeys(_Part):
-    """The probability of an IMO criterion over the members."""
-
-    name: str
-    allowed: float
-    unit: str
-    probability_met: JsonNumber
-    interval_95: list[float] | None
-    not_shown: int
-    beyond_card: int
-    band: BandKeys | None
-    tail: TailKeys | None
-
-
-class ChanceOfAllKeys(_Part):
-    """The probability of all IMO criteria that are judged within the card's range."""
-
-    criteria: list[str]
-    probability_met: float
-    interval_95: list[float]
-    tail: TailKeys | None
-
-
-class StabilityEnsembleKeys(EnsembleKeys):
-    """Bands of the straight course, and the probability of each IMO criterion and of all together."""
-
-    probability_stable: JsonNumber
-    probability_stable_interval_95: list[float] | None
-    imo: list[ChanceKeys]
-    imo_all: ChanceOfAllKeys | None
-    curves: dict[str, Any] | None
-
-
 class ComparedFigureKeys(_Part):
     """A figure of a trial next to the simulated one: D, S, E, standard uncertainties, U_val and outcome."""
 
@@ -173,87 +108,6 @@ class ReplayKeys(_Part):
     errors: list[dict[str, str | float | None]]
     measured: JsonColumns
     simulated: JsonColumns
-
-
-class OtherSideKeys(_Part):
-    """A pull-out from the other side."""
-
-    figures: FigureValues
-    histories: JsonColumns
-
-
-class SimulateKeys(_Keys):
-    """A simulated manoeuvre; `limits` by name of figure, of IMO MSC.137(76)."""
-
-    ship: str
-    length_m: JsonNumber
-    beam_m: JsonNumber
-    manoeuvre: str
-    figures: FigureValues
-    limits: dict[str, float]
-    left_card_range_s: JsonNumber
-    left_card_range_by: str
-    outside_card_range: list[str]
-    notices: list[str]
-    histories: JsonColumns
-    ensemble: NotRequired[ManoeuvreEnsembleKeys]
-    other_side: NotRequired[OtherSideKeys]
-
-
-class OperatingPointKeys(_Part):
-    """The straight course about which the ship is linearised."""
-
-    speed_mps: float
-    drift_deg: float
-    rudder_deg: float
-
-
-class SteadySpeedKeys(TypedDict):
-    """A speed straight ahead that the engine holds."""
-
-    speed_mps: JsonNumber
-    stable: bool
-
-
-class StabilityKeys(_Keys):
-    """Stability, steady turning and IMO criteria."""
-
-    ship: str
-    operating_point: OperatingPointKeys
-    eigenvalues: list[list[JsonNumber]]
-    stability_criterion: dict[str, bool | float | list[str] | None]
-    nomoto: dict[str, dict[str, JsonNumber]]
-    margins: dict[str, Any]
-    trim: dict[str, Any]
-    responses: list[dict[str, Any]]
-    steady_turning: dict[str, Any] | None
-    characteristic: dict[str, Any] | None
-    spirals: dict[str, dict[str, Any] | None]
-    imo: list[ImoKeys]
-    steady_speeds: list[SteadySpeedKeys]
-    notices: list[str]
-    ensemble: NotRequired[StabilityEnsembleKeys]
-
-
-class DifferenceTurnKeys(_Part):
-    """A steady turn of a craft; difference, yaw rate and drift positive in a turn to starboard."""
-
-    difference_rpm: float
-    speed_mps: float
-    yaw_rate_degps: float
-    drift_deg: float
-    diameter_m: float
-
-
-class CraftStabilityKeys(_Keys):
-    """Straight-line stability, surge and turning of a craft with thrusters."""
-
-    ship: str
-    straight_run: dict[str, Any]
-    speeds: list[dict[str, Any]]
-    highest_speed_mps: float
-    difference_turns: list[DifferenceTurnKeys]
-    notices: list[str]
 
 
 class EstimateKeys(_Part):
@@ -689,60 +543,16 @@ class ValidateKeys(_Keys):
     notices: list[str]
 
 
-class QuantileKeys(_Part):
-    """Quantiles of 5, 50 and 95 %."""
-
-    p5: float
-    p50: float
-    p95: float
-
-
-class GuessFigureKeys(_Part):
-    """A figure of a guessed ship: given or not, by the dimensions alone, and with the figures given."""
-
-    unit: str
-    given: JsonNumber
-    standard_error: JsonNumber
-    by_dimensions: QuantileKeys
-    found: QuantileKeys
-
-
-class GuessNumberKeys(_Part):
-    """A number of the card of a guessed ship."""
-
-    by_dimensions: float
-    by_dimensions_standard_error: float
-    value: float
-    standard_error: float
-    settled: bool
-
-
-class GuessKeys(_Keys):
-    """A ship guessed from dimensions and figures."""
-
-    ship: str
-    dimensions: dict[str, float]
-    members: int
-    seed: int
-    figures: dict[str, GuessFigureKeys]
-    parameters: dict[str, GuessNumberKeys]
-    next_figures: dict[str, float]
-    notices: list[str]
-
-
 KEYS: dict[str, Any] = {
     "compare": CompareKeys,
     "demo": DemoKeys,
     "gap": GapKeys,
-    "guess": GuessKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "signals": SignalsKeys,
-    "simulate": SimulateKeys,
-    "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,
     "validate": ValidateKeys | CraftValidateKeys,
 }

@@ -38,15 +38,15 @@ if TYPE_CHECKING:
 
     from tank2sim.answer.result import Result
     from tank2sim.api.bridge import PilotCardResult, PosterResult
-    from tank2sim.api.craft_stability import CraftStabilityResult
     from tank2sim.api.influence import InfluenceResult, TuningResult
-    from tank2sim.api.manoeuvre import ManoeuvreResult
-    from tank2sim.api.stability import StabilityResult
     from tank2sim.api.steering_page import SteeringPageResult
     from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.dynamics.model import Model
+    from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
     from tank2sim.results.glide import GlideResult
+    from tank2sim.results.manoeuvre import ManoeuvreResult
+    from tank2sim.results.stability import StabilityResult
     from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
 
@@ -373,7 +373,7 @@ class Ship:
             The ship holds no straight course; an ensemble of a craft.
         """
         if isinstance(self.card, CraftCard):
-            from tank2sim.api.craft_stability import judge_craft_stability
+            from tank2sim.api.stability import judge_craft_stability
 
             if members:
                 problem = "is of the IMO criteria, which a craft without a rudder has not"

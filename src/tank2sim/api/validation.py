@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -120,7 +120,7 @@ class ValidationResult(OldResult):
             "propulsion": card.propulsion is not None,
             **self.validation.as_json(),
             "verification": [{**vars(row), "U_num": row.numerical} for row in self.verified],
-            "imo": [criterion.as_json() for criterion in self.criteria],
+            "imo": [asdict(criterion) for criterion in self.criteria],
             "replays": [_replay_as_json(replay) for replay in self.replays],
             "notices": self.notices,
         }

@@ -66,7 +66,7 @@ def command(
         members=members,
         seed=seed,
     )
-    files = result.card.files(output) if output else {}
+    files = result.card.files(output) if output and result.card else {}
     write_result(result, [], json_file=json_file, page=page, files=files)
     show_result(result)
     if output:

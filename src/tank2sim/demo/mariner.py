@@ -24,6 +24,7 @@ from tank2sim.answer.charts.picture import (
 from tank2sim.answer.charts.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.answer.study import study_values
 from tank2sim.arrays import Array
 from tank2sim.cards import linear_card, read_card
 from tank2sim.demo.fmu_helpers import DemoOutcome, Workshop, demo_output_errors, error_words, largest_error
@@ -66,8 +67,8 @@ def mariner(workshop: Workshop) -> DemoOutcome:
     figures = _figures(reports, runs["turn-35"][THIRD], runs["zigzag-20-20"][THIRD], judged[THIRD])
     result: dict[str, object] = {
         "figures": {name: {kind: entry.figures for kind, entry in run.items()} for name, run in runs.items()},
-        "stability": {kind: entry.as_json() for kind, entry in judged.items()},
-        "imo": [criterion.as_json() for criterion in criteria],
+        "stability": {kind: study_values(entry.reported()) for kind, entry in judged.items()},
+        "imo": [study_values(criterion) for criterion in criteria],
         "checks": [asdict(report) for report in reports],
     }
     return DemoOutcome(figures, sections, result)

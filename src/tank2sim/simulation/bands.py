@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number
 from tank2sim.simulation.ensemble import Ensemble
 
 QUANTILES = (0.05, 0.50, 0.95)
@@ -30,29 +30,25 @@ _ROUNDED = 0.001
 
 @dataclass(frozen=True)
 class Band:
-    """A band of a figure: its 5, 50 and 95 % quantiles over the members that show it, and their number."""
+    """A band of a figure: 5, 50 and 95 % quantiles and standard deviation over the members that show it (`shown_by`).
 
-    low: float
-    median: float
-    high: float
-    shown: int
+    The standard deviation is nan for one member.
+    """
 
-    def as_json(self) -> dict[str, object]:
-        """The band by the names of the quantiles."""
-        return {"p5": self.low, "p50": self.median, "p95": self.high, "shown_by": self.shown}
+    p5: float
+    p50: float
+    p95: float
+    standard_deviation: Number
+    shown_by: int
 
 
 @dataclass(frozen=True, eq=False)
 class BandOverTime:
-    """A band of a signal: its quantiles (n,) at the times of :class:`Bands`."""
+    """A band of a signal: its 5, 50 and 95 % quantiles (n,) at the times of the bands; nan where no member runs."""
 
-    low: Array
-    median: Array
-    high: Array
-
-    def as_json(self) -> dict[str, object]:
-        """The band by the names of the quantiles."""
-        return {"p5": self.low, "p50": self.median, "p95": self.high}
+    p5: Array
+    p50: Array
+    p95: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,38 +66,39 @@ class TrackBand:
 
     Parameters
     ----------
-    middle, low, high : array (n, 2)
+    middle_m, low_m, high_m : array (n, 2)
         x and y, m, of the 50, 5 and 95 % quantiles, at the times of the bands (of the leading track).
     """
 
-    middle: Array
-    low: Array
-    high: Array
+    middle_m: Array
+    low_m: Array
+    high_m: Array
 
     @property
     def count(self) -> int:
         """Times up to its end."""
-        return int(np.isfinite(self.middle[:, 0]).sum())
-
-    def as_json(self) -> dict[str, object]:
-        """The three lines as points."""
-        return {"middle_m": self.middle, "low_m": self.low, "high_m": self.high}
+        return int(np.isfinite(self.middle_m[:, 0]).sum())
 
 
 def figure_bands(found: Ensemble) -> dict[str, Band]:
     """The band of every figure, by name."""
     bands = {}
     for name, values in found.figures.items():
-        shown = values[np.isfinite(values)]
-        if len(shown):
-            low, median, high = (float(value) for value in np.quantile(shown, QUANTILES))
-            bands[name] = Band(low, median, high, len(shown))
+        if np.isfinite(values).any():
+            bands[name] = band_of(values)
     return bands
+
+
+def band_of(values: Array) -> Band:
+    """The band of the finite ones of values (n,), at least one."""
+    shown = values[np.isfinite(values)]
+    p5, p50, p95 = (float(value) for value in np.quantile(shown, QUANTILES))
+    return Band(p5, p50, p95, float(np.std(shown, ddof=1)) if len(shown) > 1 else math.nan, len(shown))
 
 
 def history_bands(
     found: Ensemble, times: Array, signals: tuple[str, ...]
-) -> tuple[Array, Mapping[str, BandOverTime], TrackBand | None]:
+) -> tuple[Array, dict[str, BandOverTime], TrackBand | None]:
     """Times (n,) at which enough members still run, the bands of the signals, and that of the track.
 
     `signals` are the names of the rows of the histories; the track needs ``x_m`` and ``y_m``.
@@ -115,8 +112,7 @@ def history_bands(
     kept = kept[begun]
     bands = {}
     for row, name in enumerate(signals):
-        low, median, high = _quantiles(kept[:, row, :count])
-        bands[name] = BandOverTime(low, median, high)
+        bands[name] = BandOverTime(*_quantiles(kept[:, row, :count]))
     track = None
     if count > 1 and {"x_m", "y_m"} <= set(signals):
         tracks = kept[:, [signals.index("x_m"), signals.index("y_m")]].transpose(0, 2, 1)

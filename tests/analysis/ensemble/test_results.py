@@ -145,20 +145,21 @@ def test_members_take_their_numbers_together_from_the_samples_of_a_card(tmp_path
 def test_members_without_a_mass_matrix_and_runaways_are_counted(mariner_card: ManoeuvringCard) -> None:
     card = changed(mariner_card, Yvdot=0.02)
     bands = manoeuvre_bands(card, Turn(TWENTY), (200.0, 200.0), EnsembleRequest(40, 1))
-    assert 5 < sum(bands.asked.unusable.values()) < 35
-    assert any("positive" in notice for notice in bands.asked.notices)
-    assert bands.figures["time_90_s"].shown <= bands.asked.usable == 40 - sum(bands.asked.unusable.values())
+    assert 5 < sum(bands.unusable.values()) < 35
+    assert any("positive" in notice for notice in bands.notices)
+    assert bands.figures["time_90_s"].shown_by <= bands.usable == 40 - sum(bands.unusable.values())
 
 
 def test_the_chance_of_a_criterion_is_the_share_that_meets_it() -> None:
     values = np.concatenate([np.full(60, 1.0), np.full(30, 3.0), np.full(10, np.nan)])
     found = chance(
-        ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(105, 0, {"c": np.append(values, [np.nan] * 5)}, None, {"x": 5})
+        ImoCriterion.judged("c", 1.0, 2.0, "L"),
+        Ensemble(105, 0, {"c": np.append(values, [np.nan] * 5)}, None, {"x": 5}),
     )
-    assert found.met == pytest.approx(0.6) and found.undecided == 10
+    assert found.probability_met == pytest.approx(0.6) and found.not_shown == 10
     # Wilson's interval of 60 of 100, as tabled.
-    assert found.between == pytest.approx((0.5020, 0.6906), abs=1e-4)
-    assert chance(ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(3, 0, {})).met is None
+    assert found.interval_95 == pytest.approx((0.5020, 0.6906), abs=1e-4)
+    assert chance(ImoCriterion.judged("c", 1.0, 2.0, "L"), Ensemble(3, 0, {})).probability_met is None
 
 
 @pytest.mark.slow
@@ -167,18 +168,19 @@ def test_the_chance_of_meeting_a_limit_at_the_median_is_a_half(mariner_card, mar
     assert criteria[0].found is not None
     at_median = replace(criteria[0], allowed=criteria[0].found)
     found = stability_bands(mariner_card, [at_median], EnsembleRequest(16, 2))
-    (one,) = found.chances
-    assert one.met is not None and abs(one.met - 0.5) < 0.35 and found.stable == 1.0
+    (one,) = found.imo
+    assert one.probability_met is not None and abs(one.probability_met - 0.5) < 0.35 and found.probability_stable == 1.0
     # Wilson's interval of 16 of 16: from 1/(1 + z^2/n).
-    assert found.as_json()["probability_stable_interval_95"] == pytest.approx([1 / (1 + 1.959964**2 / 16), 1.0])
-    assert one.band is not None and one.band.low < criteria[0].found < one.band.high
+    assert found.probability_stable_interval_95 == pytest.approx([1 / (1 + 1.959964**2 / 16), 1.0])
+    assert one.band is not None and one.band.p5 < criteria[0].found < one.band.p95
 
 
 @pytest.mark.slow
 def test_slow_motions_alone_give_no_probability_of_stability(mariner_card) -> None:
     roll = "\n[[effects]]\nname = 'roll_coupling'\n[effects.parameters]\nYphi = 0.001\nNphi = 0.02\n"
     found = stability_bands(parse_card(mariner_card.text + roll, "roll.toml"), [], EnsembleRequest(2, 0))
-    assert found.stable is found.stable_between is None and any("motion.phi" in one for one in found.asked.notices)
+    assert found.probability_stable is found.probability_stable_interval_95 is None
+    assert any("motion.phi" in one for one in found.notices)
 
 
 def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_card, mariner) -> None:
@@ -204,14 +206,14 @@ def test_members_beyond_the_card_are_those_whose_own_trials_left_its_range(marin
         if name + BEYOND_CARD_MARK in found.figures:
             assert (found.figures[name + BEYOND_CARD_MARK] > 0).tolist() == beyond, name
     assert 0 < sum(expected["advance"]) < 6
-    assert chance(ImoCriterion("advance", 1.0, 9.0, "L"), found).beyond == sum(expected["advance"])
+    assert chance(ImoCriterion.judged("advance", 1.0, 9.0, "L"), found).beyond_card == sum(expected["advance"])
 
 
 def test_all_criteria_together_are_met_by_members_that_meet_each() -> None:
     figures = {"a": np.array([1.0, 1, 3, np.nan, 1]), "b": np.array([1.0, 5, 1, 1, np.nan])}
     found = all_chances({"a": 2.0, "b": 2.0}, Ensemble(5, 0, figures, None, {"x": 1}))
-    assert found is not None and found.met == pytest.approx(1 / 4)
-    assert found.between == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of Wilson, 1 of 4
+    assert found is not None and found.probability_met == pytest.approx(1 / 4)
+    assert found.interval_95 == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of Wilson, 1 of 4
     assert all_chances({}, Ensemble(5, 0, figures)) is None
 
 

@@ -11,11 +11,6 @@ import pytest
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import ShipText
 from tank2sim.analysis.ensemble.steering import (
-    FROM_PORT,
-    FROM_STARBOARD,
-    MAGNITUDE,
-    PHASE,
-    STEP,
     Grid,
     _responses,
     branches,
@@ -42,12 +37,12 @@ def found(request: pytest.FixtureRequest):
     assert isinstance(card, ManoeuvringCard)
     draws, _ = draws_of(card, 3)
     grid = grid_of(card)
-    return card, draws, grid, steering_bands(ShipText.of(card), draws, MEMBERS, (None, grid))
+    return card, draws, grid, *steering_bands(ShipText.of(card), draws, MEMBERS, (None, grid))
 
 
 @pytest.mark.slow
 def test_bands_are_the_quantiles_of_the_members_own_responses(found) -> None:
-    card, draws, grid, bands = found
+    card, draws, grid, bands, _ = found
     model, magnitude, phase, step = build(card), [], [], []
     for number in range(MEMBERS):
         member = model.with_values(draws.member(number))
@@ -59,15 +54,15 @@ def test_bands_are_the_quantiles_of_the_members_own_responses(found) -> None:
         values, vectors = np.linalg.eig(A)
         modes = (np.exp(np.outer(grid.time_s, values)) - 1) / values
         step.append(((modes * np.linalg.solve(vectors, B)) @ vectors.T)[:, 1].real)
-    for name, truth in ((MAGNITUDE, magnitude), (STEP, step)):
-        for side, share in ((bands.curves[name].low, 0.05), (bands.curves[name].high, 0.95)):
+    for band, truth in ((bands.bode.magnitude_dB, magnitude), (bands.step.step_per_s, step)):
+        for side, share in ((band.p5, 0.05), (band.p95, 0.95)):
             np.testing.assert_allclose(side, np.quantile(truth, share, axis=0), rtol=2e-3, atol=2e-4)
     # But for whole turns; all within half a turn of the ship's own at the highest frequency.
-    off = bands.curves[PHASE].median - np.median(np.unwrap(phase, axis=0, period=360), axis=0)
+    off = bands.bode.phase_deg.p50 - np.median(np.unwrap(phase, axis=0, period=360), axis=0)
     np.testing.assert_allclose(off - 360 * np.round(off / 360), 0.0, atol=0.2)
-    assert abs(bands.curves[PHASE].high[-1] - grid.phase_deg) < 180
+    assert abs(bands.bode.phase_deg.p95[-1] - grid.phase_deg) < 180
     turned = _responses(model, None, replace(grid, phase_deg=grid.phase_deg + 360))[1]
-    np.testing.assert_allclose(turned - bands.reference[PHASE], 360.0, atol=1e-4)
+    np.testing.assert_allclose(turned - bands.bode.phase_deg.own, 360.0, atol=1e-4)
 
 
 def _yaw_by_rudder(model, course) -> tuple[np.ndarray, np.ndarray]:
@@ -86,25 +81,23 @@ def _yaw_by_rudder(model, course) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_branches_are_those_of_the_diagram_and_part_in_the_loop_alone(found) -> None:
-    card, _, grid, bands = found
+    card, _, grid, bands, notices = found
     turning = steady_turning(build(card))
     starboard, port = branches(turning, grid.rudder_rad)
-    np.testing.assert_allclose(bands.reference[FROM_STARBOARD], starboard, rtol=1e-6)
+    own = bands.steady_turning.yaw_rate_from_starboard_degps.own
+    np.testing.assert_allclose(own, starboard, rtol=1e-6)
     edge = math.degrees(turning.loop.width_rad) / 2 if turning.loop else 0.0
     middle = math.degrees(turning.rudder_rad[turning.straight])
     parts = np.abs(starboard - port) > 1e-6
     inside = np.abs(np.degrees(grid.rudder_rad) - middle) < max(edge - 0.6, 0.0)
     assert parts[inside].all() and not parts[np.abs(np.degrees(grid.rudder_rad) - middle) > edge + 0.6].any()
-    assert (bands.with_loop > 0) == (turning.loop is not None) and inside.any() == (turning.loop is not None)
-    low, high = bands.curves[FROM_PORT].low, bands.curves[FROM_PORT].high
+    assert (bands.steady_turning.with_loop > 0) == (turning.loop is not None) and inside.any() == (
+        turning.loop is not None
+    )
+    from_port = bands.steady_turning.yaw_rate_from_port_degps
+    low, high = from_port.p5, from_port.p95
     assert np.all((low <= high) | np.isnan(low)) and low[-1] < port[-1] < high[-1]
-    assert np.isnan(low).any() == any("no stable turn" in one for one in bands.notices)
+    assert np.isnan(low).any() == any("no stable turn" in one for one in notices)
     if turning.loop:
-        assert bands.loop_width_deg.low < 2 * edge < bands.loop_width_deg.high * 1.5
-
-
-def test_curves_go_to_json_with_the_ships_own(found) -> None:
-    *_, grid, bands = found
-    reported = bands.as_json()
-    assert reported["members"] == MEMBERS and len(reported["bode"][MAGNITUDE]["own"]) == len(grid.omega_radps)
-    assert np.isfinite(reported["step"][STEP]["p95"]).all()
+        assert bands.steady_turning.loop_width_deg.p5 < 2 * edge < bands.steady_turning.loop_width_deg.p95 * 1.5
+    assert bands.members == MEMBERS and np.isfinite(bands.step.step_per_s.p95).all()

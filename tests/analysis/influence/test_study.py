@@ -98,7 +98,7 @@ def test_linear_figures_are_those_of_the_stability_analysis(ship) -> None:
     found = study_of(card, "K_per_s", "T_s", "T1_s", "T2_s", "T3_s", "T_prime", "criterion_C").base
     known = stability(build(card))
     own = known.nomoto
-    wanted = [own.K_per_s, own.T_s, own.T1_s, own.T2_s, own.T3_s, known.nomoto_prime.T_s, known.criterion]
+    wanted = [own.K_per_s, own.T_s, own.T1_s, own.T2_s, own.T3_s, known.nomoto_prime.T_prime, known.criterion]
     assert found == pytest.approx(wanted, rel=1e-9)
 
 

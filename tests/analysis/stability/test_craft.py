@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.analysis.stability.craft import craft_stability
-from tank2sim.api.craft_stability import CraftStabilityResult
+from tank2sim.analysis.stability.craft import craft_stability, keeps_nearly_straight
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
+from tank2sim.results.craft_stability import CraftStabilityResult
 
 CARD = """
 format = "tank2sim-ship/1"
@@ -57,9 +57,9 @@ def made_up():
 
 
 def test_surge_and_steering_are_those_of_the_equations_written_out(made_up):
-    run = craft_stability(made_up).run
+    run = craft_stability(made_up).straight_run
     n = math.sqrt(50 / 2 / 0.01)  # 30 u + 20 u|u| of both thrusters
-    assert run.revolutions_radps == pytest.approx(n)
+    assert run.revolutions_rpm == pytest.approx(n * 30 / math.pi)
     assert run.surge_time_constant_s == pytest.approx(85 / (30 + 2 * 20 * 1.0))
     # (m - Yvdot) v' = Yv v - (m - Xudot) u r,  (I - Nrdot) r' = (Nv + (Yvdot - Xudot) u) v + Nr r + N  at u = 1 m/s
     A = np.array([[-60 / 120, -85 / 120], [(-2 + (-40 + 5)) / 26, -20 / 26]])
@@ -73,29 +73,29 @@ def test_surge_and_steering_are_those_of_the_equations_written_out(made_up):
 
 def test_a_steady_turn_is_that_to_which_the_simulation_comes():
     otter = t2s.load("otter")
-    turn = craft_stability(otter.card).turns[3]
-    found = otter.simulate(f"difference:{turn.difference_radps * 30 / math.pi}", duration_s=60).figures
-    assert found["steady_rate_degps"] == pytest.approx(math.degrees(turn.yaw_rate_radps), rel=1e-3)
+    turn = craft_stability(otter.card).difference_turns[3]
+    found = otter.simulate(f"difference:{turn.difference_rpm}", duration_s=60).figures
+    assert found["steady_rate_degps"] == pytest.approx(turn.yaw_rate_degps, rel=1e-3)
     assert found["steady_diameter_m"] == pytest.approx(turn.diameter_m, rel=1e-3)
-    assert found["steady_drift_deg"] == pytest.approx(math.degrees(turn.drift_rad), rel=1e-3)
+    assert found["steady_drift_deg"] == pytest.approx(turn.drift_deg, rel=1e-3)
 
 
 def test_a_craft_unstable_on_a_straight_course_turns_without_a_difference():
     study = craft_stability(t2s.load("otter").card)
-    assert not study.run.stable
-    assert study.turns[0].difference_radps == 0.0
-    assert study.turns[0].yaw_rate_radps > 0
-    assert craft_stability(t2s.load("otter").card, 0.7).run.stable
+    assert not study.straight_run.stable
+    assert study.difference_turns[0].difference_rpm == 0.0
+    assert study.difference_turns[0].yaw_rate_degps > 0
+    assert craft_stability(t2s.load("otter").card, 0.7).straight_run.stable
 
 
 @pytest.mark.parametrize(("lengths", "nearly_straight"), [(30.0, False), (1.2e4, True)])
 def test_a_loop_of_thousands_of_lengths_is_nearly_straight(lengths, nearly_straight):
     otter = t2s.load("otter")
     study = craft_stability(otter.card)
-    alone = replace(study.turns[0], diameter_m=lengths * otter.card.ship.length_m)
-    found = CraftStabilityResult(otter, replace(study, turns=(alone, *study.turns[1:])))
-    assert (found.stable, found.nearly_straight) == (False, nearly_straight)
-    assert found.to_dict()["nearly_straight"] is nearly_straight
+    alone = replace(study.difference_turns[0], diameter_m=lengths * otter.card.ship.length_m)
+    assert keeps_nearly_straight(study.straight_run, [alone], study.length_m) is nearly_straight
+    found = CraftStabilityResult(replace(study, difference_turns=(alone, *study.difference_turns[1:])))
+    assert not found.stable
     assert ("by itself" in " ".join(found.headline)) is not nearly_straight
 
 

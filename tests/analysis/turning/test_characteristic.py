@@ -49,16 +49,19 @@ def test_norrbin_and_bech_of_a_cubic_ship_are_her_own_coefficients(N_r: float) -
     time = LENGTH_M / SPEED_MPS
     b1, b3 = -N_r / N_D * time, -N_RRR / N_D * time**3
     np.testing.assert_allclose(found.bech.coefficients, [0, b1, 0, b3], rtol=1e-5, atol=1e-5 * abs(b1))
-    np.testing.assert_allclose(found.n, [0, math.copysign(1, b1), 0, b3 / abs(b1)], rtol=1e-5, atol=1e-5)
-    assert found.bech.largest_rad < 1e-5 and found.norrbin.beyond_rad < 1e-5
-    assert found.K_per_s == pytest.approx(abs(stability(model).nomoto.K_per_s), rel=1e-6)
+    np.testing.assert_allclose(
+        found.norrbin.coefficients, [0, math.copysign(1, b1), 0, b3 / abs(b1)], rtol=1e-5, atol=1e-5
+    )
+    assert found.bech.error.largest_deg < 1e-3 and found.norrbin.error.largest_beyond_fit_deg < 1e-3
+    assert found.norrbin.K_per_s == pytest.approx(abs(stability(model).nomoto.K_per_s), rel=1e-6)
 
 
 def test_the_error_of_a_cubic_is_reported_where_a_ship_is_none(mariner) -> None:
     found = steering_characteristic(steady_turning(mariner))
     assert found is not None
-    assert found.n[1] == 1.0 and 0.1 < math.degrees(found.bech.rms_rad) < math.degrees(found.norrbin.rms_rad) < 2
-    assert found.bech.beyond_rad > found.bech.largest_rad
+    bech, norrbin = found.bech.error, found.norrbin.error
+    assert found.norrbin.n1 == 1.0 and 0.1 < bech.rms_deg < norrbin.rms_deg < 2
+    assert bech.largest_beyond_fit_deg > bech.largest_deg
 
 
 @pytest.mark.slow
@@ -67,14 +70,15 @@ def test_spirals_lie_on_the_diagram_the_reverse_one_on_its_unstable_branch_too()
     turning = steady_turning(model)
     direct, reverse = direct_spiral(model, turning), reverse_spiral(model, turning, stability(model).nomoto)
     assert reverse is not None and turning.loop is not None
-    rate = abs(turning.folds[0].yaw_rate_radps)
-    assert direct.steady.mean() > 0.8 and reverse.steady.mean() > 0.8
-    assert np.all(np.abs(direct.yaw_rate_radps) > rate)
-    assert np.all(direct.distance_radps[direct.steady] < 0.05 * rate)
-    held = np.abs(reverse.yaw_rate_radps) < rate
-    assert held.sum() >= 2 and reverse.steady[held].all()
-    expected = [rudder_rad(UNSTABLE, one) for one in reverse.yaw_rate_radps[held]]
-    np.testing.assert_allclose(reverse.rudder_rad[held], expected, atol=math.radians(0.02))
+    rate = abs(math.degrees(turning.folds[0].yaw_rate_radps))
+    steady, reverse_steady = np.array(direct.steady), np.array(reverse.steady)
+    assert steady.mean() > 0.8 and reverse_steady.mean() > 0.8
+    assert np.all(np.abs(direct.yaw_rate_degps) > rate)
+    assert np.all(direct.distance_to_diagram_degps[steady] < 0.05 * rate)
+    held = np.abs(reverse.yaw_rate_degps) < rate
+    assert held.sum() >= 2 and reverse_steady[held].all()
+    expected = [rudder_rad(UNSTABLE, one) for one in np.radians(reverse.yaw_rate_degps[held])]
+    np.testing.assert_allclose(np.radians(reverse.rudder_deg[held]), expected, atol=math.radians(0.02))
 
 
 def test_a_curve_that_turns_back_between_two_of_its_points_is_used_up_to_there() -> None:
@@ -98,4 +102,4 @@ def test_a_curve_that_turns_back_between_two_of_its_points_is_used_up_to_there()
     )
     found = steering_characteristic(turning)
     assert found is not None
-    assert found.yaw_rate_radps[[0, -1]].tolist() == [-5e-3, 5e-3]
+    assert found.curve.yaw_rate_degps[[0, -1]] == pytest.approx(np.degrees([-5e-3, 5e-3]))

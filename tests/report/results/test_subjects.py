@@ -27,15 +27,6 @@ HISTORIES = {
     "x_m": [0.0, 7.0, 14.0, 21.0],
     "y_m": [0.0, 0.1, 0.3, 0.6],
 }
-BAND = {"p5": [6.9, 6.8, 6.7, 6.6], "p50": [7.0, 6.9, 6.8, 6.7], "p95": [7.1, 7.0, 6.9, 6.8]}
-SIDES = {
-    f"{side}_m": [[x, y + aside] for x, y in zip(HISTORIES["x_m"], HISTORIES["y_m"], strict=True)]
-    for side, aside in (("low", -0.1), ("middle", 0.0), ("high", 0.1))
-}
-SIMULATED = {"ship": "A ship", "manoeuvre": "turn:10", "figures": {"advance_m": 570.0}, "notices": []}
-SIMULATED |= {"histories": HISTORIES}
-TURN = "Turning circle, 10° of rudder to starboard"
-ENSEMBLE = {"members": 5, "t_s": TIMES, "histories": {"u_mps": BAND, "x_m": BAND, "y_m": BAND}, "track": SIDES}
 VALIDATED = {
     "kind": "validate",
     "ship": "A ship",
@@ -87,44 +78,6 @@ def drawn(result: Any) -> dict[str, Illustration]:
     return charts_of(result_page(json.loads(json_text(result)), "r.json"))
 
 
-def test_a_simulated_manoeuvre_has_its_track_and_its_histories_in_their_units() -> None:
-    charts = drawn(SIMULATED)
-    assert list(charts) == [TURN, "Time histories"]
-    track = [(row["x"], row["y"]) for row in rows_of(charts[TURN].chart) if row.get("run") == "track"]
-    assert track[:4] == list(zip(HISTORIES["x_m"], HISTORIES["y_m"], strict=True))
-    shown = panels_of(charts["Time histories"])
-    assert list(shown) == [
-        "rudder, + to starboard (deg)",
-        "heading (deg)",
-        "yaw rate (deg/s)",
-        "surge velocity (m/s)",
-    ]
-    for title, name in (("heading (deg)", "psi_deg"), ("yaw rate (deg/s)", "r_degps")):
-        assert [row["v"] for row in shown[title]] == pytest.approx(HISTORIES[name])
-    assert [row["v"] for row in shown["surge velocity (m/s)"]] == HISTORIES["u_mps"]
-    assert "revolutions 60 rpm" in charts["Time histories"].caption
-
-
-def test_an_ensemble_is_drawn_as_bands_next_to_the_run() -> None:
-    charts = drawn({**SIMULATED, "ensemble": ENSEMBLE})
-    speeds = [row for row in rows_of(charts["Time histories"].chart) if row.get("run") == "band"]
-    assert [(row["low"], row["high"]) for row in speeds] == list(zip(BAND["p5"], BAND["p95"], strict=True))
-    edges = [row["y"] for row in rows_of(charts[TURN].chart) if row.get("run") == "band"]
-    port = [y - 0.1 for y in HISTORIES["y_m"]]
-    assert edges == pytest.approx(port + [y + 0.1 for y in HISTORIES["y_m"]][::-1])
-
-
-def test_a_spiral_is_drawn_against_its_rudder() -> None:
-    figures = {"rudder_deg": [10.0, 0.0, -10.0], "rate_degps": [0.5, 0.1, -0.4]}
-    chart = drawn({**SIMULATED, "manoeuvre": "spiral", "figures": figures})["Direct spiral"]
-    rows = [(row["d"], row["r"]) for row in rows_of(chart.chart) if "i" in row]
-    assert [value for row in rows for value in row] == pytest.approx([10.0, 0.5, 0.0, 0.1, -10.0, -0.4])
-
-
-def test_an_older_result_without_histories_still_has_its_page() -> None:
-    assert drawn({key: value for key, value in SIMULATED.items() if key != "histories"}) == {}
-
-
 def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -> None:
     charts = drawn(VALIDATED)
     (row,) = (row for row in rows_of(charts["Comparison error and validation uncertainty"].chart) if "e" in row)
@@ -154,7 +107,7 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
 def test_the_charts_of_every_kind_open_without_a_word_in_the_console(tmp_path: Any) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, VALIDATED, POSTER]
+    results = [VALIDATED, POSTER]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, figure_bands, history_bands
+from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, band_of, figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, Draws, Ensemble, Question, ensemble
 from tank2sim.simulation.lane_figures import USUAL_PACE
 from tank2sim.simulation.manoeuvres import Manoeuvre
@@ -52,174 +52,103 @@ class EnsembleRequest:
     seed: int = 0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Members:
-    """Members of an ensemble: number, seed, unusable members with the reason, and notices."""
+    """Members of an ensemble: number, seed, usable ones, unusable ones by their reason, and notices."""
 
     members: int
     seed: int
-    unusable: Mapping[str, int]
+    usable: int
+    unusable: dict[str, int]
     notices: tuple[str, ...]
 
-    @property
-    def usable(self) -> int:
-        """Number of usable members."""
-        return self.members - sum(self.unusable.values())
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return {
-            "members": self.members,
-            "seed": self.seed,
-            "usable": self.usable,
-            "unusable": dict(self.unusable),
-            "notices": list(self.notices),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class ManoeuvreBands:
-    """Bands of a manoeuvre: of its figures, of signals at `times_s` (n,), and of the track.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ManoeuvreBands(Members):
+    """Bands of a manoeuvre: of its figures, of signals at `t_s` (n,), and of the track.
 
     `steps_s` are the integration steps of the first :data:`tank2sim.simulation.ensemble.KEPT` members, whose histories
     are kept, and of all later ones, `single_precision` whether these are integrated in single precision.
     """
 
-    asked: Members
-    figures: Mapping[str, Band]
-    times_s: Array
-    histories: Mapping[str, BandOverTime]
+    figures: dict[str, Band]
+    t_s: Array
+    histories: dict[str, BandOverTime]
     track: TrackBand | None
     steps_s: tuple[float, float]
     single_precision: bool
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return {
-            **self.asked.as_json(),
-            "steps_s": self.steps_s,
-            "single_precision": self.single_precision,
-            "figures": {name: band.as_json() for name, band in self.figures.items()},
-            "t_s": self.times_s,
-            "histories": {name: band.as_json() for name, band in self.histories.items()},
-            "track": self.track and self.track.as_json(),
-        }
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Chance:
     """Probability that a criterion is met.
 
     Parameters
     ----------
-    criterion : ImoCriterion
-        The criterion, with the value of the card's ship.
-    met : float or None
+    name, allowed, unit : str, float, str
+        The criterion, and its largest allowed value.
+    probability_met : float or None
         Share of all usable members that meet it; None if no member shows it.
-    between : tuple or None
+    interval_95 : tuple or None
         95 % interval of that probability, by the number of members (Wilson 1927, J. Amer. Stat. Assoc. 22).
-    undecided : int
+    not_shown : int
         Usable members whose trial does not show it; they count as not meeting it.
+    beyond_card : int
+        Usable members whose trial left the card's range before it was known; they count by the value found.
     band : Band or None
-        Band of the figures found.
-    beyond : int
-        Usable members whose trial left the card's range before it was known; they count by what was found.
+        Band of the values found.
     tail : Tail, optional
         The probability of not meeting it by importance sampling, where fewer than
         :data:`tank2sim.analysis.ensemble.tails.FEW_FAILING` members fail.
     """
 
-    criterion: ImoCriterion
-    met: float | None
-    between: tuple[float, float] | None
-    undecided: int
-    band: Band | None
-    beyond: int = 0
+    name: str
+    allowed: float
+    unit: str
+    probability_met: float | None
+    interval_95: tuple[float, float] | None
+    not_shown: int
+    beyond_card: int = 0
+    band: Band | None = None
     tail: Tail | None = None
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        found = self.criterion
-        return {
-            "name": found.name,
-            "allowed": found.allowed,
-            "unit": found.unit,
-            "probability_met": self.met,
-            "interval_95": self.between,
-            "not_shown": self.undecided,
-            "beyond_card": self.beyond,
-            "band": self.band and self.band.as_json(),
-            "tail": self.tail and self.tail.as_json(),
-        }
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ChanceOfAll:
     """Probability that all criteria are met that have a probability and are judged within the card's range.
 
     Parameters
     ----------
-    names : tuple of str
-        Names of these criteria.
-    met, between, tail
+    criteria : tuple of str
+        Their names.
+    probability_met, interval_95, tail
         As in :class:`Chance`.
     """
 
-    names: tuple[str, ...]
-    met: float
-    between: tuple[float, float]
+    criteria: tuple[str, ...]
+    probability_met: float
+    interval_95: tuple[float, float]
     tail: Tail | None = None
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return {
-            "criteria": list(self.names),
-            "probability_met": self.met,
-            "interval_95": self.between,
-            "tail": self.tail and self.tail.as_json(),
-        }
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StabilityBands(Members):
+    """Bands of the straight course at the card's speed, and the probabilities of stability (`probability_stable`, with
+    its 95 % interval), of each criterion (`imo`) and of all criteria together; `curves` where they were requested."""
+
+    figures: dict[str, Band]
+    probability_stable: float | None
+    probability_stable_interval_95: tuple[float, float] | None
+    imo: tuple[Chance, ...]
+    imo_all: ChanceOfAll | None
+    curves: SteeringBands | None
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityBands:
-    """Bands of the straight course at the card's speed, and the probabilities of stability, of each criterion and of
-    all criteria together."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FigureBands(Members):
+    """Bands of figures by name."""
 
-    asked: Members
-    figures: Mapping[str, Band]
-    stable: float | None
-    stable_between: tuple[float, float] | None
-    chances: tuple[Chance, ...]
-    curves: SteeringBands | None = None
-    all_met: ChanceOfAll | None = None
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return {
-            **self.asked.as_json(),
-            "figures": {name: band.as_json() for name, band in self.figures.items()},
-            "probability_stable": self.stable,
-            "probability_stable_interval_95": self.stable_between,
-            "imo": [chance.as_json() for chance in self.chances],
-            "imo_all": self.all_met and self.all_met.as_json(),
-            "curves": self.curves and self.curves.as_json(),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class FigureBands:
-    """Bands of figures by name, and the standard deviation of each over the members."""
-
-    asked: Members
-    figures: Mapping[str, Band]
-    deviations: Mapping[str, float]
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        figures = {
-            name: {**band.as_json(), "standard_deviation": self.deviations[name]} for name, band in self.figures.items()
-        }
-        return {**self.asked.as_json(), "figures": figures}
+    figures: dict[str, Band]
 
 
 def manoeuvre_bands(
@@ -254,7 +183,13 @@ def manoeuvre_bands(
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it")
     return ManoeuvreBands(
-        _members(found, notices), figure_bands(found), shown, histories, track, steps, question.pace.single
+        **_members(found, notices),
+        figures=figure_bands(found),
+        t_s=shown,
+        histories=histories,
+        track=track,
+        steps_s=steps,
+        single_precision=question.pace.single,
     )
 
 
@@ -277,15 +212,15 @@ def stability_bands(
         straight = Ensemble(request.members, request.seed, {})
         messages.append(f"no bands of the straight course: {error.problem}")
     chances = tuple(chance(criterion, trials) for criterion in criteria)
-    limits = {
-        one.criterion.name: one.criterion.allowed
-        for one in chances
-        if one.met is not None and not one.criterion.beyond_card
-    }
+    within = {criterion.name for criterion in criteria if not criterion.beyond_card}
+    judged = [one for one in chances if one.probability_met is not None]
+    limits = {one.name: one.allowed for one in judged if one.name in within}
     each, of_any, about = tails(question, draws, trials, limits, executor)
     messages += about
-    chances = tuple(replace(one, tail=each.get(one.criterion.name)) for one in chances)
-    messages += _counted(chances, trials.usable)
+    chances = tuple(replace(one, tail=each.get(one.name)) for one in chances)
+    messages += _counted(judged, trials.usable)
+    if judged and not limits:
+        messages.append("no probability of the criteria together: the trials of the card itself leave its range")
     together = all_chances(limits, trials)
     unseen = answering_states(build(card))
     if unseen:
@@ -296,10 +231,19 @@ def stability_bands(
     stable, between = (None, None) if unseen else _stable(straight)
     bands, through = bands_without_poles(straight)
     messages += through
-    drawn = steering_bands(ShipText.of(card), draws, request.members, curves, executor) if curves else None
-    messages += drawn.notices if drawn else ()
-    together = together and replace(together, tail=of_any)
-    return StabilityBands(_members(trials, messages), bands, stable, between, chances, drawn, together)
+    drawn = None
+    if curves:
+        drawn, about = steering_bands(ShipText.of(card), draws, request.members, curves, executor)
+        messages += about
+    return StabilityBands(
+        **_members(trials, messages),
+        figures=bands,
+        probability_stable=stable,
+        probability_stable_interval_95=between,
+        imo=chances,
+        imo_all=together and replace(together, tail=of_any),
+        curves=drawn,
+    )
 
 
 def named_bands(
@@ -310,12 +254,10 @@ def named_bands(
     found = _ensemble(card, OfFigures(ShipText.of(card), tuple(figures)), draws, request.members, executor)
     bands, through = bands_without_poles(found)
     notices += through
-    deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if request.members > 1 else {}
-    deviations = {name: deviations.get(name, math.nan) for name in bands}
     for name, band in bands.items():
-        if band.shown < found.usable:
-            notices.append(f"{name}: {found.usable - band.shown} of {request.members} members do not show it")
-    return FigureBands(_members(found, notices), bands, deviations)
+        if band.shown_by < found.usable:
+            notices.append(f"{name}: {found.usable - band.shown_by} of {request.members} members do not show it")
+    return FigureBands(**_members(found, notices), figures=bands)
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
@@ -339,27 +281,34 @@ def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
     """The probability of a criterion, from the values of the members."""
     values = found.figures.get(criterion.name, np.zeros(0))
     shown = values[np.isfinite(values)]
+    unknown = Chance(
+        name=criterion.name,
+        allowed=criterion.allowed,
+        unit=criterion.unit,
+        probability_met=None,
+        interval_95=None,
+        not_shown=found.usable,
+    )
     if not len(shown):
-        return Chance(criterion, None, None, found.usable, None)
-    count = int(np.sum(shown <= criterion.allowed))
-    met, ends = _share(count, found.usable)
-    beyond = int(np.sum(found.figures.get(criterion.name + BEYOND_CARD_MARK, np.zeros(0)) > 0))
-    return Chance(criterion, met, ends, found.usable - len(shown), figure_bands(found)[criterion.name], beyond)
+        return unknown
+    met, ends = _share(int(np.sum(shown <= criterion.allowed)), found.usable)
+    return replace(
+        unknown,
+        probability_met=met,
+        interval_95=ends,
+        not_shown=found.usable - len(shown),
+        beyond_card=int(np.sum(found.figures.get(criterion.name + BEYOND_CARD_MARK, np.zeros(0)) > 0)),
+        band=band_of(values),
+    )
 
 
 def _counted(chances: Sequence[Chance], usable: int) -> list[str]:
     """Notices on members without a figure, and on those beyond the card's range."""
-    lost, left = (
-        ", ".join(f"{one.criterion.name} {count} of {usable}" for one, count in counts if one.met is not None and count)
-        for counts in ([(one, one.undecided) for one in chances], [(one, one.beyond) for one in chances])
-    )
+    lost = ", ".join(f"{one.name} {one.not_shown} of {usable}" for one in chances if one.not_shown)
+    left = ", ".join(f"{one.name} {one.beyond_card} of {usable}" for one in chances if one.beyond_card)
     lines = [f"members that do not show a figure count as not meeting its criterion: {lost}"] if lost else []
     if left:
-        lines.append(f"members that left the card's range before a figure was known count by what was found: {left}")
-    if any(one.met is not None for one in chances) and all(
-        one.criterion.beyond_card for one in chances if one.met is not None
-    ):
-        lines.append("no probability of the criteria together: the trials of the card itself leave its range")
+        lines.append(f"members that left the card's range before a figure was known count by the value found: {left}")
     return lines
 
 
@@ -369,7 +318,8 @@ def all_chances(limits: Mapping[str, float], found: Ensemble) -> ChanceOfAll | N
         return None
     with np.errstate(invalid="ignore"):
         met = np.all([found.figures[name] <= allowed for name, allowed in limits.items()], axis=0)
-    return ChanceOfAll(tuple(limits), *_share(int(np.sum(met)), found.usable))
+    share, between = _share(int(np.sum(met)), found.usable)
+    return ChanceOfAll(criteria=tuple(limits), probability_met=share, interval_95=between)
 
 
 def _share(count: int, of: int) -> tuple[float, tuple[float, float]]:
@@ -403,5 +353,12 @@ def _ensemble(
     return found
 
 
-def _members(found: Ensemble, messages: Sequence[str]) -> Members:
-    return Members(found.members, found.seed, found.unusable, (*messages, *found.notices))
+def _members(found: Ensemble, messages: Sequence[str]) -> dict[str, Any]:
+    """Fields of :class:`Members`."""
+    return {
+        "members": found.members,
+        "seed": found.seed,
+        "usable": found.members - sum(found.unusable.values()),
+        "unusable": dict(found.unusable),
+        "notices": (*messages, *found.notices),
+    }

@@ -30,15 +30,6 @@ known to 1.5 % (project choice)."""
 _POINTS = 121
 """Points of every curve (project choice)."""
 
-FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP = (
-    "yaw_rate_from_starboard_degps",
-    "yaw_rate_from_port_degps",
-    "magnitude_dB",
-    "phase_deg",
-    "step_per_s",
-)
-_CURVES = (FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP)
-
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -97,50 +88,58 @@ class OfSteering:
 
 
 @dataclass(frozen=True, eq=False)
-class SteeringBands:
-    """Bands over a grid of the curves of ``stability``, by name, and of the width of the hysteresis loop.
+class CurveBand(BandOverTime):
+    """A band of a curve (n,), and the curve of the card's ship itself (`own`)."""
 
-    Parameters
-    ----------
-    members : int
-        Usable members behind the curves.
-    reference : mapping
-        The curves of the card's ship.
-    with_loop : int
-        Members with a loop; without one the width is 0.
+    own: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TurningBands:
+    """Yaw rates of the stable turns that a spiral reaches from starboard and from port, over the rudder (n,).
+
+    `loop_width_deg` is the band of the width of the hysteresis loop, 0 for members without one; `with_loop` members
+    have one.
     """
 
-    grid: Grid
-    members: int
-    reference: Mapping[str, Array]
-    curves: Mapping[str, BandOverTime]
+    rudder_deg: Array
+    yaw_rate_from_starboard_degps: CurveBand
+    yaw_rate_from_port_degps: CurveBand
     loop_width_deg: Band | None
     with_loop: int
-    notices: tuple[str, ...]
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
 
-        def bands_of(*names: str) -> dict[str, object]:
-            return {name: self.curves[name].as_json() | {"own": self.reference[name]} for name in names}
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BodeBands:
+    """Magnitude and phase of yaw rate by rudder angle, over the angular frequency (n,)."""
 
-        return {
-            "members": self.members,
-            "steady_turning": {
-                "rudder_deg": np.degrees(self.grid.rudder_rad),
-                **bands_of(FROM_STARBOARD, FROM_PORT),
-                "loop_width_deg": self.loop_width_deg and self.loop_width_deg.as_json(),
-                "with_loop": self.with_loop,
-            },
-            "bode": {"omega_radps": self.grid.omega_radps, **bands_of(MAGNITUDE, PHASE)},
-            "step": {"time_s": self.grid.time_s, **bands_of(STEP)},
-        }
+    omega_radps: Array
+    magnitude_dB: CurveBand
+    phase_deg: CurveBand
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StepBands:
+    """Yaw rate after a unit step of the rudder, 1/s, over the time (n,)."""
+
+    time_s: Array
+    step_per_s: CurveBand
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SteeringBands:
+    """Bands of the curves of ``stability``, over the usable ones of the first :data:`CURVES` members."""
+
+    members: int
+    steady_turning: TurningBands
+    bode: BodeBands
+    step: StepBands
 
 
 def steering_bands(
     ship: ShipText, draws: Draws, members: int, about: tuple[float | None, Grid], executor: Executor | None = None
-) -> SteeringBands | None:
-    """Bands of the first :data:`CURVES` members; `about` is the speed (None: the card's) and the grid.
+) -> tuple[SteeringBands | None, list[str]]:
+    """Bands of the first :data:`CURVES` members, with notices; `about` is the speed (None: the card's) and the grid.
 
     None if no member has such curves.
     """
@@ -149,19 +148,27 @@ def steering_bands(
     (reference,) = question.prepared()([{}])
     found = ensemble(question, draws, min(members, CURVES), executor)
     if found.histories is None or reference.histories is None:
-        return None
+        return None, []
     messages = [f"no steady turns: {notice}" for notice in found.notices if "cannot be used" in notice]
     if members > CURVES:
         messages.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
-    width = found.figures["loop_width_deg"]
-    loops = int(np.sum(width > 0))
-    unvaried = {name: row.astype(float) for name, row in zip(_CURVES, reference.histories, strict=True)}
-    bands = {name: _band(found, row) for row, name in enumerate(_CURVES)}
-    if not all(np.isfinite(bands[name].low).all() for name in (FROM_STARBOARD, FROM_PORT)):
+    bands = [_band(found, row, own.astype(float)) for row, own in enumerate(reference.histories)]
+    from_starboard, from_port, magnitude, phase, step = bands
+    if not all(np.isfinite(side.p5).all() for side in (from_starboard, from_port)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
         messages.append(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
-    loop = figure_bands(found).get("loop_width_deg")
-    return SteeringBands(grid, found.usable, unvaried, bands, loop, loops, tuple(messages))
+    turning = TurningBands(
+        rudder_deg=np.degrees(grid.rudder_rad),
+        yaw_rate_from_starboard_degps=from_starboard,
+        yaw_rate_from_port_degps=from_port,
+        loop_width_deg=figure_bands(found).get("loop_width_deg"),
+        with_loop=int(np.sum(found.figures["loop_width_deg"] > 0)),
+    )
+    bode = BodeBands(omega_radps=grid.omega_radps, magnitude_dB=magnitude, phase_deg=phase)
+    drawn = SteeringBands(
+        members=found.usable, steady_turning=turning, bode=bode, step=StepBands(time_s=grid.time_s, step_per_s=step)
+    )
+    return drawn, messages
 
 
 def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:
@@ -187,7 +194,7 @@ def _responses(model: Model, speed_mps: float | None, grid: Grid) -> list[Array]
     return [magnitude, phase, step]
 
 
-def _band(found: Ensemble, row: int) -> BandOverTime:
+def _band(found: Ensemble, row: int, own: Array) -> CurveBand:
     """Quantiles where nearly all usable members have the curve, nan elsewhere."""
     assert found.histories is not None
     values = found.histories[:, row].astype(float)
@@ -195,4 +202,5 @@ def _band(found: Ensemble, row: int) -> BandOverTime:
     quantiles = np.full((len(QUANTILES), values.shape[1]), np.nan)
     if shown.any():
         quantiles[:, shown] = np.nanquantile(np.where(np.isfinite(values), values, np.nan)[:, shown], QUANTILES, axis=0)
-    return BandOverTime(*quantiles)
+    p5, p50, p95 = quantiles
+    return CurveBand(p5, p50, p95, own)

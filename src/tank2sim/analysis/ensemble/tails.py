@@ -78,7 +78,7 @@ class Tail:
         Probability of the figure beyond the limit, if it were linear.
     linear_figure, figure : float, and float or None
         The figure of the ship at that distance (at most :data:`FARTHEST_LIMIT`), if it were linear, and as it is.
-    failing_ships : mapping
+    failing_ships : dict
         Number of the card (name in the model) to the mean of failing ships less the card, in standard errors: the
         largest.
     remark : str
@@ -99,13 +99,7 @@ class Tail:
     unusable: int = 0
     beyond_card: int = 0
     unusable_probability: float = 0.0
-    failing_ships: Mapping[str, float] = field(default_factory=dict)
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return {each.name: getattr(self, each.name) for each in fields(self)} | {
-            "failing_ships": dict(self.failing_ships)
-        }
+    failing_ships: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import InputError
 from tank2sim.marks import CHECK
-from tank2sim.simulation.bands import QUANTILES
+from tank2sim.simulation.bands import Band, band_of
 
 TRIAL_ERROR, OVERSHOOT_ERROR_DEG = 0.05, 1.0
 """Standard errors of figures that come without: of a turn's distances relative to themselves, and of an overshoot, deg.
@@ -39,120 +39,62 @@ SETTLED = 0.7
 half of its variance is gone."""
 
 
-@dataclass(frozen=True, eq=False)
-class Guess:
+@dataclass(frozen=True, kw_only=True)
+class GuessedFigure:
+    """A manoeuvring figure in its `unit`: as given, with its standard error, and its bands over the ships of these
+    dimensions (`by_dimensions`) and over the ships found."""
+
+    unit: str
+    given: float | None
+    standard_error: float | None
+    by_dimensions: Band
+    found: Band
+
+
+@dataclass(frozen=True, kw_only=True)
+class GuessedNumber:
+    """A number of the card: mean and standard error over the ships of these dimensions, and over the ships found.
+
+    It is `settled` where the standard error falls below :data:`SETTLED` of the former one.
+    """
+
+    by_dimensions: float
+    by_dimensions_standard_error: float
+    value: float
+    standard_error: float
+    settled: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GuessStudy:
     """A guessed ship.
 
     Parameters
     ----------
-    ship : ShipDimensions
-    given : tuple of GivenFigure
-    found : GuessMembers
-        The members before and after.
-    prior, card : ManoeuvringCard
-        The cards by the dimensions alone, and with the figures; the latter has a covariance with samples.
+    ship : str
+        Its name.
+    dimensions : dict
+        Fields of :class:`.ShipDimensions`.
     members, seed : int
+        Ships drawn, and the seed of the draws.
+    figures : dict
+        Key of :data:`.FIGURE_KEYS` to what is known of the figure.
+    parameters : dict
+        Name on the card to what is known of the number, prime.
+    next_figures : dict
+        Figures not given, to the mean share of the variance of all figures not given that each would take away; the
+        most helpful first.
+    notices : tuple of str
     """
 
-    ship: ShipDimensions
-    given: tuple[GivenFigure, ...]
-    found: GuessMembers
-    prior: ManoeuvringCard
-    card: ManoeuvringCard
+    ship: str
+    dimensions: dict[str, float]
     members: int
     seed: int
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """Limits of the guess."""
-        lost = self.members - len(self.found.prior)
-        messages = [*self._outside()]
-        messages += [
-            "a guess: the model (third order, cross-flow drag, rudder in the slipstream), deep and calm water, and "
-            "figures of one loading are taken for granted",
-            "rudder, surge and third-order terms have no published regression here: their prior is about what three "
-            "ships have",
-        ]
-        if lost:
-            messages.append(f"{lost} of {self.members} ships of these dimensions do not come round and were left out")
-        errors = [figure for figure in self.given if figure.standard_error == default_error(figure.word, figure.value)]
-        if errors:
-            messages.append(
-                f"standard errors of figures given without: {100 * TRIAL_ERROR:g} % of distances, "
-                f"{OVERSHOOT_ERROR_DEG:g} deg of overshoots"
-            )
-        return tuple(messages)
-
-    def _outside(self) -> Iterator[str]:
-        """Figures outside what nine of ten ships of these dimensions show, or the guess, by more than their errors."""
-        for figure in self.given:
-            before, after = (_quantiles(figures[figure.key]) for figures in (self.found.before, self.found.after))
-            error = figure.standard_error
-            if all(each["p5"] - error <= figure.value <= each["p95"] + error for each in (before, after)):
-                continue
-            unit = figure_unit(figure.key)
-            units = [
-                f"if that is in {name}: {figure.value * factor:.4g} {unit}"
-                for name, factor in _OTHER_UNITS[unit].items()
-                if before["p5"] <= figure.value * factor <= before["p95"]
-            ]
-            yield (
-                f"{CHECK} {figure.key} is {figure.value:g} {unit}, and nine of ten ships of these dimensions and speed "
-                f"have {before['p5']:.4g} to {before['p95']:.4g} (the guess {after['p5']:.4g} to {after['p95']:.4g})"
-                f"{'; ' + ', '.join(units) if units else '; check it, the dimensions and the speed'}."
-            )
-
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        given = {figure.key: figure for figure in self.given}
-        figures = {}
-        for key in FIGURE_KEYS:
-            entry = given.get(key)
-            figures[key] = {
-                "unit": figure_unit(key),
-                "given": entry and entry.value,
-                "standard_error": entry and entry.standard_error,
-                "by_dimensions": _quantiles(self.found.before[key]),
-                "found": _quantiles(self.found.after[key]),
-            }
-        return {
-            "ship": self.card.ship.name,
-            "dimensions": vars(self.ship),
-            "members": self.members,
-            "seed": self.seed,
-            "figures": figures,
-            "parameters": {name: dict(zip(_NUMBERS, row, strict=True)) for name, row in self.parameters.items()},
-            "next_figures": self.next_figures,
-        }
-
-    @property
-    def parameters(self) -> dict[str, tuple[float, float, float, float, bool]]:
-        """Name to mean and standard error by the dimensions alone, with the figures, and whether they settle it."""
-        rows = {}
-        for name, before, after in zip(self.found.draws.names, self.found.prior.T, self.found.posterior.T, strict=True):
-            errors = float(before.std()), float(after.std())
-            numbers = float(before.mean()), errors[0], float(after.mean()), errors[1]
-            rows[name.removeprefix("derivatives.")] = (*numbers, errors[1] < SETTLED * errors[0])
-        return rows
-
-    @property
-    def next_figures(self) -> dict[str, float]:
-        """Figures not given, to the mean share of the variance of all figures not given that each would take away, with
-        the errors of those given without; the most helpful first. By the covariance of the logarithms."""
-        known = {figure.key for figure in self.given}
-        keys = [key for key in FIGURE_KEYS if key not in known]
-        logs = {key: np.log(self.found.after[key]) for key in keys}
-        gains = {}
-        for key in keys:
-            median = float(np.median(self.found.after[key]))
-            error = default_error(FIGURE_KEYS[key][1], median) / median
-            variance = float(logs[key].var()) + error**2
-            shares = [float(np.cov(logs[key], other)[0, 1] ** 2 / variance / other.var()) for other in logs.values()]
-            gains[key] = float(np.mean(shares))
-        return dict(sorted(gains.items(), key=lambda item: -item[1]))
-
-
-_NUMBERS = ("by_dimensions", "by_dimensions_standard_error", "value", "standard_error", "settled")
+    figures: dict[str, GuessedFigure]
+    parameters: dict[str, GuessedNumber]
+    next_figures: dict[str, float]
+    notices: tuple[str, ...]
 
 
 def figure_unit(key: str) -> str:
@@ -191,8 +133,10 @@ def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
     return list(found.values())
 
 
-def guess_ship(ship: ShipDimensions, given: Sequence[GivenFigure], name: str, members: int, seed: int) -> Guess:
-    """A ship from its dimensions and figures.
+def guess_ship(
+    ship: ShipDimensions, given: Sequence[GivenFigure], name: str, members: int, seed: int
+) -> tuple[GuessStudy, ManoeuvringCard]:
+    """A ship from its dimensions and figures: the study, and the card, which has a covariance with samples.
 
     Parameters
     ----------
@@ -211,7 +155,108 @@ def guess_ship(ship: ShipDimensions, given: Sequence[GivenFigure], name: str, me
     """
     prior = prior_card(ship, name)
     found = conditioned(prior, given, members, seed)
-    return Guess(ship, tuple(given), found, prior, _card_of(prior, found), members, seed)
+    return study_members(ship, name, given, found, members, seed), _card_of(prior, found)
+
+
+def study_members(
+    ship: ShipDimensions, name: str, given: Sequence[GivenFigure], found: GuessMembers, members: int, seed: int
+) -> GuessStudy:
+    """The study of members that were found.
+
+    Parameters
+    ----------
+    ship, name, given, members, seed
+        As of :func:`guess_ship`.
+    found : GuessMembers
+    """
+    by_key = {figure.key: figure for figure in given}
+    figures = {}
+    for key, before in found.before.items():
+        figure = by_key.get(key)
+        figures[key] = GuessedFigure(
+            unit=figure_unit(key),
+            given=figure.value if figure else None,
+            standard_error=figure.standard_error if figure else None,
+            by_dimensions=band_of(before),
+            found=band_of(found.after[key]),
+        )
+    return GuessStudy(
+        ship=name,
+        dimensions=vars(ship),
+        members=members,
+        seed=seed,
+        figures=figures,
+        parameters=_parameters(found),
+        next_figures=_next_figures(found, by_key),
+        notices=(*_outside(figures), *_notices(given, members, members - len(found.prior))),
+    )
+
+
+def _parameters(found: GuessMembers) -> dict[str, GuessedNumber]:
+    numbers = {}
+    for name, before, after in zip(found.draws.names, found.prior.T, found.posterior.T, strict=True):
+        prior_error, error = float(before.std()), float(after.std())
+        numbers[name.removeprefix("derivatives.")] = GuessedNumber(
+            by_dimensions=float(before.mean()),
+            by_dimensions_standard_error=prior_error,
+            value=float(after.mean()),
+            standard_error=error,
+            settled=error < SETTLED * prior_error,
+        )
+    return numbers
+
+
+def _next_figures(found: GuessMembers, given: Mapping[str, GivenFigure]) -> dict[str, float]:
+    """:attr:`GuessStudy.next_figures`: by the covariance of the logarithms, each figure with its usual error."""
+    logs = {key: np.log(values) for key, values in found.after.items() if key not in given}
+    gains = {}
+    for key, values in logs.items():
+        median = float(np.median(found.after[key]))
+        error = default_error(FIGURE_KEYS[key][1], median) / median
+        variance = float(values.var()) + error**2
+        shares = [float(np.cov(values, other)[0, 1] ** 2 / variance / other.var()) for other in logs.values()]
+        gains[key] = float(np.mean(shares))
+    return dict(sorted(gains.items(), key=lambda item: -item[1]))
+
+
+def _outside(figures: Mapping[str, GuessedFigure]) -> Iterator[str]:
+    """Figures outside what nine of ten ships of these dimensions show, or the guess, by more than their errors."""
+    for key, figure in figures.items():
+        if figure.given is None or figure.standard_error is None:
+            continue
+        value, error, unit = figure.given, figure.standard_error, figure.unit
+        before, after = figure.by_dimensions, figure.found
+        if all(band.p5 - error <= value <= band.p95 + error for band in (before, after)):
+            continue
+        units = [
+            f"if that is in {name}: {value * factor:.4g} {unit}"
+            for name, factor in _OTHER_UNITS[unit].items()
+            if before.p5 <= value * factor <= before.p95
+        ]
+        yield (
+            f"{CHECK} {key} is {value:g} {unit}, and nine of ten ships of these dimensions and speed "
+            f"have {before.p5:.4g} to {before.p95:.4g} (the guess {after.p5:.4g} to {after.p95:.4g})"
+            f"{'; ' + ', '.join(units) if units else '; check it, the dimensions and the speed'}."
+        )
+
+
+def _notices(given: Sequence[GivenFigure], members: int, lost: int) -> Iterator[str]:
+    """Limits of every guess, ships that were left out, and standard errors that were assumed."""
+    yield (
+        "a guess: the model (third order, cross-flow drag, rudder in the slipstream), deep and calm water, and "
+        "figures of one loading are taken for granted"
+    )
+    yield (
+        "rudder, surge and third-order terms have no published regression here: their prior is about what three "
+        "ships have"
+    )
+    if lost:
+        yield f"{lost} of {members} ships of these dimensions do not come round and were left out"
+    if any(figure.standard_error == default_error(figure.word, figure.value) for figure in given):
+        yield (
+            f"standard errors of figures given without: {100 * TRIAL_ERROR:g} % of distances, "
+            f"{OVERSHOOT_ERROR_DEG:g} deg of overshoots"
+        )
 
 
 def _card_of(prior: ManoeuvringCard, found: GuessMembers) -> ManoeuvringCard:
@@ -236,8 +281,3 @@ def _card_of(prior: ManoeuvringCard, found: GuessMembers) -> ManoeuvringCard:
     assert isinstance(card, ManoeuvringCard)
     samples = found.posterior[:KEPT_SAMPLES]
     return replace(card, covariance=by_file_name(card, found.draws.names, matrix, samples))
-
-
-def _quantiles(values: Array) -> Mapping[str, float]:
-    low, middle, high = (float(value) for value in np.quantile(values, QUANTILES))
-    return {"p5": low, "p50": middle, "p95": high}

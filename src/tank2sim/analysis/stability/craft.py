@@ -11,7 +11,7 @@ so that a K above 0 turns to starboard where the thrusters at port run faster.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,13 +22,13 @@ from scipy.optimize import root
 
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
 from tank2sim.analysis.stability.straight_line import steering_constants
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.cards.card import CraftCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.simulation.thruster_manoeuvres import thruster_sides
-from tank2sim.units import from_si
+from tank2sim.units import from_si, to_si
 
 SPEED_SHARES = (0.25, 0.5, 0.75, 0.95)
 """Speeds of the table, over the highest that the thrusters hold (project choice)."""
@@ -39,6 +39,12 @@ DIFFERENCE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 _CURVATURES, _DRIFT = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6), 0.1
 """Yaw rates in r L/U and sway over surge from which a steady turn is looked for: those of craft in wide to tight turns
 (project choice)."""
+
+STRAIGHT_FROM_LENGTHS = 100.0
+"""Diameter over length of a loop from which it is called nearly straight. Project choice: it turns the craft by a
+degree for each length, which wind, waves and errors of a few per cent in its coefficients do as well."""
+
+NO_RUDDER = "the criteria of IMO MSC.137(76) and the spirals are of a rudder, and are not judged"
 
 _MOTION = ("motion.u", "motion.v", "motion.r")
 _RATES = ("motion.udot", "motion.vdot", "motion.rdot")
@@ -52,7 +58,7 @@ class CraftAtSpeed:
 
     Parameters
     ----------
-    speed_mps, revolutions_radps : float
+    speed_mps, revolutions_rpm : float
         Surge velocity through the water, and the mean revolutions of the two sides that hold it.
     eigenvalues : tuple of complex
         Eigenvalues of surge, sway and yaw, 1/s, least damped first.
@@ -62,69 +68,66 @@ class CraftAtSpeed:
         -1 over the slope of du/dt by u; None where nothing brakes the craft.
     K, T_s, T1_s, T2_s, T3_s : float
         Constants of r/d; K in rad/s by rad/s; T1 and T2 are None for an oscillating pair.
+    stable : bool
+        True if the straight run is stable with revolutions held: every mode decays.
     """
 
     speed_mps: float
-    revolutions_radps: float
-    eigenvalues: tuple[complex, ...]
-    steering_modes: tuple[complex, ...]
+    revolutions_rpm: float
+    eigenvalues: tuple[ComplexNumber, ...]
+    steering_modes: tuple[ComplexNumber, ...]
     surge_time_constant_s: float | None
-    K: float
-    T_s: float
+    K: Unbounded
+    T_s: Unbounded
     T1_s: float | None
     T2_s: float | None
-    T3_s: float
-
-    @property
-    def stable(self) -> bool:
-        """True if the straight run is stable with revolutions held: every mode decays."""
-        return all(mode.real < 0 for mode in (*self.eigenvalues, *self.steering_modes))
-
-    def as_json(self) -> dict[str, object]:
-        """The run for JSON; eigenvalues as [real, imaginary]."""
-        found = dict(vars(self))
-        for key in ("eigenvalues", "steering_modes"):
-            found[key] = [[value.real, value.imag] for value in found[key]]
-        revolutions = from_si("n_rpm", found.pop("revolutions_radps"))
-        return {"revolutions_rpm": revolutions, **found, "stable": self.stable}
+    T3_s: Unbounded
+    stable: bool
 
 
 @dataclass(frozen=True)
 class SteadyCraftTurn:
-    """A steady turn: revolutions at port less at starboard (rad/s), and the motion in m/s, rad/s, rad, m."""
+    """A steady turn: revolutions at port less at starboard, speed, yaw rate and drift (positive to starboard)."""
 
-    difference_radps: float
+    difference_rpm: float
     speed_mps: float
-    yaw_rate_radps: float
-    drift_rad: float
+    yaw_rate_degps: float
+    drift_deg: float
     diameter_m: float
 
 
-@dataclass(frozen=True)
-class CraftStability:
+@dataclass(frozen=True, kw_only=True)
+class CraftStabilityStudy:
     """Stability and turning of a craft.
 
     Parameters
     ----------
-    name : str
-    run : CraftAtSpeed
+    ship : str
+    length_m : float
+    straight_run : CraftAtSpeed
         At the requested speed.
+    nearly_straight : bool
+        Of :func:`keeps_nearly_straight`.
     speeds : tuple of CraftAtSpeed
         At :data:`SPEED_SHARES` of the highest speed.
     highest_speed_mps : float
-        That the thrusters hold.
-    turns : tuple of SteadyCraftTurn
-        To starboard, about the revolutions of `run`.
+        Held by the thrusters at their largest revolutions.
+    difference_turns : tuple of SteadyCraftTurn
+        To starboard, about the revolutions of the straight run.
+    notices : tuple of str
     """
 
-    name: str
-    run: CraftAtSpeed
+    ship: str
+    length_m: float
+    straight_run: CraftAtSpeed
+    nearly_straight: bool
     speeds: tuple[CraftAtSpeed, ...]
     highest_speed_mps: float
-    turns: tuple[SteadyCraftTurn, ...]
+    difference_turns: tuple[SteadyCraftTurn, ...]
+    notices: tuple[str, ...]
 
 
-def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStability:
+def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStabilityStudy:
     """Stability and turning of a craft, by default at its cruising speed.
 
     Parameters
@@ -145,13 +148,33 @@ def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftSta
         problem = f"{speed:g} m/s is not a speed ahead that the thrusters hold"
         raise InputError("--speed", "", problem, f"give one up to {highest:.4g} m/s")
     run = craft.straight(speed)
-    return CraftStability(
-        name=card.ship.name,
-        run=run,
+    turns = tuple(craft.turns(run))
+    return CraftStabilityStudy(
+        ship=card.ship.name,
+        length_m=card.ship.length_m,
+        straight_run=run,
+        nearly_straight=keeps_nearly_straight(run, turns, card.ship.length_m),
         speeds=tuple(craft.straight(share * highest) for share in SPEED_SHARES),
         highest_speed_mps=highest,
-        turns=tuple(craft.turns(run)),
+        difference_turns=turns,
+        notices=(*build(card).notices, NO_RUDDER),
     )
+
+
+def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], length_m: float) -> bool:
+    """Whether a craft, with no difference of revolutions, keeps a straight course or a loop wider than
+    :data:`STRAIGHT_FROM_LENGTHS`.
+
+    Parameters
+    ----------
+    run : CraftAtSpeed
+    turns : sequence of SteadyCraftTurn
+        About its revolutions; the one without a difference first.
+    length_m : float
+        Of the craft.
+    """
+    alone = turns[0] if turns and not turns[0].difference_rpm else None
+    return run.stable or (alone is not None and alone.diameter_m > STRAIGHT_FROM_LENGTHS * length_m)
 
 
 class _Craft:
@@ -216,10 +239,11 @@ class _Craft:
         )
         real = total**2 >= 4 * product
         T1 = 0.5 * (total + math.copysign(math.sqrt(total**2 - 4 * product), total)) if real else None
+        eigenvalues = _sorted(np.linalg.eigvals(A))
         return CraftAtSpeed(
             speed_mps=speed,
-            revolutions_radps=float(mean),
-            eigenvalues=_sorted(np.linalg.eigvals(A)),
+            revolutions_rpm=from_si("n_rpm", float(mean)),
+            eigenvalues=eigenvalues,
             steering_modes=modes,
             surge_time_constant_s=float(-1 / A[0, 0]) if A[0, 0] < 0 else None,
             K=K,
@@ -227,6 +251,7 @@ class _Craft:
             T1_s=T1,
             T2_s=product / T1 if T1 else None,
             T3_s=T3,
+            stable=all(mode.real < 0 for mode in (*eigenvalues, *modes)),
         )
 
     def turns(self, run: CraftAtSpeed) -> list[SteadyCraftTurn]:
@@ -234,14 +259,14 @@ class _Craft:
 
         A craft that is unstable on a straight course turns without a difference, too: that turn is the first.
         """
-        mean = run.revolutions_radps
+        mean = to_si("n_rpm", run.revolutions_rpm)[1]
         most = 2 * min(self.high - mean, mean - self.low)
         shares = DIFFERENCE_SHARES if run.stable else (0.0, *DIFFERENCE_SHARES)
         found = [self._turn(run, share * most) for share in shares]
         return [turn for turn in found if turn is not None]
 
     def _turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
-        mean = run.revolutions_radps
+        mean = to_si("n_rpm", run.revolutions_rpm)[1]
         for curvature in _CURVATURES:
             rate = curvature * run.speed_mps / self.p[self.model.parameter_names.index("ship.length")]
             start = np.array([run.speed_mps, -_DRIFT * run.speed_mps, rate])
@@ -252,7 +277,13 @@ class _Craft:
             A, _ = jacobians(self.model, self.point(solved.x, mean, difference), _RATES, _MOTION, [])
             if np.linalg.eigvals(A).real.max() < 0:
                 speed = math.hypot(u, v)
-                return SteadyCraftTurn(difference, speed, r, -math.asin(v / speed), 2 * speed / r)
+                return SteadyCraftTurn(
+                    difference_rpm=from_si("n_rpm", difference),
+                    speed_mps=speed,
+                    yaw_rate_degps=math.degrees(r),
+                    drift_deg=-math.degrees(math.asin(v / speed)),
+                    diameter_m=2 * speed / r,
+                )
         return None
 
     def _solved(self, rates: Callable[[Array], Array], start: Array) -> Array:

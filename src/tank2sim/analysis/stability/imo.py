@@ -76,34 +76,35 @@ class ImoCriterion:
     """A criterion: value and limit in `unit`; `found` is None where the trial did not show it.
 
     `remark` states why it has no value, or a reservation on the verdict; `beyond_card` is True if a trial left the
-    card's range, so that the verdict is an extrapolation.
+    card's range, so that the verdict is an extrapolation. `passed` is None if the trial did not show it, or only
+    outside the card's range; the margin to the limit is negative if the criterion is not met.
     """
 
     name: str
     found: float | None
     allowed: float
     unit: str
-    remark: str = ""
-    beyond_card: bool = False
+    remark: str
+    beyond_card: bool
+    passed: bool | None
+    margin: float | None
+    margin_percent: float | None
 
-    @property
-    def passed(self) -> bool | None:
-        """True if met; None if the trial did not show it, or only outside the card's range."""
-        return None if self.found is None or self.beyond_card else self.found <= self.allowed
+    @classmethod
+    def judged(
+        cls, name: str, found: float | None, allowed: float, unit: str, remark: str = "", beyond_card: bool = False
+    ) -> ImoCriterion:
+        """The criterion with its verdict and margin.
 
-    @property
-    def margin(self) -> float | None:
-        """Margin to the limit, in `unit`; negative if the criterion is not met."""
-        return None if self.found is None else self.allowed - self.found
-
-    @property
-    def margin_percent(self) -> float | None:
-        """The margin in per cent of the limit."""
-        return None if self.margin is None else 100 * self.margin / self.allowed
-
-    def as_json(self) -> dict[str, object]:
-        """The criterion with its verdict and margin."""
-        return {**vars(self), "passed": self.passed, "margin": self.margin, "margin_percent": self.margin_percent}
+        Parameters
+        ----------
+        name, found, allowed, unit, remark, beyond_card
+            Fields of the same names.
+        """
+        passed = None if found is None or beyond_card else found <= allowed
+        margin = None if found is None else allowed - found
+        percent = None if margin is None else 100 * margin / allowed
+        return cls(name, found, allowed, unit, remark, beyond_card, passed, margin, percent)
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ def imo_criteria(
 
     def criterion(name: str, unit: str, remark: str = "") -> ImoCriterion:
         text = "; ".join(text_part for text_part in (worst[name].remark, remark) if text_part)
-        return ImoCriterion(name, worst[name].value, limits[name], unit, text, worst[name].beyond)
+        return ImoCriterion.judged(name, worst[name].value, limits[name], unit, text, worst[name].beyond)
 
     return (
         criterion(ADVANCE, "L"),
@@ -262,11 +263,11 @@ def _stopping(trials: _Trials) -> ImoCriterion:
     name = TRACK_REACH
     if "propeller.speed" not in trials.model.input_names:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
-        return ImoCriterion(name, None, STOPPING, "L", remark)
+        return ImoCriterion.judged(name, None, STOPPING, "L", remark)
     (worse,) = trials.worst([Stop()], "track_reach_lengths")
     found = worse.value
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
     remark = "; ".join(text_part for text_part in (worse.remark, remark if found is not None else "") if text_part)
-    return ImoCriterion(name, found, STOPPING, "L", remark, worse.beyond)
+    return ImoCriterion.judged(name, found, STOPPING, "L", remark, worse.beyond)

@@ -18,7 +18,7 @@ import numpy as np
 from tank2sim.analysis.linearisation import OperatingPoint, straight_course
 from tank2sim.analysis.stability.straight_line import speed_acts
 from tank2sim.analysis.turning.diagram import hull_states
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
 
@@ -59,82 +59,61 @@ class MarginInfluence:
         Change of C' when the value is multiplied by 1.1 (its magnitude grows by 10 %), in per cent of |C'|.
     neutral_value : float or None
         The value at which C' = 0, all else unchanged; None without one within ten times its magnitude.
+    neutral_percent : float or None
+        Change to that value, in per cent of the value: negative if its magnitude is to fall.
     """
 
     name: str
     value: float
     slope: float
-    percent: float
+    percent: Number
     neutral_value: float | None
+    neutral_percent: float | None
 
     @property
     def short_name(self) -> str:
         """``Nr``, ``mass``: the name without its group."""
         return self.name.rpartition(".")[2]
 
-    @property
-    def neutral_percent(self) -> float | None:
-        """Change that makes the ship neutral, in per cent of the value: negative if its magnitude is to fall."""
-        return None if self.neutral_value is None else 100 * (self.neutral_value / self.value - 1)
 
-    def as_json(self) -> dict[str, object]:
-        """All values."""
-        return {**vars(self), "neutral_percent": self.neutral_percent}
+@dataclass(frozen=True, eq=False)
+class CriterionBySpeed:
+    """C' over speed (k,) and its slope dC'/du; nan without a straight course."""
+
+    speed_mps: Array
+    C_prime: Array
+    slope_s_per_m: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Margin:
     """The criterion of straight-line stability, its margin and their sensitivities.
 
     Parameters
     ----------
-    criterion : float
-        C'.
-    damping_lever, sway_lever : float
+    C_prime : float
+    damping_lever_lengths, sway_lever_lengths : float
         (N'_r - m' x'_G)/(Y'_r - m') and N'_v/Y'_v, in ship lengths forward of midships.
-    percent : float
+    lever_margin_lengths : float
+        The former less the latter: positive on a stable ship (whose Y_v and Y_r - m are negative).
+    margin_percent : float
         C' in per cent of |Y'_v (N'_r - m' x'_G)|, its stabilising part.
-    slopes : array (2, 2)
+    slopes_prime : array (2, 2)
         Slopes of Y' and N' by v' and r', the inertia of (3.1) included.
-    influences : tuple of MarginInfluence
+    derivatives : tuple of MarginInfluence
         The strongest first.
-    speeds_mps, criteria, speed_slopes : arrays (k,)
-        C' over speed and dC'/du (s/m); nan without a straight course. Empty where forces do not change with speed, as
-        for a linear card.
+    speed : CriterionBySpeed or None
+        None where forces do not change with speed, as for a linear card.
     """
 
-    criterion: float
-    damping_lever: float
-    sway_lever: float
-    percent: float
-    slopes: Array
-    influences: tuple[MarginInfluence, ...]
-    speeds_mps: Array
-    criteria: Array
-    speed_slopes: Array
-
-    @property
-    def lever(self) -> float:
-        """Margin of the levers, L: positive on a stable ship (whose Y_v and Y_r - m are negative)."""
-        return self.damping_lever - self.sway_lever
-
-    def as_json(self) -> dict[str, object]:
-        """Margins, sensitivities and the curve over speed."""
-        return {
-            "C_prime": self.criterion,
-            "damping_lever_lengths": self.damping_lever,
-            "sway_lever_lengths": self.sway_lever,
-            "lever_margin_lengths": self.lever,
-            "margin_percent": self.percent,
-            "derivatives": [influence.as_json() for influence in self.influences],
-            "speed": {
-                "speed_mps": self.speeds_mps,
-                "C_prime": self.criteria,
-                "slope_s_per_m": self.speed_slopes,
-            }
-            if len(self.speeds_mps)
-            else None,
-        }
+    C_prime: float
+    damping_lever_lengths: Number
+    sway_lever_lengths: Number
+    lever_margin_lengths: Number
+    margin_percent: Number
+    slopes_prime: Array
+    derivatives: tuple[MarginInfluence, ...]
+    speed: CriterionBySpeed | None
 
 
 class StabilityCriterion:
@@ -224,17 +203,16 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
         if (name.startswith("derivatives.") or name in _BODY) and point.p[names.index(name)] != 0
     ]
     moving = [influence for influence in influences if abs(influence.percent) > _NOTHING]
-    speeds, criteria, by_speed = _over_speed(criterion, point)
+    damping, sway = _ratio(slopes[1, 1], slopes[0, 1]), _ratio(slopes[1, 0], slopes[0, 0])
     return Margin(
-        criterion=value,
-        damping_lever=_ratio(slopes[1, 1], slopes[0, 1]),
-        sway_lever=_ratio(slopes[1, 0], slopes[0, 0]),
-        percent=100 * _ratio(value, abs(slopes[0, 0] * slopes[1, 1])),
-        slopes=slopes,
-        influences=tuple(sorted(moving, key=lambda item: -abs(item.percent))),
-        speeds_mps=speeds,
-        criteria=criteria,
-        speed_slopes=by_speed,
+        C_prime=value,
+        damping_lever_lengths=damping,
+        sway_lever_lengths=sway,
+        lever_margin_lengths=damping - sway,
+        margin_percent=100 * _ratio(value, abs(slopes[0, 0] * slopes[1, 1])),
+        slopes_prime=slopes,
+        derivatives=tuple(sorted(moving, key=lambda item: -abs(item.percent))),
+        speed=_over_speed(criterion, point),
     )
 
 
@@ -246,8 +224,8 @@ def _influence(criterion: StabilityCriterion, point: OperatingPoint, name: str, 
     place = criterion.model.parameter_names.index(name)
     value, present = float(point.p[place]), criterion.at(point)[0]
     percent = 100 * CHANGE * slope * value / abs(present) if present else float("nan")
-    strong = abs(percent) > _NOTHING
-    return MarginInfluence(name, value, slope, percent, _neutral(criterion, point, place) if strong else None)
+    neutral = _neutral(criterion, point, place) if abs(percent) > _NOTHING else None
+    return MarginInfluence(name, value, slope, percent, neutral, neutral and 100 * (neutral / value - 1))
 
 
 def _neutral(criterion: StabilityCriterion, point: OperatingPoint, place: int) -> float | None:
@@ -272,10 +250,10 @@ def _neutral(criterion: StabilityCriterion, point: OperatingPoint, place: int) -
     return None
 
 
-def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> tuple[Array, Array, Array]:
+def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> CriterionBySpeed | None:
     model = criterion.model
     if not criterion.by_speed:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
+        return None
     start = {parameter.name: parameter.start for parameter in model.parameters if isinstance(parameter, Parameter)}
     speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
     rows = []
@@ -287,43 +265,46 @@ def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> tuple[A
         value, total, _ = criterion.at(shifted)
         rows.append((value, float(total[-1])))
     criteria, slopes = np.array(rows).T
-    return speeds, criteria, slopes
+    return CriterionBySpeed(speeds, criteria, slopes)
 
 
 @dataclass(frozen=True)
-class TrimEffect:
-    """C' by trim.
+class TrimReading:
+    """C' with a derivative 7.5 % smaller and larger in magnitude: trim changed by 1 %."""
+
+    less: float
+    more: float
+
+
+@dataclass(frozen=True, eq=False)
+class InoueTrim:
+    """C' over trim after Inoue et al. (1981).
 
     Parameters
     ----------
-    readings : dict
-        ``Yr`` and ``Nr``: C' with that derivative 7.5 % smaller and larger in magnitude (trim changed by 1 %).
-    trims, criteria : arrays (k,)
-        Trim by the stern over ship length, and C' after Inoue et al.
+    trim_by_stern_over_length, C_prime : arrays (k,)
     draught_m : float
         Mean draught with which tau/d was formed.
-    changes : dict
-        Per cent by which 1 % of L of trim by the stern changes each derivative after Inoue et al.
+    change_percent_by_1_percent : dict
+        Per cent by which 1 % of L of trim by the stern changes each derivative.
     """
 
-    readings: Mapping[str, tuple[float, float]]
-    trims: Array
-    criteria: Array
+    trim_by_stern_over_length: Array
+    C_prime: Array
     draught_m: float
-    changes: Mapping[str, float]
+    change_percent_by_1_percent: dict[str, float]
 
-    def as_json(self) -> dict[str, object]:
-        """Both estimates."""
-        return {
-            "estimate": True,
-            "paper_7_5_percent": {name: {"less": low, "more": high} for name, (low, high) in self.readings.items()},
-            "inoue_1981": {
-                "trim_by_stern_over_length": self.trims,
-                "C_prime": self.criteria,
-                "draught_m": self.draught_m,
-                "change_percent_by_1_percent": dict(self.changes),
-            },
-        }
+
+@dataclass(frozen=True, eq=False)
+class TrimEffect:
+    """C' by trim, by two estimates: the readings of paper 2 by derivative (``Yr``, ``Nr``), and Inoue et al.
+
+    It is an estimate, because a card holds for a single trim.
+    """
+
+    paper_7_5_percent: dict[str, TrimReading]
+    inoue_1981: InoueTrim
+    estimate: bool = True
 
 
 def trim_effect(model: Model, margin: Margin) -> TrimEffect:
@@ -346,7 +327,7 @@ def trim_effect(model: Model, margin: Margin) -> TrimEffect:
     length = values["ship.length"]
     mass = values["ship.mass"] / (0.5 * values["ship.water_density"] * length**3)
     inertia = {"Yr": mass, "Nr": mass * values["ship.x_G"] / length}
-    (Yv, Yr), (Nv, Nr) = margin.slopes.tolist()
+    (Yv, Yr), (Nv, Nr) = margin.slopes_prime.tolist()
     bare = {"Yv": Yv, "Yr": Yr + inertia["Yr"], "Nv": Nv, "Nr": Nr + inertia["Nr"]}
 
     def criterion(factors: Mapping[str, float]) -> float:
@@ -359,11 +340,9 @@ def trim_effect(model: Model, margin: Margin) -> TrimEffect:
     per_length = length / draught
     curve = [criterion({name: 1 + rate * trim * per_length for name, rate in rates.items()}) for trim in TRIMS]
     return TrimEffect(
-        readings={
-            name: (criterion({name: 1 - PAPER_CHANGE}), criterion({name: 1 + PAPER_CHANGE})) for name in ("Yr", "Nr")
+        {
+            name: TrimReading(criterion({name: 1 - PAPER_CHANGE}), criterion({name: 1 + PAPER_CHANGE}))
+            for name in ("Yr", "Nr")
         },
-        trims=TRIMS,
-        criteria=np.array(curve),
-        draught_m=draught,
-        changes={name: rate * per_length for name, rate in rates.items()},
+        InoueTrim(TRIMS, np.array(curve), draught, {name: rate * per_length for name, rate in rates.items()}),
     )

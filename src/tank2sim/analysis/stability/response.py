@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space
 from tank2sim.analysis.stability.straight_line import Nomoto, steering_states
+from tank2sim.arrays import Array, ComplexArray, Unbounded
 from tank2sim.dynamics.model import Model
 
 if TYPE_CHECKING:
@@ -30,14 +31,14 @@ _STABLE_STEP, _UNSTABLE_STEP = 5.0, 2.5
 """Length of the step response in slowest time constants: to 99 % of the end, or to twelve times the beginning."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SteeringResponse:
     """Response of the yaw rate (rad/s) to the rudder (rad), + to starboard.
 
     Parameters
     ----------
     label : str
-        Name of the response.
+        The system: :data:`HULL`, :data:`GEAR` or :data:`FIRST_ORDER`.
     poles, zeros : arrays of complex
         1/s.
     gain_per_s : float
@@ -49,28 +50,13 @@ class SteeringResponse:
     """
 
     label: str
-    poles: NDArray[np.complex128]
-    zeros: NDArray[np.complex128]
-    gain_per_s: float
-    omega_radps: NDArray[np.float64]
-    response: NDArray[np.complex128]
-    time_s: NDArray[np.float64]
-    step_per_s: NDArray[np.float64]
-
-    def as_json(self) -> dict[str, object]:
-        """Complex numbers as [real, imaginary]; gain in dB of 1/s, phase in deg."""
-        return {
-            "system": self.label,
-            "poles": [[pole.real, pole.imag] for pole in self.poles],
-            "zeros": [[zero.real, zero.imag] for zero in self.zeros],
-            "gain_per_s": self.gain_per_s,
-            "bode": {
-                "omega_radps": self.omega_radps,
-                "magnitude_dB": 20 * np.log10(np.abs(self.response)),
-                "phase_deg": np.degrees(np.unwrap(np.angle(self.response))),
-            },
-            "step": {"time_s": self.time_s, "yaw_rate_per_rudder_per_s": self.step_per_s},
-        }
+    poles: ComplexArray
+    zeros: ComplexArray
+    gain_per_s: Unbounded
+    omega_radps: Array
+    response: ComplexArray
+    time_s: Array
+    step_per_s: Array
 
 
 def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> tuple[SteeringResponse, ...]:

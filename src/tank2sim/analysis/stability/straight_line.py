@@ -12,6 +12,7 @@ import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians, state_space, straight_course
 from tank2sim.analysis.turning.diagram import hull_states
+from tank2sim.arrays import ComplexNumber, Unbounded
 from tank2sim.dynamics.model import Model
 
 if TYPE_CHECKING:
@@ -30,15 +31,62 @@ class Nomoto:
     product of T1 and T2 are real: both are then None.
     """
 
-    K_per_s: float
-    T_s: float
+    K_per_s: Unbounded
+    T_s: Unbounded
     T1_s: float | None
     T2_s: float | None
-    T3_s: float
+    T3_s: Unbounded
 
-    def prime_json(self) -> dict[str, float | None]:
-        """The coefficients in the prime system, without units."""
-        return {f"{name.partition('_')[0]}_prime": value for name, value in vars(self).items()}
+
+@dataclass(frozen=True)
+class NomotoPrime:
+    """:class:`Nomoto` in the prime system: K L/U and T U/L."""
+
+    K_prime: Unbounded
+    T_prime: Unbounded
+    T1_prime: float | None
+    T2_prime: float | None
+    T3_prime: Unbounded
+
+
+@dataclass(frozen=True)
+class NomotoModels:
+    """Nomoto's coefficients in SI and in the prime system."""
+
+    dimensional: Nomoto
+    prime: NomotoPrime
+
+
+@dataclass(frozen=True, kw_only=True)
+class StraightCourse:
+    """A straight course: speed, drift (beta) and rudder, both positive to starboard."""
+
+    speed_mps: float
+    drift_deg: float
+    rudder_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CourseCriterion:
+    """The criterion of straight-line stability, as of :class:`Stability`; `settled_states` follow slow motions at once
+    (:func:`answering_states`)."""
+
+    C_prime: float
+    stable: bool
+    C_prime_decides: bool
+    growth_per_s: float
+    settled_states: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StraightLine:
+    """Straight-line stability of a ship as results report it; fields are those of :class:`Stability`."""
+
+    ship: str
+    operating_point: StraightCourse
+    eigenvalues: tuple[ComplexNumber, ...]
+    stability_criterion: CourseCriterion
+    nomoto: NomotoModels
 
 
 @dataclass(frozen=True)
@@ -60,8 +108,8 @@ class Stability:
         follow at once (:func:`settled_states`).
     steering_modes : tuple of complex
         The same at a held speed: of sway and yaw with the states of effects, 1/s.
-    nomoto, nomoto_prime : Nomoto
-        In SI; and with K L/U, T U/L. Of slow motion, as C' is.
+    nomoto, nomoto_prime : Nomoto, NomotoPrime
+        Of slow motion, as C' is.
     effect_states : tuple of str
         States of effects that respond to sway and yaw and act on them: C' and Nomoto's models include them only at
         rest.
@@ -75,7 +123,7 @@ class Stability:
     criterion: float
     steering_modes: tuple[complex, ...]
     nomoto: Nomoto
-    nomoto_prime: Nomoto
+    nomoto_prime: NomotoPrime
     effect_states: tuple[str, ...] = ()
 
     @property
@@ -97,25 +145,23 @@ class Stability:
         """True if the sign of C' agrees with the modes; else it is not a margin of stability."""
         return self.stable == (self.criterion > 0)
 
-    def as_json(self) -> dict[str, object]:
-        """The result for JSON; eigenvalues as [real, imaginary]."""
-        return {
-            "ship": self.name,
-            "operating_point": {
-                "speed_mps": self.speed_mps,
-                "drift_deg": self.drift_deg,
-                "rudder_deg": self.rudder_deg,
-            },
-            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
-            "stability_criterion": {
-                "C_prime": self.criterion,
-                "stable": self.stable,
-                "C_prime_decides": self.criterion_decides,
-                "growth_per_s": self.growth_per_s,
-                "settled_states": list(self.effect_states),
-            },
-            "nomoto": {"dimensional": vars(self.nomoto), "prime": self.nomoto_prime.prime_json()},
-        }
+    def reported(self) -> StraightLine:
+        """Return the part that results report."""
+        return StraightLine(
+            ship=self.name,
+            operating_point=StraightCourse(
+                speed_mps=self.speed_mps, drift_deg=self.drift_deg, rudder_deg=self.rudder_deg
+            ),
+            eigenvalues=self.eigenvalues,
+            stability_criterion=CourseCriterion(
+                C_prime=self.criterion,
+                stable=self.stable,
+                C_prime_decides=self.criterion_decides,
+                growth_per_s=self.growth_per_s,
+                settled_states=self.effect_states,
+            ),
+            nomoto=NomotoModels(self.nomoto, self.nomoto_prime),
+        )
 
 
 def stability(model: Model, speed_mps: float | None = None) -> Stability:
@@ -152,7 +198,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         criterion=criterion,
         steering_modes=_modes(model, point, steering_states(model)),
         nomoto=models,
-        nomoto_prime=Nomoto(
+        nomoto_prime=NomotoPrime(
             models.K_per_s * time,
             models.T_s / time,
             models.T1_s and models.T1_s / time,

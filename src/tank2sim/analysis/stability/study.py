@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
+from tank2sim.analysis.ensemble.results import StabilityBands
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.margin import Margin, TrimEffect, stability_margin, trim_effect
 from tank2sim.analysis.stability.response import SteeringResponse, steering_responses
-from tank2sim.analysis.stability.straight_line import Stability, stability
+from tank2sim.analysis.stability.straight_line import Stability, StraightLine, stability
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic, steering_characteristic
-from tank2sim.analysis.turning.diagram import SteadyTurning, steady_turning
+from tank2sim.analysis.turning.diagram import SteadyTurning, TurningDiagram, steady_turning
 from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, reverse_spiral
 from tank2sim.dynamics.effects import EFFECTS, undisturbed_inputs
 from tank2sim.dynamics.model import Model
@@ -30,55 +32,52 @@ SLOWEST, FASTEST, SPEEDS = 0.01, 2.0, 400
 0.5 % of it are taken for none. Ships do not go at twice the speed about which they were tested. Project choice."""
 
 
+@dataclass(frozen=True, eq=False)
+class Spirals:
+    """Simulated spirals; None if not requested or not possible."""
+
+    direct: SpiralPoints | None = None
+    reverse: SpiralPoints | None = None
+
+
 @dataclass(frozen=True)
-class StabilityStudy:
-    """Stability and manoeuvrability of a ship.
+class SteadySpeed:
+    """A surge speed (m/s) that the engine holds, and whether the ship returns to it after a small change of speed."""
+
+    speed_mps: float
+    stable: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StabilityStudy(StraightLine):
+    """Stability and manoeuvrability of a ship: the straight course at the requested speed, and
 
     Parameters
     ----------
-    stability, margin, trim, responses
-        Results of the straight course at the requested speed.
-    turning, characteristic : optional
+    margins, trim, responses
+        Results of the straight course.
+    steady_turning, characteristic : optional
         At the speed of expansion; None without a steady motion, which `notices` state.
-    direct, reverse : SpiralPoints, optional
-        Simulated spirals; None if not requested or not possible.
+    spirals : Spirals
     imo : tuple of ImoCriterion
         At the speed of expansion.
     steady_speeds : tuple of SteadySpeed
         Speeds straight ahead that the engine holds at the revolutions of the start.
     notices : tuple of str
         Messages for the user.
+    ensemble : StabilityBands, optional
     """
 
-    stability: Stability
-    margin: Margin
+    margins: Margin
     trim: TrimEffect
     responses: tuple[SteeringResponse, ...]
-    turning: SteadyTurning | None
+    steady_turning: TurningDiagram | None
     characteristic: SteeringCharacteristic | None
-    direct: SpiralPoints | None
-    reverse: SpiralPoints | None
+    spirals: Spirals
     imo: tuple[ImoCriterion, ...]
     steady_speeds: tuple[SteadySpeed, ...]
     notices: tuple[str, ...]
-
-    def as_json(self) -> dict[str, object]:
-        """The result for JSON."""
-        return {
-            **self.stability.as_json(),
-            "margins": self.margin.as_json(),
-            "trim": self.trim.as_json(),
-            "responses": [response.as_json() for response in self.responses],
-            "steady_turning": self.turning and self.turning.as_json(),
-            "characteristic": self.characteristic and self.characteristic.as_json(),
-            "spirals": {
-                "direct": self.direct and self.direct.as_json(),
-                "reverse": self.reverse and self.reverse.as_json(),
-            },
-            "imo": [criterion.as_json() for criterion in self.imo],
-            "steady_speeds": [vars(speed) for speed in self.steady_speeds],
-            "notices": list(self.notices),
-        }
+    ensemble: StabilityBands | None = None
 
 
 def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bool = True) -> StabilityStudy:
@@ -95,30 +94,29 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
     found = stability(model, speed_mps)
     margin = stability_margin(model, speed_mps)
     notices = [
-        *_about_speed(model, found, by_speed=len(margin.speeds_mps) > 0),
+        *_about_speed(model, found, by_speed=margin.speed is not None),
         *_about_effects(found),
         *_about_weather(model),
     ]
     held = steady_speeds(model)
     notices += _about_steady_speeds(held)
-    turning, direct, reverse = None, None, None
+    turning, spiralled = None, Spirals()
     try:
         turning = steady_turning(model)
         notices += turning.notices
     except InputError as error:
         notices.append(f"no steady-turning diagram: {_reason(error)}")
     if turning is not None and spirals:
-        direct, reverse, spiral_notes = _spirals(model, turning)
+        spiralled, spiral_notes = _spirals(model, turning)
         notices += spiral_notes
     return StabilityStudy(
-        stability=found,
-        margin=margin,
+        **vars(found.reported()),
+        margins=margin,
         trim=trim_effect(model, margin),
         responses=steering_responses(model, straight_course(model, speed_mps), found.nomoto),
-        turning=turning,
+        steady_turning=turning.reported() if turning else None,
         characteristic=steering_characteristic(turning) if turning else None,
-        direct=direct,
-        reverse=reverse,
+        spirals=spiralled,
         imo=imo_criteria(model),
         steady_speeds=held,
         notices=tuple(notices),
@@ -191,7 +189,7 @@ def _about_weather(model: Model) -> list[str]:
     ]
 
 
-def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None, SpiralPoints | None, list[str]]:
+def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[str]]:
     """The two spirals, with notices."""
     messages: list[str] = []
     direct = reverse = None
@@ -208,25 +206,17 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None,
             messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
     except InputError as error:
         messages.append(f"no reverse spiral: {_reason(error)}")
-    most = float(np.max(np.abs(turning.yaw_rate_radps)))
+    most = math.degrees(np.max(np.abs(turning.yaw_rate_radps)))
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:
             continue
-        off = int(np.sum(points.steady & ~(points.distance_radps < _FAR * most)))
+        off = int(np.sum(np.array(points.steady) & ~(points.distance_to_diagram_degps < _FAR * most)))
         if off:
             messages.append(
                 f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
                 "joined to its straight course, or the diagram ends before them"
             )
-    return direct, reverse, messages
-
-
-@dataclass(frozen=True)
-class SteadySpeed:
-    """A surge speed (m/s) that the engine holds, and whether the ship returns to it after a small change of speed."""
-
-    speed_mps: float
-    stable: bool
+    return Spirals(direct, reverse), messages
 
 
 def steady_speeds(model: Model) -> tuple[SteadySpeed, ...]:

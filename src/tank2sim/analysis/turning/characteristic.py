@@ -26,72 +26,76 @@ _RATES = 201
 
 
 @dataclass(frozen=True)
-class CubicCharacteristic:
-    """Rudder angle (rad) as a cubic in yaw rate (rad/s): coefficients (4,) from the constant up, and its error.
+class CubicError:
+    """Error of the rudder angle of a cubic: root mean square and largest within the fit, and largest in the
+    single-valued part beyond it, None without such a part."""
 
-    `rms_rad` and `largest_rad` are the root mean square and the largest error of the rudder angle within the fit,
-    `beyond_rad` the largest in the single-valued part beyond it, None without such a part.
-    """
-
-    coefficients: Array
-    rms_rad: float
-    largest_rad: float
-    beyond_rad: float | None
-
-    def __call__(self, yaw_rate_radps: Array) -> Array:
-        """Rudder angle, rad."""
-        return np.asarray(np.polynomial.polynomial.polyval(yaw_rate_radps, self.coefficients))
-
-    def error_json(self) -> dict[str, float | None]:
-        """Errors in deg."""
-        errors = {"rms": self.rms_rad, "largest": self.largest_rad, "largest_beyond_fit": self.beyond_rad}
-        return {f"{name}_deg": None if value is None else math.degrees(value) for name, value in errors.items()}
+    rms_deg: float
+    largest_deg: float
+    largest_beyond_fit_deg: float | None
 
 
 @dataclass(frozen=True)
+class BechCubic:
+    """delta = b0 + b1 r + b2 r^2 + b3 r^3, rad and s."""
+
+    b0_rad: float
+    b1_s: float
+    b2_s2_per_rad: float
+    b3_s3_per_rad2: float
+    error: CubicError
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """b0 to b3."""
+        return self.b0_rad, self.b1_s, self.b2_s2_per_rad, self.b3_s3_per_rad2
+
+
+@dataclass(frozen=True)
+class NorrbinCubic:
+    """K delta = n0 + n1 r + n2 r^2 + n3 r^3, rad and s."""
+
+    K_per_s: float
+    n0_radps: float
+    n1: float
+    n2_s_per_rad: float
+    n3_s2_per_rad2: float
+    error: CubicError
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """n0 to n3."""
+        return self.n0_radps, self.n1, self.n2_s_per_rad, self.n3_s2_per_rad2
+
+
+@dataclass(frozen=True, eq=False)
+class CharacteristicCurve:
+    """H(r) of the diagram: yaw rate and the rudder angle that holds it (k,), positive to starboard."""
+
+    yaw_rate_degps: Array
+    rudder_deg: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SteeringCharacteristic:
-    """Rudder angle that holds a steady yaw rate, and two cubics for it; SI, + to starboard.
+    """Rudder angle that holds a steady yaw rate, and two cubics for it.
 
     Parameters
     ----------
-    yaw_rate_radps, rudder_rad : arrays (k,)
-        H(r) of the diagram.
-    bech, norrbin : CubicCharacteristic
-        The nearest cubic, and the nearest one with the position and slope of the straight course.
-    slope_s : float
-        dH/dr on the straight course, exact, s: the reciprocal of Nomoto's K if surge does not change with the rudder.
-    fitted_rad : float
-        Largest yaw rate of the fit, rad/s.
+    norrbin, bech : NorrbinCubic, BechCubic
+        The nearest cubic with the position and slope of the straight course, and the nearest one.
+    curve : CharacteristicCurve
+    slope_on_straight_course_s : float
+        dH/dr, exact, s: the reciprocal of Nomoto's K if surge does not change with the rudder.
+    fitted_up_to_degps : float
+        Largest yaw rate of the fit.
     """
 
-    yaw_rate_radps: Array
-    rudder_rad: Array
-    bech: CubicCharacteristic
-    norrbin: CubicCharacteristic
-    slope_s: float
-    fitted_radps: float
-
-    @property
-    def K_per_s(self) -> float:
-        """Norrbin's K, 1/s."""
-        return 1 / abs(self.slope_s)
-
-    @property
-    def n(self) -> Array:
-        """Norrbin's n0 (rad/s), n1 (1), n2 (s/rad), n3 (s^2/rad^2)."""
-        return self.K_per_s * self.norrbin.coefficients
-
-    def as_json(self) -> dict[str, object]:
-        """Coefficients in SI (rad, s), errors in deg."""
-        of_norrbin = dict(zip(("n0_radps", "n1", "n2_s_per_rad", "n3_s2_per_rad2"), self.n, strict=True))
-        names = ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")
-        return {
-            "norrbin": {"K_per_s": self.K_per_s, **of_norrbin, "error": self.norrbin.error_json()},
-            "bech": {**dict(zip(names, self.bech.coefficients, strict=True)), "error": self.bech.error_json()},
-            "curve": {"yaw_rate_degps": np.degrees(self.yaw_rate_radps), "rudder_deg": np.degrees(self.rudder_rad)},
-            "slope_on_straight_course_s": self.slope_s,
-            "fitted_up_to_degps": math.degrees(self.fitted_radps),
-        }
+    norrbin: NorrbinCubic
+    bech: BechCubic
+    curve: CharacteristicCurve
+    slope_on_straight_course_s: float
+    fitted_up_to_degps: float
 
 
 def steering_characteristic(turning: SteadyTurning) -> SteeringCharacteristic | None:
@@ -110,18 +114,22 @@ def steering_characteristic(turning: SteadyTurning) -> SteeringCharacteristic | 
     rudder = np.asarray(curve(rate), dtype=float)
     inside = np.abs(rudder) <= max(FITTED_RUDDER, 1.5 * abs(turning.rudder_rad[turning.straight]))
     tangent = np.array([turning.rudder_rad[turning.straight], slope[0] / slope[1]])
+    nearest, error = _cubic(rate, rudder, inside, np.zeros(0))
+    tangential, its_error = _cubic(rate, rudder, inside, tangent)
+    K = float(1 / abs(tangent[1]))
+    b0, b1, b2, b3 = nearest.tolist()
+    n0, n1, n2, n3 = (K * tangential).tolist()
     return SteeringCharacteristic(
-        yaw_rate_radps=rate,
-        rudder_rad=rudder,
-        bech=_cubic(rate, rudder, inside, np.zeros(0)),
-        norrbin=_cubic(rate, rudder, inside, tangent),
-        slope_s=float(tangent[1]),
-        fitted_radps=float(np.max(np.abs(rate[inside]))),
+        norrbin=NorrbinCubic(K, n0, n1, n2, n3, its_error),
+        bech=BechCubic(b0, b1, b2, b3, error),
+        curve=CharacteristicCurve(np.degrees(rate), np.degrees(rudder)),
+        slope_on_straight_course_s=float(tangent[1]),
+        fitted_up_to_degps=math.degrees(np.max(np.abs(rate[inside]))),
     )
 
 
-def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -> CubicCharacteristic:
-    """The nearest cubic with the first coefficients `kept`."""
+def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -> tuple[Array, CubicError]:
+    """Coefficients (4,), SI, of the nearest cubic with the first coefficients `kept`, and its error."""
     largest = float(np.max(np.abs(rate)))
     powers = np.vander(rate / largest, 4, increasing=True)
     scales = largest ** np.arange(4.0)
@@ -129,11 +137,10 @@ def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -
     residual = rudder - powers[:, :n] @ (kept * scales[:n])
     higher = np.linalg.lstsq(powers[inside, n:], residual[inside], rcond=None)[0] / scales[n:]
     coefficients = np.concatenate([kept, higher])
-    error = np.abs(powers @ (coefficients * scales) - rudder)
+    error = np.degrees(np.abs(powers @ (coefficients * scales) - rudder))
     beyond = float(error[~inside].max()) if not inside.all() else None
-    return CubicCharacteristic(
-        coefficients, float(np.sqrt(np.mean(error[inside] ** 2))), float(error[inside].max()), beyond
-    )
+    within = error[inside]
+    return coefficients, CubicError(float(np.sqrt(np.mean(within**2))), float(within.max()), beyond)
 
 
 def _single_valued(turning: SteadyTurning) -> tuple[int, int]:

@@ -128,38 +128,92 @@ class SteadyTurning:
             for place, row in zip(places, before, strict=True)
         ]
 
-    def as_json(self) -> dict[str, object]:
-        """The diagram in SI and in degrees, for JSON."""
-        points: dict[str, object] = {
-            "rudder_deg": np.degrees(self.rudder_rad),
-            "yaw_rate_degps": np.degrees(self.yaw_rate_radps),
-            "speed_mps": self.speed_mps,
-            "drift_deg": np.degrees(self.drift_rad),
-            "growth_per_s": self.growth_per_s,
-            "stable": self.stable,
-        }
-        if self.heel_rad is not None:
-            points["heel_deg"] = np.degrees(self.heel_rad)
-        turns = [
-            {"rudder_deg": rudder, "yaw_rate_degps": math.degrees(rate), "stable": stable}
+    def reported(self) -> TurningDiagram:
+        """Return the part that results report, in degrees."""
+        reported = [
+            ReportedTurn(float(rudder), math.degrees(rate), stable)
             for rudder in _REPORTED_RUDDERS_DEG
             for rate, stable in self.turns_at(math.copysign(max(0.0, abs(math.radians(rudder)) - 1e-9), rudder))
         ]
-        loop = self.loop and {
-            "width_deg": math.degrees(self.loop.width_rad),
-            "height_degps": None if self.loop.height_radps is None else math.degrees(self.loop.height_radps),
-        }
-        folds = [
-            {"rudder_deg": math.degrees(fold.rudder_rad), "yaw_rate_degps": math.degrees(fold.yaw_rate_radps)}
-            for fold in self.folds
-        ]
-        return {
-            "points": points,
-            "turns": turns,
-            "folds": folds,
-            "loop": loop,
-            "ended": {"port": self.ended[0], "starboard": self.ended[1]},
-        }
+        loop = None
+        if self.loop is not None:
+            height = self.loop.height_radps
+            loop = ReportedLoop(math.degrees(self.loop.width_rad), None if height is None else math.degrees(height))
+        return TurningDiagram(
+            points=DiagramPoints(
+                rudder_deg=np.degrees(self.rudder_rad),
+                yaw_rate_degps=np.degrees(self.yaw_rate_radps),
+                speed_mps=self.speed_mps,
+                drift_deg=np.degrees(self.drift_rad),
+                growth_per_s=self.growth_per_s,
+                stable=tuple(self.stable.tolist()),
+                heel_deg=None if self.heel_rad is None else np.degrees(self.heel_rad),
+            ),
+            turns=tuple(reported),
+            folds=tuple(
+                ReportedFold(math.degrees(fold.rudder_rad), math.degrees(fold.yaw_rate_radps)) for fold in self.folds
+            ),
+            loop=loop,
+            ended=CurveEnds(*self.ended),
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DiagramPoints:
+    """Steady turns (k,) in the order of the curve, from port to starboard turn, positive to starboard; as of
+    :class:`SteadyTurning`."""
+
+    rudder_deg: Array
+    yaw_rate_degps: Array
+    speed_mps: Array
+    drift_deg: Array
+    growth_per_s: Array
+    stable: tuple[bool, ...]
+    heel_deg: Array | None
+
+
+@dataclass(frozen=True)
+class ReportedTurn:
+    """A steady turn at one of the rudder angles of a report."""
+
+    rudder_deg: float
+    yaw_rate_degps: float
+    stable: bool
+
+
+@dataclass(frozen=True)
+class ReportedFold:
+    """A fold of the diagram."""
+
+    rudder_deg: float
+    yaw_rate_degps: float
+
+
+@dataclass(frozen=True)
+class ReportedLoop:
+    """Width (rudder) and height (yaw rate) of a hysteresis loop, as of :class:`HysteresisLoop`."""
+
+    width_deg: float
+    height_degps: float | None
+
+
+@dataclass(frozen=True)
+class CurveEnds:
+    """Why the curve ends to port and to starboard."""
+
+    port: str
+    starboard: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TurningDiagram:
+    """The steady-turning diagram of a ship as results report it: all points, turns at round rudder angles, folds."""
+
+    points: DiagramPoints
+    turns: tuple[ReportedTurn, ...]
+    folds: tuple[ReportedFold, ...]
+    loop: ReportedLoop | None
+    ended: CurveEnds
 
 
 def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:

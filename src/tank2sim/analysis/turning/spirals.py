@@ -44,33 +44,25 @@ _LONGEST = 60.0
 """Longest time at a yaw rate, L/u0."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpiralPoints:
     """Points of a simulated spiral in the order of the run.
 
     Parameters
     ----------
-    rudder_rad, yaw_rate_radps : arrays (n,)
-    steady : array (n,) of bool
+    rudder_deg, yaw_rate_degps : arrays (n,)
+        Positive to starboard.
+    steady : tuple of bool
         False where the turn (or the rudder) was still changing at the end.
-    distance_radps : array (n,)
+    distance_to_diagram_degps : array (n,)
         To the nearest turn of the diagram at that rudder, yaw rate, nan where the diagram has none: for a direct spiral
         only stable turns count.
     """
 
-    rudder_rad: Array
-    yaw_rate_radps: Array
-    steady: NDArray[np.bool_]
-    distance_radps: Array
-
-    def as_json(self) -> dict[str, object]:
-        """In degrees."""
-        return {
-            "rudder_deg": np.degrees(self.rudder_rad),
-            "yaw_rate_degps": np.degrees(self.yaw_rate_radps),
-            "steady": self.steady,
-            "distance_to_diagram_degps": np.degrees(self.distance_radps),
-        }
+    rudder_deg: Array
+    yaw_rate_degps: Array
+    steady: tuple[bool, ...]
+    distance_to_diagram_degps: Array
 
 
 def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator | None = None) -> SpiralPoints:
@@ -92,8 +84,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
     angles = trajectory["rudder.angle"][ends]  # not the orders: a gear may have play
     acceleration = np.abs(trajectory["motion.rdot"][ends]) * _ship_time(model)
     steady = acceleration < 2e-3 * np.maximum(np.abs(rates), 0.01 / _ship_time(model))
-    distance = [_distance(turning, d, r, only_stable=True) for d, r in zip(angles, rates, strict=True)]
-    return SpiralPoints(angles, rates, steady, np.array(distance))
+    return _points(turning, angles, rates, steady, only_stable=True)
 
 
 def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> SpiralPoints | None:
@@ -115,8 +106,7 @@ def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> Spir
     rudders, steady = _held(running, rates, _ship_time(model))
     if not np.isfinite(rudders).all():
         raise InputError(model.origin, "reverse spiral", "the motion leaves all bounds", "check the card's derivatives")
-    distance = [_distance(turning, d, r, only_stable=False) for d, r in zip(rudders, rates, strict=True)]
-    return SpiralPoints(rudders, rates, steady, np.array(distance))
+    return _points(turning, rudders, rates, steady, only_stable=False)
 
 
 def with_rate_controller(model: Model, nomoto: Nomoto) -> Model:
@@ -162,6 +152,14 @@ def _held(running: Running, rates: Sequence[float] | Array, ship_time: float) ->
         rudders.append(before)
         steady.append(calm)
     return np.array(rudders), np.array(steady)
+
+
+def _points(
+    turning: SteadyTurning, rudders: Array, rates: Array, steady: NDArray[np.bool_], *, only_stable: bool
+) -> SpiralPoints:
+    """Points of rudders (rad) and yaw rates (rad/s), all (n,)."""
+    apart = [_distance(turning, d, r, only_stable=only_stable) for d, r in zip(rudders, rates, strict=True)]
+    return SpiralPoints(np.degrees(rudders), np.degrees(rates), tuple(steady.tolist()), np.degrees(apart))
 
 
 def _distance(turning: SteadyTurning, rudder: float, rate: float, *, only_stable: bool) -> float:

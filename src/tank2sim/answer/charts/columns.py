@@ -6,7 +6,6 @@ One table of columns is ``{"t_s": [...], "psi_deg": [...], ...}``; angles may be
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import altair as alt
 import numpy as np
@@ -24,6 +23,7 @@ from tank2sim.answer.charts.parts import shown_unit
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
+from tank2sim.simulation.bands import BandOverTime
 from tank2sim.units import in_words, to_si
 
 _Columns = Mapping[str, Sequence[float | None] | Array]
@@ -102,30 +102,25 @@ def measured_histories(columns: _Columns, title: str) -> alt.VConcatChart | None
     return history_chart([record], signals, title=title, height_px=60)
 
 
-def varying_histories(columns: _Columns, ensemble: Mapping[str, Any]) -> Illustration | None:
-    """The signals of a run that change, over time, with the bands of an ensemble; those that do not in the caption."""
+def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band_t_s: Array) -> Illustration | None:
+    """The signals of a run that change, over time, with bands at `band_t_s` (n,); the others in the caption."""
     table = _by_stem(_in_si(columns))
     signals = [signal for signal in _signals({"run": columns}) if not (signal.name == _ORDER and _ANGLE in table)]
     constant = [signal for signal in signals if np.nanmax(table[signal.name]) == np.nanmin(table[signal.name])]
     shown = [signal for signal in signals if signal not in constant]
     if not shown:
         return None
-    bands = [
-        _band(name, band, ensemble["t_s"])
-        for name, band in (ensemble.get("histories") or {}).items()
-        if name not in _TRACK
-    ]
-    run = History(label="simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=bands)
+    shaded = [_band(name, band, band_t_s) for name, band in bands.items() if name not in _TRACK]
+    run = History(label="simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
     held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
-    said = ["Shaded: nine of ten ships at each time."] if bands else []
+    said = ["Shaded: nine of ten ships at each time."] if shaded else []
     said += [f"Constant: {held}."] if held else []
     chart = history_chart([run], shown, title="Time histories", height_px=110)
     return Illustration(chart=chart, caption=" ".join(said))
 
 
-def _band(name: str, band: Mapping[str, Sequence[float | None]], time_s: Sequence[float]) -> HistoryBand:
-    edges = _in_si({f"{edge}_{name}": band[edge] for edge in ("p5", "p95")})
-    low, high = edges.values()
+def _band(name: str, band: BandOverTime, time_s: Array) -> HistoryBand:
+    low, high = _in_si({f"p5_{name}": band.p5, f"p95_{name}": band.p95}).values()
     return HistoryBand(signal=stem_of(name), time_s=time_s, low=low, high=high)
 
 

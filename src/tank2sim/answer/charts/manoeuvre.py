@@ -34,6 +34,7 @@ from tank2sim.answer.charts.parts import (
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
 from tank2sim.records.thinning import thin_line
+from tank2sim.simulation.bands import Band
 
 MOST_HULLS = 14
 """Outlines of the ship along a track at most: more would hide it. Project choice."""
@@ -148,11 +149,11 @@ class Dimension:
     align: Literal["left", "center", "right"] = "center"
 
 
-Quantiles = Mapping[str, Mapping[str, float | None]]
-"""Figure by name to its quantiles ``p5``, ``p50``, ``p95``."""
+NamedBands = Mapping[str, Band]
+"""Figure by name to its band over an ensemble."""
 
 
-def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: Quantiles) -> list[Dimension]:
+def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: NamedBands) -> list[Dimension]:
     """Return advance, transfer and tactical diameter of a turning circle, as far as the run shows them."""
     side = math.copysign(1.0, float(motion.heading_deg[-1]))
     advance, transfer = figures.get("advance_m"), figures.get("transfer_m")
@@ -202,7 +203,7 @@ def turn_chart(
     motion: Motion,
     figures: Mapping[str, float | None],
     *,
-    bands: Quantiles | None = None,
+    bands: NamedBands | None = None,
     edges_m: tuple[Array, Array] | None = None,
     title: str = "",
 ) -> alt.LayerChart:
@@ -214,7 +215,7 @@ def turn_chart(
     figures : mapping
         ``advance_m``, ``transfer_m``, ``tactical_diameter_m``, ``time_180_s``.
     bands : mapping, optional
-        Quantiles of the figures over an ensemble.
+        NamedBands of the figures over an ensemble.
     edges_m : pair of arrays (n, 2), optional
         Edges of the band of the track: distance ahead and to starboard, m.
     title : str
@@ -295,7 +296,7 @@ def zigzag_chart(
     figures: Mapping[str, Sequence[float]],
     heading_deg: float,
     *,
-    bands: Quantiles | None = None,
+    bands: NamedBands | None = None,
     edges_deg: tuple[Array, Array, Array] | None = None,
     title: str = "",
 ) -> alt.LayerChart:
@@ -309,7 +310,7 @@ def zigzag_chart(
     heading_deg : float
         Heading at which the rudder is reversed, positive.
     bands : mapping, optional
-        Quantiles over an ensemble, of ``overshoot_1_deg``, ...
+        NamedBands over an ensemble of ``overshoot_1_deg``, ...
     edges_deg : three arrays (n,), optional
         Times (s), and the edges of the band of the heading (deg).
     title : str
@@ -356,7 +357,7 @@ def zigzag_chart(
 
 
 def overshoot_marks(
-    motion: Motion, figures: Mapping[str, Sequence[float]], heading_deg: float, bands: Quantiles
+    motion: Motion, figures: Mapping[str, Sequence[float]], heading_deg: float, bands: NamedBands
 ) -> list[ChartRecord]:
     """Return a mark for each overshoot: from the heading of the order to the peak of the heading, with its size."""
     marks: list[ChartRecord] = []
@@ -365,10 +366,8 @@ def overshoot_marks(
         at = execute + later
         side = math.copysign(1.0, float(np.interp(at, motion.time_s, motion.heading_deg)))
         mark = {"t": plain(at), "from": side * heading_deg, "v": plain(side * (heading_deg + overshoot))}
-        band = bands.get(f"overshoot_{number}_deg") or {}
-        low, high = band.get("p5"), band.get("p95")
-        if low is not None and high is not None:
-            mark |= {"low": plain(side * (heading_deg + low)), "high": plain(side * (heading_deg + high))}
+        if band := bands.get(f"overshoot_{number}_deg"):
+            mark |= {"low": plain(side * (heading_deg + band.p5)), "high": plain(side * (heading_deg + band.p95))}
         marks.append(mark | {"text": f"{format_number(overshoot, _ROUND)}°"})
     return marks
 
@@ -497,12 +496,9 @@ def _sized(name: str, size_m: float, length_m: float | None) -> str:
 
 
 def _ends(
-    band: Mapping[str, float | None] | None, point: Callable[[float], tuple[float, float]]
+    band: Band | None, point: Callable[[float], tuple[float, float]]
 ) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
-    low, high = (band or {}).get("p5"), (band or {}).get("p95")
-    if low is None or high is None:
-        return None, None
-    return point(low), point(high)
+    return (point(band.p5), point(band.p95)) if band else (None, None)
 
 
 def _polygon(edges: tuple[Array, Array]) -> Array:

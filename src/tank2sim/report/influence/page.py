@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tank2sim.analysis.ensemble.results import FigureBands
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.answer.study import read_study
 from tank2sim.arrays import Array
 from tank2sim.marks import assumed_words
-from tank2sim.report.ensemble.sections import figures_section
 from tank2sim.report.influence.charts import (
     InfluenceData,
     figure_label,
@@ -22,6 +23,7 @@ from tank2sim.report.influence.charts import (
     variance_chart,
 )
 from tank2sim.report.json_values import Json
+from tank2sim.results.ensembles import figures_section
 from tank2sim.units import in_words
 
 _COEFFICIENTS = (
@@ -55,7 +57,7 @@ def influence_page(found: Json) -> Page:
     if tuned:
         sections.append(_moves(tuned["parameters"]))
     if "ensemble" in found:
-        sections.append(figures_section(found["ensemble"]))
+        sections.append(figures_section(read_study(FigureBands, found["ensemble"], "")))
     return Page(
         title=f"{found['ship']}: influence coefficients",
         subtitle=f"Parameters: {len(coefficients.names)}. Figures: {len(coefficients.figures)}.",

@@ -43,25 +43,11 @@ _GAP_NOTE = (
 
 RESULT_TYPES = (
     ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
-    ResultType("Simulated manoeuvre", "simulate", ("ship", "manoeuvre", "figures"), ("manoeuvre",)),
-    ResultType(
-        "Stability",
-        "stability",
-        ("stability_criterion", "nomoto"),
-        ("stability_criterion.stable", "stability_criterion.C_prime"),
-    ),
-    ResultType(
-        "Stability of a craft",
-        "stability",
-        ("straight_run", "difference_turns"),
-        ("straight_run.stable", "straight_run.surge_time_constant_s"),
-    ),
     ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("Guessed ship", "guess", ("dimensions", "next_figures"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),

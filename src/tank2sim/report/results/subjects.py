@@ -10,15 +10,12 @@ from tank2sim.answer.parts import Section
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
-from tank2sim.report.guess.page import guess_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
-from tank2sim.report.manoeuvre.page import manoeuvre_page
 from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
-from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
 
@@ -55,33 +52,14 @@ _PAGES: Mapping[str, _Page] = {
     "Cards compared": _Page(
         compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),
-    "Stability": _Page(
-        stability_page,
-        {
-            "operating_point": dict,
-            "margins": dict,
-            "trim": dict,
-            "responses": list,
-            "steady_turning": dict,
-            "characteristic": dict,
-            "spirals": dict,
-            "imo": list,
-            "notices": list,
-        },
-    ),
     "Steering catalogue": _Page(
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
     ),
-    "Simulated manoeuvre": _Page(manoeuvre_page, {"ship": str, "histories": dict, "figures": dict, "manoeuvre": str}),
     "Validation": _Page(
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
         | {"imo": list, "replays": list, "notices": list},
-    ),
-    "Guessed ship": _Page(
-        guess_page,
-        {"figures": dict, "dimensions": dict, "parameters": dict, "next_figures": dict, "notices": list},
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Signals": _Page(signals_page, {"trials": list}),

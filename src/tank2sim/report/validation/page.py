@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.study import ComparisonOutcome
 from tank2sim.answer.charts.columns import motions
 from tank2sim.answer.numbers import format_number
@@ -14,8 +14,8 @@ from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, notices_section
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
 from tank2sim.report.json_values import Json
-from tank2sim.report.stability.page import imo_section
 from tank2sim.report.validation.charts import COMPARISON_ERRORS, comparison_error_chart
+from tank2sim.results.imo import imo_section
 from tank2sim.units import in_words
 
 _METHOD = (
@@ -224,7 +224,8 @@ def _replays(replays: Sequence[Json]) -> Section:
 
 def _standards(criteria: Sequence[Json]) -> Section:
     text = "Figures of the model next to the standards; they hold as far as the figures above are validated."
-    return replace(imo_section(criteria), heading="Standard manoeuvres", text=text)
+    found = [ImoCriterion(**criterion) for criterion in criteria]
+    return imo_section(found, heading="Standard manoeuvres", text=text)
 
 
 _CAUSES = (

@@ -8,7 +8,13 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.analysis.stability.response import FIRST_ORDER
+from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.analysis.stability.margin import CriterionBySpeed, Margin, TrimEffect
+from tank2sim.analysis.stability.response import FIRST_ORDER, SteeringResponse
+from tank2sim.analysis.stability.study import Spirals
+from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
+from tank2sim.analysis.turning.diagram import TurningDiagram
+from tank2sim.analysis.turning.spirals import SpiralPoints
 from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
 from tank2sim.answer.charts.parts import (
     NUMBER,
@@ -21,18 +27,12 @@ from tank2sim.answer.charts.parts import (
     plain,
     records,
     series_look,
-    vector,
 )
 from tank2sim.answer.charts.parts import stacked as stacked_panels
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
-from tank2sim.report.json_values import Json
 
 STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
-BECH = ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")
-NORRBIN = ("n0_radps", "n1", "n2_s_per_rad", "n3_s2_per_rad2")
-"""Keys of the coefficients of the two cubics, by rising powers of the yaw rate."""
-
 _FEW = 14
 """Coefficients in the chart of influences; the table has all."""
 
@@ -40,38 +40,35 @@ _WIDTH = 680
 _RUDDER = "rudder angle, starboard positive (deg)"
 
 
-def steering_diagram(turning: Json, spirals: Json, *, title: str = "") -> alt.VConcatChart:
-    """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points;
-    from ``steady_turning`` and ``spirals`` of the JSON."""
-    points = turning["points"]
-    run = {name: spirals[key] for name, key in ((DIRECT, "direct"), (REVERSE, "reverse")) if spirals.get(key)}
-    lines = [STABLE, *([UNSTABLE] if not all(points["stable"]) else [])]
+def steering_diagram(turning: TurningDiagram, spirals: Spirals, *, title: str = "") -> alt.VConcatChart:
+    """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points."""
+    points = turning.points
+    run = {name: spiral for name, spiral in ((DIRECT, spirals.direct), (REVERSE, spirals.reverse)) if spiral}
+    lines = [STABLE, *([UNSTABLE] if not all(points.stable) else [])]
     look = series_look([*lines, *run], as_points=list(run))
     shown = {
-        "yaw rate (deg/s)": ("yaw_rate_degps", 300),
-        "speed (m/s)": ("speed_mps", 110),
-        "drift angle (deg)": ("drift_deg", 110),
-        "heel (deg)": ("heel_deg", 110),
+        "yaw rate (deg/s)": (points.yaw_rate_degps, 300),
+        "speed (m/s)": (points.speed_mps, 110),
+        "drift angle (deg)": (points.drift_deg, 110),
     }
-    shown = {name: panel_key for name, panel_key in shown.items() if panel_key[0] in points}
+    if points.heel_deg is not None:
+        shown["heel (deg)"] = (points.heel_deg, 110)
     panels = []
-    for name, (key, height) in shown.items():
+    for name, (values, height) in shown.items():
         last = name == list(shown)[-1]
         run_shown = run if name.startswith("yaw") else {}
-        panel = _turning_panel(_branches(turning, points[key]), run_shown, look, (name, _RUDDER if last else None))
+        panel = _turning_panel(_branches(turning, values), run_shown, look, (name, _RUDDER if last else None))
         panels.append(panel.properties(width=_WIDTH, height=height))
     return stacked_panels(panels, title=title, description="Steady yaw rate, speed and drift against the rudder angle.")
 
 
-def _branches(turning: Json, values: Sequence[float]) -> list[ChartRecord]:
+def _branches(turning: TurningDiagram, values: Array) -> list[ChartRecord]:
     """Rows of the branches: between two folds (or changes of stability) one line."""
-    points = turning["points"]
-    rudder, rate, column = (vector(fold) for fold in (points["rudder_deg"], points["yaw_rate_degps"], values))
-    stable = points["stable"]
-    # A fold is one of the turns.
+    points, stable = turning.points, turning.points.stable
+    rudder, rate = points.rudder_deg, points.yaw_rate_degps
+    # Folds are listed among the turns.
     folds = {
-        int(np.argmin(np.abs(rudder - fold["rudder_deg"]) + np.abs(rate - fold["yaw_rate_degps"])))
-        for fold in turning["folds"]
+        int(np.argmin(np.abs(rudder - fold.rudder_deg) + np.abs(rate - fold.yaw_rate_degps))) for fold in turning.folds
     }
     ends, rows = [0], []
     for place in range(1, len(rudder) - 1):
@@ -82,13 +79,13 @@ def _branches(turning: Json, values: Sequence[float]) -> list[ChartRecord]:
     for part, (first, last) in enumerate(itertools.pairwise(ends)):
         kept = slice(first, last + 1)
         label = STABLE if stable[(first + last + 1) // 2] else UNSTABLE
-        found = records(label, {"d": rudder[kept], "v": column[kept]})
+        found = records(label, {"d": rudder[kept], "v": values[kept]})
         rows += [{**row, "part": part} for row in found]
     return rows
 
 
 def _turning_panel(
-    rows: list[ChartRecord], spirals: Mapping[str, Json], look: SeriesLook, titles: tuple[str, str | None]
+    rows: list[ChartRecord], spirals: Mapping[str, SpiralPoints], look: SeriesLook, titles: tuple[str, str | None]
 ) -> alt.LayerChart:
     name, across = titles
     labelled = across is not None
@@ -111,7 +108,7 @@ def _turning_panel(
     points = [
         row
         for label, spiral in spirals.items()
-        for row in records(label, {"d": vector(spiral["rudder_deg"]), "v": vector(spiral["yaw_rate_degps"])})
+        for row in records(label, {"d": spiral.rudder_deg, "v": spiral.yaw_rate_degps})
     ]
     if points:
         layers.append(
@@ -150,55 +147,34 @@ def _level(value: float) -> alt.Chart:
     return Chart(data([{"y": value}])).mark_rule(style="reference", clip=True).encode(y="y:Q")
 
 
-def step_chart(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
-    """Yaw rate after a step of one degree of rudder (or of its order), deg/s; from ``responses`` of the JSON."""
-    rows = [
-        row
-        for response in responses
-        for row in records(
-            response["system"],
-            {"x": vector(response["step"]["time_s"]), "y": vector(response["step"]["yaw_rate_per_rudder_per_s"])},
-        )
-    ]
-    look = series_look([response["system"] for response in responses])
+def step_chart(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.LayerChart:
+    """Yaw rate after a step of one degree of rudder (or of its order), deg/s."""
+    rows = [row for one in responses for row in records(one.label, {"x": one.time_s, "y": one.step_per_s})]
+    look = series_look([response.label for response in responses])
     chart = _curves(rows, look, across="time after the step (s)", up="yaw rate per degree of rudder (deg/s)")
     return chart.properties(title=title, description="Yaw rate over time after a step of the rudder.")
 
 
-def steering_bode(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.VConcatChart:
+def steering_bode(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.VConcatChart:
     """Bode diagram of the yaw rate by the rudder."""
-    drawn = []
-    for system in responses:
-        gain = 10 ** (vector(system["bode"]["magnitude_dB"]) / 20)
-        response = gain * np.exp(1j * np.radians(vector(system["bode"]["phase_deg"])))
-        drawn.append(
-            FrequencyResponse(label=system["system"], omega_radps=system["bode"]["omega_radps"], response=response)
-        )
+    drawn = [
+        FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses
+    ]
     return bode_chart(drawn, title=title)
 
 
-def steering_poles(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+def steering_poles(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.LayerChart:
     """Poles and zeros of the hull, and of Nomoto's first order; those of the gear lie far out and are left out."""
-    shown = [response for response in responses if response["system"] in (responses[0]["system"], FIRST_ORDER)]
-    systems = [
-        PolesZeros(
-            label=system["system"],
-            poles=[complex(*pole) for pole in system["poles"]],
-            zeros=[complex(*zero) for zero in system["zeros"]],
-        )
-        for system in shown
-    ]
+    shown = [response for response in responses if response.label in (responses[0].label, FIRST_ORDER)]
+    systems = [PolesZeros(label=one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist()) for one in shown]
     return pole_zero_chart(systems, title=title)
 
 
-def influence_chart(margins: Json, *, title: str = "") -> alt.LayerChart:
-    """Change of C' by ten per cent more of each coefficient, as bars, the strongest at the top; from ``margins``."""
-    strongest = margins["derivatives"][:_FEW]
-    names = [influence["name"].rpartition(".")[2] for influence in strongest]
-    rows = [
-        {"name": name, "y": float(f"{influence['percent']:.6g}")}
-        for name, influence in zip(names, strongest, strict=True)
-    ]
+def influence_chart(margins: Margin, *, title: str = "") -> alt.LayerChart:
+    """Change of C' by ten per cent more of each coefficient, as bars, the strongest at the top."""
+    strongest = margins.derivatives[:_FEW]
+    names = [influence.short_name for influence in strongest]
+    rows: list[ChartRecord] = [{"name": one.short_name, "y": plain(one.percent)} for one in strongest]
     y = alt.Y("name:N", title=None, sort=names)
     x = alt.X("y:Q", title="change of C′ when the coefficient grows by 10 % (% of |C′|)")
     tooltip = [alt.Tooltip("name:N", title="coefficient"), alt.Tooltip("y:Q", title="change of C′ (%)", format=NUMBER)]
@@ -212,9 +188,9 @@ def influence_chart(margins: Json, *, title: str = "") -> alt.LayerChart:
     )
 
 
-def criterion_by_speed_chart(speed: Json, *, title: str = "") -> alt.LayerChart:
-    """C' over speed, from ``margins.speed`` of the JSON."""
-    rows = records("C′", {"x": vector(speed["speed_mps"]), "y": 1e5 * vector(speed["C_prime"])})
+def criterion_by_speed_chart(speed: CriterionBySpeed, *, title: str = "") -> alt.LayerChart:
+    """C' over speed."""
+    rows = records("C′", {"x": speed.speed_mps, "y": 1e5 * speed.C_prime})
     look = series_look(["C′"])
     chart = _curves(rows, look, across="speed (m/s)", up="C′ · 10⁵", marks=[_level(0.0)], height=200)
     return chart.properties(title=title, description="Stability criterion over speed.")
@@ -229,17 +205,16 @@ _TWO_LINES = "split(datum.label, '|')"
 """Labels of an axis in two lines, divided at a bar."""
 
 
-def criteria_chart(criteria: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
-    """Figures of ``imo`` of the JSON as bars, in per cent of what is allowed; pale beyond the range of the card."""
+def criteria_chart(criteria: Sequence[ImoCriterion], *, title: str = "") -> alt.LayerChart:
+    """Figures of the criteria as bars, in per cent of their limits; pale beyond the range of the card."""
     rows: list[ChartRecord] = [
         {
-            "name": f"{_short(criterion['name'])}|{format_number(criterion['found'], 3)} of "
-            f"{format_number(criterion['allowed'], 3)} {criterion['unit']}",
-            "percent": plain(100 * criterion["found"] / criterion["allowed"]),
-            "beyond": bool(criterion["beyond_card"]),
+            "name": f"{_short(one.name)}|{format_number(one.found, 3)} of {format_number(one.allowed, 3)} {one.unit}",
+            "percent": plain(100 * one.found / one.allowed),
+            "beyond": one.beyond_card,
         }
-        for criterion in criteria
-        if criterion["found"] is not None
+        for one in criteria
+        if one.found is not None
     ]
     longest = max([*(row["percent"] for row in rows), 100.0])
     x = alt.X("percent:Q", title="per cent of the limit", scale=alt.Scale(domain=[0, 1.05 * longest], nice=False))
@@ -261,35 +236,33 @@ def criteria_chart(criteria: Sequence[Mapping[str, Json]], *, title: str = "") -
     )
 
 
-def trim_chart(trim: Json, *, title: str = "") -> alt.LayerChart:
-    """C' over trim after Inoue et al., with the two readings of Krezelewski and Misiag; from ``trim``."""
-    inoue = trim["inoue_1981"]
-    per_cent, criteria = 100 * vector(inoue["trim_by_stern_over_length"]), vector(inoue["C_prime"])
+def trim_chart(trim: TrimEffect, *, title: str = "") -> alt.LayerChart:
+    """C' over trim after Inoue et al., with the two readings of Krezelewski and Misiag."""
+    inoue = trim.inoue_1981
+    per_cent, criteria = 100 * inoue.trim_by_stern_over_length, inoue.C_prime
     base = float(criteria[len(criteria) // 2])
     series = {"Inoue et al.": criteria}
-    for name, reading in trim["paper_7_5_percent"].items():
-        series[f"7.5 % of {name}"] = base + per_cent * (reading["more"] - reading["less"]) / 2
+    for name, reading in trim.paper_7_5_percent.items():
+        series[f"7.5 % of {name}"] = base + per_cent * (reading.more - reading.less) / 2
     rows = [row for label, values in series.items() for row in records(label, {"x": per_cent, "y": 1e5 * values})]
     across = "trim by the stern (% of length)"
     chart = _curves(rows, series_look(list(series)), across=across, up="C′ · 10⁵", marks=[_level(0.0)], height=220)
     return chart.properties(title=title, description="Stability criterion over trim, estimated.")
 
 
-def characteristic_chart(found: Json, *, title: str = "") -> alt.LayerChart:
-    """Rudder angle against steady yaw rate: the diagram, Bech's cubic and Norrbin's, where they were fitted; from
-    ``characteristic`` of the JSON."""
-    rate = vector(found["curve"]["yaw_rate_degps"])
-    kept = np.abs(rate) <= found["fitted_up_to_degps"] * (1 + 1e-9)
-    rate, rudder = rate[kept], vector(found["curve"]["rudder_deg"])[kept]
-    bech, norrbin = [found["bech"][name] for name in BECH], [found["norrbin"][name] for name in NORRBIN]
+def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> alt.LayerChart:
+    """Rudder angle against steady yaw rate: the diagram, Bech's cubic and Norrbin's, where they were fitted."""
+    rate = found.curve.yaw_rate_degps
+    kept = np.abs(rate) <= found.fitted_up_to_degps * (1 + 1e-9)
+    rate, rudder = rate[kept], found.curve.rudder_deg[kept]
 
     def cubic(coefficients: Sequence[float]) -> Array:
         return np.asarray(np.degrees(np.polynomial.polynomial.polyval(np.radians(rate), coefficients)))
 
     series = {
         "steady turns": rudder,
-        "Bech, nearest cubic": cubic(bech),
-        "Norrbin, slope kept": cubic(norrbin) / found["norrbin"]["K_per_s"],
+        "Bech, nearest cubic": cubic(found.bech.coefficients),
+        "Norrbin, slope kept": cubic(found.norrbin.coefficients) / found.norrbin.K_per_s,
     }
     rows = [row for label, values in series.items() for row in records(label, {"x": rate, "y": values})]
     across = "yaw rate, starboard positive (deg/s)"

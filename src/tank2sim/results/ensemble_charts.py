@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import altair as alt
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.analysis.ensemble.steering import BodeBands, CurveBand, SteeringBands, StepBands, TurningBands
 from tank2sim.answer.charts.parts import (
     NUMBER,
     Chart,
@@ -19,28 +18,26 @@ from tank2sim.answer.charts.parts import (
     records,
     series_look,
     stacked,
-    vector,
 )
 from tank2sim.answer.charts.theme import BAND_OPACITY
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
-from tank2sim.report.json_values import Json
 
 _WIDTH = 680
 _APART = 1e-6
 """Share of the largest yaw rate by which the two branches of a steering diagram are apart at least."""
 
 
-def curve_charts(curves: Json) -> list[Illustration]:
-    """The charts, from what JSON has of a :class:`tank2sim.analysis.ensemble.steering.SteeringBands`."""
-    turning, bode, step = curves["steady_turning"], curves["bode"], curves["step"]
-    shaded = f"Line: this ship. Shaded: nine of ten of {curves['members']} members."
-    loop, with_loop, turns = turning["loop_width_deg"], turning["with_loop"], shaded
+def curve_charts(curves: SteeringBands) -> list[Illustration]:
+    """Stable turns, Bode diagram and step of the rudder, each with its band."""
+    turning, bode, step = curves.steady_turning, curves.bode, curves.step
+    shaded = f"Line: this ship. Shaded: nine of ten of {curves.members} members."
+    loop, with_loop, turns = turning.loop_width_deg, turning.with_loop, shaded
     if with_loop and loop:
-        none = "" if with_loop == curves["members"] else " (none counted as 0)"
+        none = "" if with_loop == curves.members else " (none counted as 0)"
         turns += (
-            f" {with_loop} of them have a hysteresis loop, {loop['p5']:.3g} to {loop['p95']:.3g} deg of rudder wide"
-            f"{none}; in it the turn is the one it comes from."
+            f" {with_loop} of them have a hysteresis loop, {loop.p5:.3g} to {loop.p95:.3g} deg of rudder wide{none}; "
+            "in the loop a ship keeps turning to the side that it comes from."
         )
     return [
         Illustration(chart=turns_chart(turning, title="Stable turns over the ensemble"), caption=turns),
@@ -49,13 +46,13 @@ def curve_charts(curves: Json) -> list[Illustration]:
     ]
 
 
-def turns_chart(turning: Json, *, title: str = "") -> alt.LayerChart:
+def turns_chart(turning: TurningBands, *, title: str = "") -> alt.LayerChart:
     """Yaw rate of stable turns against the rudder, coming from starboard turn and, where it differs, from port."""
-    rudder = vector(turning["rudder_deg"])
-    starboard, port = turning["yaw_rate_from_starboard_degps"], turning["yaw_rate_from_port_degps"]
+    rudder = turning.rudder_deg
+    starboard, port = turning.yaw_rate_from_starboard_degps, turning.yaw_rate_from_port_degps
     apart = np.zeros(len(rudder), dtype=bool)
     for key in ("p5", "p50", "p95", "own"):
-        from_starboard, from_port = vector(starboard[key]), vector(port[key])
+        from_starboard, from_port = getattr(starboard, key), getattr(port, key)
         apart |= np.abs(from_starboard - from_port) > _APART * np.nanmax(np.abs(from_starboard), initial=0.0)
     # With their neighbours, so that the branches meet.
     apart = apart | np.roll(apart, 1) | np.roll(apart, -1)
@@ -73,13 +70,13 @@ def turns_chart(turning: Json, *, title: str = "") -> alt.LayerChart:
     return _by_itself(chart, title, "Yaw rate of stable turns against the rudder, with its band over an ensemble.")
 
 
-def bode_band_chart(bode: Json, *, title: str = "") -> alt.VConcatChart:
+def bode_band_chart(bode: BodeBands, *, title: str = "") -> alt.VConcatChart:
     """Magnitude and phase of the yaw rate by the rudder angle."""
-    omega, panels = vector(bode["omega_radps"]), []
+    panels = []
     look = series_look(["yaw rate by rudder angle"])
-    for key, name in (("magnitude_dB", "magnitude (dB)"), ("phase_deg", "phase (deg)")):
-        rows = _band_rows("yaw rate by rudder angle", omega, bode[key])
-        last = key == "phase_deg"
+    for name, band in (("magnitude (dB)", bode.magnitude_dB), ("phase (deg)", bode.phase_deg)):
+        rows = _band_rows("yaw rate by rudder angle", bode.omega_radps, band)
+        last = name.startswith("phase")
         axis = alt.Axis(title="angular frequency (rad/s)" if last else None, labels=last, ticks=last, format="~g")
         x = alt.X("x:Q", scale=alt.Scale(type="log", nice=False), axis=axis)
         panels.append(_panel(rows, look, x, axis_above(name), height=180))
@@ -87,20 +84,18 @@ def bode_band_chart(bode: Json, *, title: str = "") -> alt.VConcatChart:
     return stacked(panels, title=title, description=described)
 
 
-def step_band_chart(step: Json, *, title: str = "") -> alt.LayerChart:
+def step_band_chart(step: StepBands, *, title: str = "") -> alt.LayerChart:
     """Yaw rate after a step of one degree of rudder."""
-    rows = _band_rows("yaw rate", vector(step["time_s"]), step["step_per_s"])
+    rows = _band_rows("yaw rate", step.time_s, step.step_per_s)
     x = alt.X("x:Q", title="time after the step (s)", scale=alt.Scale(nice=False))
     chart = _panel(rows, series_look(["yaw rate"]), x, alt.Axis(title="yaw rate per degree of rudder (deg/s)"))
     return _by_itself(chart, title, "Yaw rate after a step of the rudder, with its band over an ensemble.")
 
 
-def _band_rows(
-    label: str, x: Array, band: Mapping[str, Json], shown: NDArray[np.bool_] | None = None
-) -> list[ChartRecord]:
+def _band_rows(label: str, x: Array, band: CurveBand, shown: NDArray[np.bool_] | None = None) -> list[ChartRecord]:
     """Rows of the ship itself and of the 5 and 95 % quantiles; `part` numbers stretches without a gap, `band` those of
     the band."""
-    columns = {"x": x, "v": vector(band["own"]), "low": vector(band["p5"]), "high": vector(band["p95"])}
+    columns = {"x": x, "v": band.own, "low": band.p5, "high": band.p95}
     rows = records(label, columns)
     kept = np.ones(len(rows), dtype=bool) if shown is None else shown
     parts, bands = (

@@ -1,0 +1,185 @@
+"""Parts of results that show an ensemble: bands of figures, and the probabilities of the IMO criteria."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from tank2sim.analysis.ensemble.results import ChanceOfAll, FigureBands, Members, StabilityBands
+from tank2sim.analysis.ensemble.tails import Tail
+from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.answer.parts import Cell, Section, Table, table
+from tank2sim.marks import assumed_words
+from tank2sim.results.ensemble_charts import curve_charts
+from tank2sim.results.imo import BEYOND_THE_CARD
+from tank2sim.simulation.bands import Band
+from tank2sim.units import in_words
+
+MEMBERS_TEXT = (
+    "Members of the ensemble are this ship with numbers drawn from the standard errors of its card, and from their "
+    "covariance where the card has one. Nine of ten lie between the 5 and the 95 % quantile. Each member has a random "
+    "stream of its own, so that the same seed gives the same members everywhere."
+)
+_CHANCES = (
+    "The probability that a criterion is met is the share of all usable members that meet it, with the 95 % "
+    "interval that their number leaves (Wilson). A member whose trial does not show the figure counts as one that "
+    "does not meet it. Where the trial of the card itself leaves the card's range no probability is reported."
+)
+
+_RARE = (
+    "Where few members fail, another table has the probability of not meeting the criterion from members drawn "
+    "about the ships that fail, each with its weight (importance sampling). Its effective size is the number of "
+    "failing members of the card's own errors that would be as accurate; without enough there is no probability. "
+    "Distance and linear probability hold for a figure that changes in proportion to the card's numbers; compare the "
+    "linear figure with the figure there."
+)
+
+
+def ensemble_heading(found: Members) -> str:
+    """Return the heading of the section of an ensemble.
+
+    Parameters
+    ----------
+    found : Members
+    """
+    return f"Ensemble of {found.members}{assumed_words(found.notices)}"
+
+
+def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
+    """Quantiles (5, 50, 95 %) of figures over the members of an ensemble.
+
+    Parameters
+    ----------
+    found : Members
+    figures : mapping
+        Name of each figure to its band.
+    """
+    rows: list[list[Cell]] = []
+    for name, band in figures.items():
+        kind, at, argument = name.partition("@")
+        words, unit = in_words(kind)
+        rows.append([words + at + argument, unit, band.p5, band.p50, band.p95, band.shown_by])
+    caption = f"Ensemble of {found.members}, seed {found.seed}: 90 % of the members lie between 5 and 95 %"
+    return table(caption, ("figure", "unit", "5 %", "50 %", "95 %", "shown by"), rows)
+
+
+def figures_section(found: FigureBands) -> Section:
+    """Return the section with bands of figures by name.
+
+    Parameters
+    ----------
+    found : FigureBands
+    """
+    return Section(heading=ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
+
+
+def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -> Section:
+    """Return the section of an ensemble judged by IMO criteria.
+
+    Parameters
+    ----------
+    found : StabilityBands
+    criteria : sequence of ImoCriterion
+        Of the card's own ship.
+    """
+    rare = {chance.name: chance.tail for chance in found.imo if chance.tail}
+    if found.imo_all and found.imo_all.tail:
+        rare["any of these"] = found.imo_all.tail
+    text = [MEMBERS_TEXT, _CHANCES, *([_RARE] if rare else [])]
+    return Section(
+        heading=ensemble_heading(found),
+        text="\n\n".join(text),
+        tables=[
+            _chances(found, {criterion.name for criterion in criteria if criterion.beyond_card}),
+            _criteria(found),
+            *(_tails(rare) if rare else []),
+            band_table(found, found.figures),
+        ],
+        charts=curve_charts(found.curves) if found.curves else (),
+    )
+
+
+def chance_sentences(found: StabilityBands) -> list[str]:
+    """Return sentences on the probability of stability, and on that of meeting all criteria together.
+
+    Parameters
+    ----------
+    found : StabilityBands
+    """
+    sentences = []
+    if found.probability_stable is not None and found.probability_stable_interval_95:
+        interval = _interval(found.probability_stable_interval_95)
+        probability = f"probability {found.probability_stable:.3g} (95 % interval {interval})"
+        sentences.append(f"The ship is stable on a straight course with {probability}.")
+    if found.imo_all:
+        sentences.append(_together(found.imo_all))
+    return sentences
+
+
+def _together(found: ChanceOfAll) -> str:
+    probability = f"probability {found.probability_met:.3g} (95 % interval {_interval(found.interval_95)})"
+    text = f"{len(found.criteria)} IMO criteria together are met with {probability}"
+    tail = found.tail
+    if tail and tail.probability is not None:
+        text += f", not met with probability {tail.probability:.2e} (standard error {tail.standard_error:.1e})"
+    return f"{text}."
+
+
+def _interval(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.3f} to {ends[1]:.3f}"
+
+
+def _chances(found: StabilityBands, beyond: set[str]) -> Table:
+    """Probability of each IMO criterion; `beyond` names those whose trial leaves the card's range."""
+    rows: list[list[Cell]] = []
+    for chance in found.imo:
+        known = chance.name not in beyond
+        met: Cell = chance.probability_met
+        if met is not None and not known:
+            met = BEYOND_THE_CARD
+        low, high = chance.interval_95 if chance.interval_95 and known else (None, None)
+        rows.append([chance.name, met, low, high, chance.not_shown, chance.beyond_card])
+    heads = ("criterion", "P(met)", "at least", "at most", "not shown by", "beyond the card")
+    return table("Probability of each IMO criterion, with its 95 % interval", heads, rows)
+
+
+def _criteria(found: StabilityBands) -> Table:
+    rows: list[list[Cell]] = [
+        [
+            one.name,
+            *((one.band.p5, one.band.p50, one.band.p95) if one.band else (None, None, None)),
+            one.allowed,
+            one.unit,
+        ]
+        for one in found.imo
+    ]
+    heads = ("criterion", "5 %", "50 %", "95 %", "allowed", "unit")
+    return table("IMO MSC.137(76), worse side, over the ensemble", heads, rows, on_screen=False)
+
+
+def _tails(rare: Mapping[str, Tail]) -> list[Table]:
+    """Small probabilities of not meeting a criterion, and linear figures to compare them with."""
+    remarks: dict[str, list[str]] = {}
+    notes = []
+    for name, tail in rare.items():
+        if tail.remark:
+            remarks.setdefault(tail.remark, []).append(name)
+            continue
+        moved = ", ".join(f"{number} {errors:+.1f}" for number, errors in tail.failing_ships.items())
+        notes.append(
+            f"{name}: {tail.failing} of {tail.members} members drawn about the failing ships fail; {tail.not_shown} of "
+            f"them do not show the figure and {tail.beyond_card} left the card's range before; {tail.unusable} members "
+            f"cannot be used; the mean of failing ships, in standard errors: {moved}"
+        )
+    notes += [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
+    rows: list[list[Cell]] = [
+        [name, tail.probability, tail.standard_error, round(tail.effective_size)] for name, tail in rare.items()
+    ]
+    linear: list[list[Cell]] = [
+        [name, tail.distance, tail.linear_probability, tail.linear_figure, tail.figure] for name, tail in rare.items()
+    ]
+    heads = ("criterion", "P(not met)", "standard error", "effective size")
+    linear_heads = ("criterion", "distance (sd)", "P if linear", "linear figure there", "figure there")
+    return [
+        table("Criteria that few members fail: by importance sampling", heads, rows, *notes),
+        table("The same for a figure linear in the card's numbers", linear_heads, linear, on_screen=False),
+    ]

@@ -1,0 +1,287 @@
+"""Result of ``simulate``: a simulated manoeuvre with its figures, its motion, and the bands of an ensemble."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tank2sim.analysis.manoeuvre import ManoeuvreStudy, OtherSide
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.results.ensembles import band_table
+from tank2sim.results.manoeuvre_charts import (
+    SIDE_NAMES,
+    history_charts,
+    manoeuvre_charts,
+    manoeuvre_title,
+    members_text,
+)
+from tank2sim.simulation.card_range import entry_name, single_figures
+from tank2sim.simulation.run import Run
+from tank2sim.simulation.trial_file import trial_columns, trial_csv
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FIRST: Mapping[str, tuple[str, ...]] = {
+    "turn": ("advance_m", "transfer_m", "tactical_diameter_m"),
+    "difference": ("advance_m", "transfer_m", "tactical_diameter_m"),
+    "zigzag": ("overshoot_1_deg", "overshoot_2_deg", "initial_turning_distance_m"),
+    "pullout": ("steady_rate_degps", "residual_rate_degps", "time_to_half_rate_s"),
+    "spiral": ("loop_width_deg", "loop_height_degps"),
+    "stop": ("track_reach_m", "side_reach_m", "time_to_stop_s"),
+}
+"""Figures at the top of the page of each manoeuvre."""
+
+_IN_LENGTHS = {"initial_turning_distance_m": "initial_turning_lengths"}
+"""Figures in ship lengths whose name does not follow from the figure in m."""
+
+_OTHERS = 4
+"""Figures at the top of the page of any other manoeuvre. Project choice."""
+
+_MEET = 0.05
+"""Yaw rates at the end of the pull-outs from both sides that differ by less than this share of those at their begin
+have met. Project choice: what is left of a stable ship's after three of its time constants."""
+
+_OUTSIDE = "outside"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ManoeuvreResult(Result[ManoeuvreStudy]):
+    """A simulated manoeuvre.
+
+    Parameters
+    ----------
+    study : ManoeuvreStudy
+    run : Run, optional
+        Motion and figures, SI and radians; None if the result was read from its JSON.
+    ship : Ship, optional
+        The ship (:class:`tank2sim.Ship`).
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> run = t2s.load("mariner").zigzag(20, 20)
+    >>> round(run.figures["overshoot_1_deg"])
+    8
+    >>> list(run.df.columns)[:3]
+    ['t_s', 'delta_order_deg', 'delta_deg']
+    """
+
+    study: ManoeuvreStudy
+    run: Run | None = None
+    ship: Any = None
+    command: ClassVar[str] = "simulate"
+
+    @property
+    def title(self) -> str:
+        """The ship, and the manoeuvre in words."""
+        return f"{self.study.ship}: {manoeuvre_title(self.study)}"
+
+    @property
+    def subtitle(self) -> str:
+        """The manoeuvre as it was ordered, and the ensemble."""
+        members = f", {members_text(self.study.ensemble)}" if self.study.ensemble else ""
+        return f"Simulated manoeuvre {self.study.manoeuvre}{members}"
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Those of the run, and of its ensemble."""
+        members = self.study.ensemble.notices if self.study.ensemble else ()
+        return tuple(dict.fromkeys([*self.study.notices, *members]))
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """Manoeuvring figures (ITTC 7.5-04-02-01) by name with unit; entries of lists as ``overshoot_1_deg``."""
+        return single_figures(dict(self.study.figures))
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Largest figures that IMO MSC.137(76) allows, by name with unit; empty for manoeuvres without any."""
+        return self.study.limits
+
+    @property
+    def other_side(self) -> OtherSide | None:
+        """Figures and motion of a pull-out from the other side."""
+        return self.study.other_side
+
+    @cached_property
+    def df(self) -> pd.DataFrame:
+        """The motion, one row a step: ``t_s``, ``u_mps``, ``r_degps``, ``psi_deg``, ``x_m`` (north), ``y_m`` (east).
+
+        Of a result that was read from its JSON only some steps are known.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
+
+    def to_csv(self, path: str | Path | None = None) -> str:
+        """The motion as text of a trial CSV, also written to `path`: readable wherever a measured trial is.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written, or the result was read from its JSON, which has not the whole motion.
+        """
+        if self.run is None:
+            problem = "the JSON of a result has not the whole motion"
+            raise InputError(path or "the result", "", problem, "simulate the manoeuvre again")
+        source = f"tank2sim simulation of {self.study.ship}: {self.study.manoeuvre}"
+        text = trial_csv(self.run.trajectory, source)
+        if path is not None:
+            write_together({Path(path): text})
+        return text
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The limits of IMO, or the behaviour that a pull-out or a spiral shows, or the first figures."""
+        study, figures = self.study, self.key_figures
+        if study.kind == "pullout" and study.other_side:
+            return (_pull_outs(study.figures, study.other_side.figures),)
+        judged = [figure for figure in figures if figure.limit is not None]
+        if failed := [figure.label.lower() for figure in judged if figure.verdict is Verdict.FAILED]:
+            return (f"Beyond the limit of IMO MSC.137(76): {' and '.join(failed)}.",)
+        if any(figure.verdict is Verdict.CAUTION for figure in judged):
+            return (
+                "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76).",
+            )
+        if judged:
+            names = " and ".join(figure.label.lower() for figure in judged)
+            return (f"Within the limits of IMO MSC.137(76): {names}.",)
+        width = study.figures.get("loop_width_deg")
+        if study.kind == "spiral" and isinstance(width, float):
+            if width > 0:
+                return ("Within the loop the ship keeps turning to its side: it is unstable on a straight course.",)
+            return ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
+        shown = [
+            f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip() for each in figures[:3]
+        ]
+        return (f"{self.title}: {', '.join(shown)}.",) if shown else ()
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The main figures of the manoeuvre, with limits and intervals over the ensemble."""
+        names = _FIRST.get(self.study.kind, tuple(self.figures)[:_OTHERS])
+        return [self._key_figure(name, self.figures[name]) for name in names if name in self.figures]
+
+    def _key_figure(self, name: str, value: float) -> KeyFigure:
+        study, (label, unit) = self.study, in_words(name)
+        limit, notes = self._limit(name), []
+        if study.length_m and _in_lengths(name) in self.figures:
+            notes.append(f"{format_number(value / study.length_m, 3)} L")
+        if limit is not None:
+            notes.append(f"IMO: at most {format_number(limit, 4)} {unit}")
+        if study.ensemble and (band := study.ensemble.figures.get(name)):
+            notes.append(f"{format_number(band.p5, 3)} to {format_number(band.p95, 3)} {unit} (90 %)")
+        verdict = Verdict.NONE
+        if name in study.outside_card_range:
+            verdict = Verdict.CAUTION
+            notes.append("outside the range of the card")
+        elif limit is not None:
+            verdict = Verdict.PASSED if value <= limit else Verdict.FAILED
+        if name == "side_reach_m":
+            notes.append(f"to {SIDE_NAMES[-1 if value < 0 else 1]}")
+            value = abs(value)
+        label = label[:1].upper() + label[1:]
+        return KeyFigure(label=label, value=value, unit=unit, verdict=verdict, note="; ".join(notes), limit=limit)
+
+    def _limit(self, name: str) -> float | None:
+        """The largest value that IMO MSC.137(76) allows, in the unit of the figure."""
+        limits, length = self.study.limits, self.study.length_m
+        if name in limits:
+            return limits[name]
+        in_lengths = limits.get(_in_lengths(name)) if name.endswith("_m") else None
+        return in_lengths * length if in_lengths is not None and length else None
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """The manoeuvre, its time histories and its figures."""
+        text = ""
+        if self.study.kind == "pullout" and self.study.other_side:
+            text = (
+                "On a ship that is stable on a straight course the yaw rates from both sides decay to one value, which "
+                "is zero at the neutral rudder; on an unstable ship they remain apart."
+            )
+        sections = [
+            Section(heading="The manoeuvre", text=text, charts=manoeuvre_charts(self.study)),
+            Section(heading="Time histories", charts=history_charts(self.study)),
+            Section(heading="Figures", tables=self._tables()),
+        ]
+        return [section for section in sections if section.charts or section.tables]
+
+    def _tables(self) -> list[Table]:
+        figures = self.study.figures
+        numbers = {
+            name: value
+            for name, value in figures.items()
+            if isinstance(value, float | int) and not name.endswith("_lengths")
+        }
+        lists = {name: value for name, value in figures.items() if isinstance(value, list) and value}
+        missing = [in_words(name)[0] for name, value in figures.items() if value is None]
+        tables = [self._figure_table(numbers, missing)] if numbers or missing else []
+        if lists:
+            tables.append(self._list_table(lists))
+        if self.study.ensemble:
+            bands = {name: band for name, band in self.study.ensemble.figures.items() if not name.endswith("_lengths")}
+            tables.append(band_table(self.study.ensemble, bands))
+        return tables
+
+    def _figure_table(self, figures: Mapping[str, float], missing: Sequence[str]) -> Table:
+        """One row a figure, its size in ship lengths and its limit next to it; empty columns are left out."""
+        rows: list[list[Cell]] = [
+            [
+                *in_words(name),
+                value,
+                self.figures.get(_in_lengths(name)),
+                self._limit(name),
+                _OUTSIDE if name in self.study.outside_card_range else None,
+            ]
+            for name, value in figures.items()
+        ]
+        heads = ["figure", "unit", "value", "ship lengths", "IMO: at most", "range of the card"]
+        shown = [place for place in range(len(heads)) if place < 3 or any(row[place] is not None for row in rows)]
+        notes = [f"The run is too short to show: {', '.join(missing)}."] if missing else []
+        return table(
+            f"Figures of {self.study.ship}, {self.study.manoeuvre}",
+            [heads[place] for place in shown],
+            [[row[place] for place in shown] for row in rows],
+            *notes,
+        )
+
+    def _list_table(self, lists: Mapping[str, Sequence[float]]) -> Table:
+        """Figures that a manoeuvre has several of, such as overshoots, by number."""
+        longest, outside = max(map(len, lists.values())), self.study.outside_card_range
+        rows: list[list[Cell]] = [
+            [place + 1, *(values[place] if place < len(values) else None for values in lists.values())]
+            for place in range(longest)
+        ]
+        heads = [Column(title="no.")]
+        for name in lists:
+            title, unit = in_words(name)
+            heads.append(Column(title=title, unit=unit))
+        beyond = [any(entry_name(name, place) in outside for name in lists) for place in range(longest)]
+        if any(beyond):
+            heads.append(Column(title="range of the card"))
+            rows = [[*row, _OUTSIDE if each else None] for row, each in zip(rows, beyond, strict=True)]
+        return table("Figures by number", heads, rows)
+
+
+def _in_lengths(name: str) -> str:
+    return _IN_LENGTHS.get(name, f"{name.removesuffix('_m')}_lengths")
+
+
+def _pull_outs(*sides: Mapping[str, Any]) -> str:
+    """What the yaw rates of pull-outs from both sides say of the ship."""
+    (first, first_left), (second, second_left) = (
+        (side["steady_rate_degps"], side["residual_rate_degps"]) for side in sides
+    )
+    if abs(first_left - second_left) <= _MEET * abs(first - second):
+        return "The ship is stable on a straight course: the yaw rates from both sides meet."
+    return "The yaw rates from both sides stay apart: the ship is unstable on a straight course, or very slow."

@@ -1,0 +1,320 @@
+"""Result of ``stability`` of a ship: straight course, steady turning and the IMO criteria."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tank2sim.analysis.stability.study import StabilityStudy
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
+from tank2sim.answer.result import Result
+from tank2sim.results.ensembles import chance_sentences, stability_section
+from tank2sim.results.imo import imo_section
+from tank2sim.results.stability_charts import (
+    characteristic_chart,
+    criterion_by_speed_chart,
+    influence_chart,
+    steering_bode,
+    steering_diagram,
+    steering_poles,
+    step_chart,
+    trim_chart,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CRITERION = (
+    "C′ = Y′v (N′r − m′x′G) − N′v (Y′r − m′), from the slopes of the full forces on the straight course. Its sign is "
+    "that of the margin between two levers: the yaw damping lever (N′r − m′x′G)/(Y′r − m′) lies ahead of the sway "
+    "lever N′v/Y′v on a ship that is stable. The margin in per cent is C′ over |Y′v (N′r − m′x′G)|, its stabilising "
+    "part."
+)
+_TRIM = (
+    "A card holds for one trim; this is an estimate. Krezelewski and Misiag say that 1 % of trim changes one of Y_r "
+    "and N_r by 7.5 %; the print does not show which, nor which way and 1 % of what: both readings are drawn, as "
+    "growing with trim by the stern over length. The chart also shows the corrections of Inoue, Hirano and "
+    "Kijima (1981) to Y_v, Y_r, N_v and N_r. All act on the hydrodynamic part, without the inertia."
+)
+_RESPONSE = (
+    "Response of the yaw rate to the rudder, by the linear equations about the straight course. The gear acts with "
+    "its lag; its rate limit is not linear and left out. The poles of an unstable ship lie in the tinted half; its "
+    "Bode diagram is that of the plant for a controller, not of a ship with a fixed rudder."
+)
+_TURNING = (
+    "All steady turns that are joined to the straight course, at constant revolutions in calm water, followed by "
+    "continuation through the folds. Solid: stable with the rudder held (all eigenvalues decay). Dashed: the ship "
+    "leaves the turn by itself, and only a rudder at work holds it there."
+)
+_SPIRALS = (
+    "The spiral holds each rudder until the turn is steady, so its points lie on the stable branches and jump at the "
+    "folds. The reverse spiral holds each yaw rate by the rudder and also reaches the unstable branch. Both are "
+    "simulated on the nonlinear model with its gear."
+)
+_CHARACTERISTIC = (
+    "Bech: H(r) = δ is the diagram itself, here with the nearest cubic. Norrbin: n3 r³ + n2 r² + n1 r + n0 = K δ "
+    "keeps place and slope of the straight course, so that n1 is 1 or −1. Both are fitted in rudder angle up to 20 "
+    "deg; the error beyond is reported."
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityResult(Result[StabilityStudy]):
+    """Stability, steady turning and IMO criteria of a ship.
+
+    Parameters
+    ----------
+    study : StabilityStudy
+    ship : Ship, optional
+        The ship (:class:`tank2sim.Ship`); None if the result was read from its JSON.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> found = t2s.load("mariner").stability(spirals=False)
+    >>> found.stable
+    True
+    """
+
+    study: StabilityStudy
+    ship: Any = None
+    command: ClassVar[str] = "stability"
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return self.study.ship
+
+    @property
+    def subtitle(self) -> str:
+        """Speed of the straight course."""
+        return f"Stability and manoeuvrability, {self.study.operating_point.speed_mps:.4g} m/s"
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Those of the study, and of its ensemble."""
+        members = self.study.ensemble.notices if self.study.ensemble else ()
+        return tuple(dict.fromkeys([*self.study.notices, *members]))
+
+    @property
+    def stable(self) -> bool:
+        """True if the ship holds a straight course with the rudder fixed: no eigenvalue has a positive real part."""
+        return self.study.stability_criterion.stable
+
+    @property
+    def criterion(self) -> float:
+        """C' (prime): the ship is stable on a straight course if it is positive and no effect adds a growing mode."""
+        return self.study.stability_criterion.C_prime
+
+    @property
+    def imo(self) -> pd.DataFrame:
+        """The IMO criteria (MSC.137(76)), worse side: found, allowed, unit, met, margin (%)."""
+        import pandas as pd
+
+        names = {"name": "criterion", "passed": "met"}
+        columns = ["name", "found", "allowed", "unit", "passed", "margin_percent"]
+        return pd.DataFrame(list(self.study.imo))[columns].rename(columns=names).set_index("criterion")
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Stability on a straight course, the range of steady turns, the IMO criteria, probabilities of an ensemble."""
+        point = self.study.operating_point
+        verdict = "stable" if self.stable else "unstable"
+        course = (
+            f"{self.study.ship} at {point.speed_mps:.4g} m/s (drift {point.drift_deg:.3g} deg, rudder "
+            f"{point.rudder_deg:.3g} deg) is {verdict} on a straight course: {self._margin()}."
+        )
+        chances = chance_sentences(self.study.ensemble) if self.study.ensemble else []
+        return (course, *self._turns(), *self._criteria(), *chances)
+
+    def _margin(self) -> str:
+        found, margin = self.study.stability_criterion, self.study.margins
+        if not found.C_prime_decides:
+            return (
+                f"a mode grows at {found.growth_per_s:.3g} 1/s, which C' = {found.C_prime:.4g} does not show, so the "
+                "margin is not defined"
+            )
+        levers = f"levers {margin.lever_margin_lengths:.3g} L apart"
+        return f"C' = {found.C_prime:.4g}, margin {margin.margin_percent:.3g} %, {levers}"
+
+    def _turns(self) -> list[str]:
+        turning = self.study.steady_turning
+        if turning is None:
+            return []
+        rudder, rate = turning.points.rudder_deg, turning.points.yaw_rate_degps
+        text = (
+            f"Steady turns: {rate[0]:.3g} to {rate[-1]:.3g} deg/s at {rudder[0]:.3g} to {rudder[-1]:.3g} deg of rudder"
+        )
+        if turning.loop is None:
+            return [f"{text}; no hysteresis loop."]
+        height = turning.loop.height_degps
+        high = "" if height is None else f", {height:.3g} deg/s high"
+        return [f"{text}; hysteresis loop {turning.loop.width_deg:.3g} deg of rudder wide{high}."]
+
+    def _criteria(self) -> list[str]:
+        met = [criterion.passed for criterion in self.study.imo]
+        if missed := [criterion.name for criterion in self.study.imo if criterion.passed is False]:
+            return [f"Not met of IMO MSC.137(76): {'; '.join(missed)}."]
+        if all(met):
+            return ["All criteria of IMO MSC.137(76) are met."]
+        count = met.count(True)
+        return [f"{count} of {len(met)} criteria of IMO MSC.137(76) are met; the others are open."] if count else []
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The straight course, its margin, Nomoto's K', the loop, and the IMO criteria."""
+        study = self.study
+        straight, prime = study.stability_criterion, study.nomoto.prime
+        figures = [
+            KeyFigure(
+                label="Straight course",
+                value="stable" if straight.stable else "unstable",
+                verdict=Verdict.PASSED if straight.stable else Verdict.CAUTION,
+                note=f"C′ = {format_number(straight.C_prime, 3)}",
+            ),
+            self._margin_figure(),
+            KeyFigure(label="Nomoto K′", value=prime.K_prime, note=f"T′ = {format_number(prime.T_prime, 3)}"),
+        ]
+        if study.steady_turning and (loop := study.steady_turning.loop):
+            note = "of rudder, between the folds"
+            figures.append(KeyFigure(label="Hysteresis loop", value=loop.width_deg, unit="deg", note=note))
+        return [*figures, self._criteria_figure()]
+
+    def _margin_figure(self) -> KeyFigure:
+        straight, margins = self.study.stability_criterion, self.study.margins
+        if not straight.C_prime_decides:
+            note = f"a mode grows at {straight.growth_per_s:.3g} 1/s that C′ does not show"
+            return KeyFigure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
+        note = f"levers {format_number(margins.lever_margin_lengths, 3)} L apart"
+        return KeyFigure(label="Margin", value=margins.margin_percent, unit="%", note=note)
+
+    def _criteria_figure(self) -> KeyFigure:
+        criteria = self.study.imo
+        met = [criterion.passed for criterion in criteria]
+        beyond = sum(criterion.beyond_card and criterion.found is not None for criterion in criteria)
+        failed, unknown = met.count(False), met.count(None) - beyond
+        verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown or beyond else Verdict.PASSED
+        notes = [f"{unknown} open"] if unknown else []
+        notes += [f"{beyond} beyond the card's validity"] if beyond else []
+        value = f"{met.count(True)} of {len(met)}"
+        return KeyFigure(label="IMO criteria met", value=value, verdict=verdict, note=", ".join(notes))
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """IMO criteria, steady turning, the ensemble, the straight course, its margin, response and nonlinearity."""
+        study = self.study
+        return [
+            imo_section(study.imo),
+            *([self._turning()] if study.steady_turning else []),
+            *([stability_section(study.ensemble, study.imo)] if study.ensemble else []),
+            self._straight_line(),
+            self._influences(),
+            self._response(),
+            *([self._characteristic()] if study.characteristic else []),
+        ]
+
+    def _turning(self) -> Section:
+        turning, spirals = self.study.steady_turning, self.study.spirals
+        assert turning is not None
+        tables = [records_table("Steady turns", turning.turns, on_screen=False)]
+        if turning.folds:
+            tables.append(records_table("Folds, where the ship leaves its branch", turning.folds, on_screen=False))
+        chart = steering_diagram(turning, spirals, title="Steady turns against the rudder")
+        return Section(
+            heading="Steady turning",
+            text=f"{_TURNING}\n\n{_SPIRALS}" if spirals.direct or spirals.reverse else _TURNING,
+            tables=tables,
+            charts=[Illustration(chart=chart)],
+        )
+
+    def _straight_line(self) -> Section:
+        straight, margins, nomoto = self.study.stability_criterion, self.study.margins, self.study.nomoto
+        states = straight.settled_states
+        eigenvalues: list[list[Cell]] = [
+            [value.real, value.imag, -1 / value.real if value.real else None] for value in self.study.eigenvalues
+        ]
+        levers: list[list[Cell]] = [
+            ["yaw damping lever", margins.damping_lever_lengths, "L"],
+            ["sway lever", margins.sway_lever_lengths, "L"],
+            ["levers apart", margins.lever_margin_lengths, "L"],
+            ["margin" if straight.C_prime_decides else "margin of C′ alone", margins.margin_percent, "%"],
+        ]
+        slow = f", in slow motions ({', '.join(states)} at rest)" if states else ""
+        models: list[list[Cell]] = [
+            ["1/s and s", *vars(nomoto.dimensional).values()],
+            ["prime", *vars(nomoto.prime).values()],
+        ]
+        return Section(
+            heading="Straight-line stability",
+            text=_CRITERION,
+            tables=[
+                table("Margin of stability", ("quantity", "value", "unit"), levers, on_screen=False),
+                table(
+                    f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in states)}",
+                    ("real part (1/s)", "imaginary part (1/s)", "time constant (s)"),
+                    eigenvalues,
+                ),
+                table(f"Nomoto's coefficients{slow}", ("units", "K", "T", "T1", "T2", "T3"), models),
+            ],
+        )
+
+    def _influences(self) -> Section:
+        margins, trim = self.study.margins, self.study.trim
+        rows: list[list[Cell]] = [
+            [one.short_name, one.value, one.percent, one.neutral_value, one.neutral_percent]
+            for one in margins.derivatives
+        ]
+        heads = ("coefficient", "value", "C' for 10 % more (%)", "neutral at", "change to neutral (%)")
+        changes = trim.inoue_1981.change_percent_by_1_percent.items()
+        changed = ", ".join(f"{name} {change:+.3g} %" for name, change in changes)
+        charts = []
+        if margins.derivatives:
+            charts.append(Illustration(chart=influence_chart(margins, title="Influence on C′")))
+        if margins.speed:
+            chart = criterion_by_speed_chart(margins.speed, title="Speed")
+            charts.append(Illustration(chart=chart, caption="Over the card's range of speeds."))
+        charts.append(
+            Illustration(
+                chart=trim_chart(trim, title="Trim (estimate)"),
+                caption=f"After Inoue, 1 % of length of trim by the stern changes {changed}.",
+            )
+        )
+        return Section(
+            heading="Influences on the margin",
+            text=f"Derivatives are prime, mass in kg and x_G in m. A coefficient is neutral at the value for which "
+            f"C′ = 0, all else unchanged. {_TRIM}",
+            tables=[table("Influences on C', strongest first", heads, rows)],
+            charts=charts,
+            folded=True,
+        )
+
+    def _response(self) -> Section:
+        heading, responses = "Response to the rudder", self.study.responses
+        if not responses:
+            return Section(heading=heading, text="The yaw rate does not answer to the rudder.")
+        charts = [
+            Illustration(chart=steering_poles(responses, title="Poles and zeros")),
+            Illustration(chart=steering_bode(responses, title="Bode diagram")),
+            Illustration(chart=step_chart(responses, title="Step of the rudder")),
+        ]
+        return Section(heading=heading, text=_RESPONSE, charts=charts, folded=True)
+
+    def _characteristic(self) -> Section:
+        found = self.study.characteristic
+        assert found is not None
+        rows: list[list[Cell]] = [
+            [name, *cubic.coefficients, *vars(cubic.error).values()]
+            for name, cubic in (("Bech", found.bech), (f"Norrbin, K = {found.norrbin.K_per_s:.4g} 1/s", found.norrbin))
+        ]
+        errors = ("rms error (deg)", "largest error (deg)", "error beyond the fit (deg)")
+        caption = "Coefficients by powers of the yaw rate, rad and s: Bech's of δ, Norrbin's of K δ"
+        chart = characteristic_chart(found, title="Rudder that holds a yaw rate")
+        return Section(
+            heading="Nonlinear steering characteristic",
+            text=_CHARACTERISTIC,
+            tables=[table(caption, ("cubic", "r⁰", "r¹", "r²", "r³", *errors), rows, on_screen=False)],
+            charts=[Illustration(chart=chart)],
+            folded=True,
+        )
