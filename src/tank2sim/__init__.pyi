@@ -52,7 +52,6 @@ from .api.schemas import json_schema as json_schema
 from .api.ship import Ship as Ship
 from .api.ship import load as load
 from .api.ship import ships as ships
-from .api.signals import SignalsResult as SignalsResult
 from .api.signals import signals as signals
 from .api.stability import StabilityResult as StabilityResult
 from .api.steering_models import (
@@ -82,6 +81,7 @@ from .results.fmu import ExportResult as ExportResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
+from .results.signals import SignalsResult as SignalsResult
 from .results.tow import TowResult as TowResult
 
 __version__: str

@@ -20,6 +20,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "export": ("results.fmu:ExportResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "ships": ("results.ships:ShipsResult",),
+    "signals": ("results.signals:SignalsResult",),
     "tow": ("results.tow:TowResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""

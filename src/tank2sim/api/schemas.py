@@ -726,13 +726,6 @@ class BridgeKeys(_Keys):
     ballast: dict[str, Any] | None
 
 
-class SignalsKeys(_Keys):
-    """Statistics, spectra and filters of records."""
-
-    trials: list[dict[str, Any]]
-    filter: NotRequired[dict[str, Any]]
-
-
 class SteerKeys(_Keys):
     """A page on which the ship is steered."""
 
@@ -961,7 +954,6 @@ KEYS: dict[str, Any] = {
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "run": RunKeys,
-    "signals": SignalsKeys,
     "simulate": SimulateKeys,
     "stability": StabilityKeys | CraftStabilityKeys,
     "steer": SteerKeys,

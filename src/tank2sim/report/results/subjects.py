@@ -20,7 +20,6 @@ from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
 from tank2sim.report.manoeuvre.page import manoeuvre_page
 from tank2sim.report.results.motions import from_the_bridge
-from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
@@ -104,7 +103,6 @@ _PAGES: Mapping[str, _Page] = {
         | {"notices": list},
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
-    "Signals": _Page(signals_page, {"trials": list}),
     "Captive run": _Page(run_page, {"runs": list, "repeats": list, "notices": list}),
     "Coefficients from trials": _Page(
         identification_page,
