@@ -42,7 +42,6 @@ from .api.schemas import json_schema as json_schema
 from .api.ship import Ship as Ship
 from .api.ship import load as load
 from .api.ship import ships as ships
-from .api.signals import SignalsResult as SignalsResult
 from .api.signals import signals as signals
 from .api.steering_models import (
     SteeringModelsResult as SteeringModelsResult,
@@ -76,6 +75,7 @@ from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
+from .results.signals import SignalsResult as SignalsResult
 from .results.stability import StabilityResult as StabilityResult
 from .results.tow import TowResult as TowResult
 from .results.yaw import YawResult as YawResult

@@ -48,7 +48,7 @@ class _InJson:
             wanted = self.dtype if self.dtype is not np.complex128 else np.float64
             if isinstance(value, np.ndarray | complex):
                 wanted = self.dtype
-            elif _holds_text(value):
+            elif _holds_other(value, (str, dict) if self.dtype is np.bool_ else (str, dict, bool)):
                 raise ValueError
             numbers = np.asarray(value, dtype=wanted)
         except (TypeError, ValueError):
@@ -71,10 +71,11 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _holds_text(value: Any) -> bool:
+def _holds_other(value: Any, kinds: tuple[type, ...]) -> bool:
+    """Whether nested lists hold an item of one of these types."""
     if isinstance(value, list | tuple):
-        return any(map(_holds_text, value))
-    return isinstance(value, str | bool | dict)
+        return any(_holds_other(item, kinds) for item in value)
+    return isinstance(value, kinds)
 
 
 Array = Annotated[NDArray[np.float64], _InJson(np.float64)]
@@ -95,5 +96,5 @@ ComplexNumber = Annotated[complex, _InJson(np.complex128, scalar=True)]
 Columns = dict[str, Array]
 """Columns (n,) by name with unit, all of one length."""
 
-Mask = NDArray[np.bool_]
+Mask = Annotated[NDArray[np.bool_], _InJson(np.bool_)]
 """Truth values, of any shape."""

@@ -55,7 +55,7 @@ def test_table_and_json_have_each_column_in_the_units_of_the_file(path, tmp_path
     assert trial["columns"]["n_rpm"]["constant"] is True
     assert trial["columns"]["n_rpm"]["mean"] == pytest.approx(84.0)
     steering = trial["rudder_to_yaw_rate"]
-    assert steering["gain_per_s"][1] == pytest.approx(0.08, rel=0.2)
+    assert np.hypot(*steering["transfer"]["response"][1]) == pytest.approx(0.08, rel=0.2)
     assert steering["cross_correlation"]["lag_of_largest_s"] > 0
 
 

@@ -23,6 +23,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),
+    "signals": ("results.signals:SignalsResult",),
     "tow": ("results.tow:TowResult",),
     "yaw": ("results.yaw:YawResult",),
     "guess": ("results.guess:GuessResult",),

@@ -504,13 +504,6 @@ class BridgeKeys(_Keys):
     ballast: dict[str, Any] | None
 
 
-class SignalsKeys(_Keys):
-    """Statistics, spectra and filters of records."""
-
-    trials: list[dict[str, Any]]
-    filter: NotRequired[dict[str, Any]]
-
-
 class SteerKeys(_Keys):
     """A page on which the ship is steered."""
 
@@ -552,7 +545,6 @@ KEYS: dict[str, Any] = {
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
-    "signals": SignalsKeys,
     "steer": SteerKeys,
     "validate": ValidateKeys | CraftValidateKeys,
 }

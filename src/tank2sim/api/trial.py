@@ -20,10 +20,10 @@ from tank2sim.records.trials import Trial
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tank2sim.api.signals import SignalsResult
     from tank2sim.cards import ManoeuvringCard
     from tank2sim.identification.trials.problem.prepare_trials import Measured
     from tank2sim.results.audit import AuditResult
+    from tank2sim.results.signals import SignalsResult
 
 
 class TrialRecord:

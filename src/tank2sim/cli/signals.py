@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.bounds import PositiveArgument
 from tank2sim.api.signals import signals
+from tank2sim.arguments import PositiveArgument
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.errors import InputError
@@ -62,6 +62,6 @@ def command(
         raise InputError("--output", "", "needs a filter", "say which with --filter, such as --filter lowpass:0.5")
     result = signals(trials, columns, max_gap_s=max_gap_s, segment_s=segment_s, filter=filter_text)
     files = {output: result.filtered.to_csv()} if output and result.filtered else {}
-    inputs = [analysis.trial.path for analysis in result.analyses]
+    inputs = [Path(trial.trial) for trial in result.study.trials]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)

@@ -66,6 +66,10 @@ def thin_points(columns: Sequence[Array], limit: int) -> Indices:
 DRAWN_SAMPLES = 600
 """Samples of a run in the JSON of a result: as many as a chart is wide. Whole runs are for trial files."""
 
+MEASURED_SAMPLES = 400
+"""Samples of each trial in the JSON, for charts. Project choice: a chart is a few hundred pixels wide, and the record
+itself is the file."""
+
 _DIGITS = 7
 
 

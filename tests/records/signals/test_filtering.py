@@ -61,8 +61,8 @@ def test_reported_gain_and_phase_are_those_of_a_sine_sent_through(name, frequenc
 def test_without_shift_of_phase_means_just_that(name):
     filtered = FILTERS[name](wave(0.3))
     assert abs(cmath.phase(measured(0.3, filtered))) < 2e-3
-    assert np.all(filtered.effect.delay_s == 0)
-    assert "no phase shift" in filtered.effect.sentence
+    assert np.all(filtered.effect.group_delay_s == 0)
+    assert "no phase shift" in filtered.effect.explanation
 
 
 def test_a_derivative_is_that_of_the_sine():
@@ -82,7 +82,7 @@ def test_minus_3_db_one_way_and_minus_6_both_ways():
     [(FilterType.LOW, [0.5], "delays"), (FilterType.HIGH, [0.2], "brings"), (FilterType.BAND, [0.1, 1.0], None)],
 )
 def test_the_sentence_tells_the_delay_that_a_sine_gets(kind, edges, word):
-    sentence = butterworth(wave(0.3), kind, edges, causal=True).effect.sentence
+    sentence = butterworth(wave(0.3), kind, edges, causal=True).effect.explanation
     reported = re.match(r"(delays|brings) ([\d.]+) Hz (?:by )?([\d.e-]+) s", sentence)
     assert reported, sentence
     frequency, shift = float(reported[2]), float(reported[3]) * (1 if reported[1] == "delays" else -1)
@@ -99,7 +99,7 @@ def test_group_delay_is_how_much_later_a_packet_comes():
     filtered = butterworth(series(packet, STEP), FilterType.LOW, [0.5], causal=True)
     energy = filtered.series.values**2
     later = float(np.sum(time * energy) / np.sum(energy)) - 100.0
-    reported = float(np.interp(0.3, filtered.effect.frequency_hz, filtered.effect.delay_s))
+    reported = float(np.interp(0.3, filtered.effect.frequency_hz, filtered.effect.group_delay_s))
     assert later == pytest.approx(reported, rel=0.01)
 
 
@@ -109,7 +109,7 @@ def test_the_middle_does_not_depend_on_what_is_beyond_the_ends_reported(name):
     values = white(5, 2000)
     whole = FILTERS[name](series(values, STEP))
     part = FILTERS[name](series(values[700:1300], STEP))
-    begin, end = (round(one / STEP) for one in part.effect.ends_s)
+    begin, end = (round(one / STEP) for one in part.effect.distorted_ends_s)
     inside = slice(begin, 600 - end)
     error = np.max(np.abs(part.series.values[inside] - whole.series.values[700:1300][inside]))
     assert error < 0.05 * np.std(whole.series.values)

@@ -33,16 +33,16 @@ def test_the_integral_of_the_density_is_the_variance():
 
 def test_degrees_of_freedom_of_half_overlapping_hann_windows():
     averaging = spectrum(series(white(1)), segment_s=40.0).averaging
-    assert (averaging.samples, averaging.segments) == (400, 19)
+    assert (averaging.samples_in_segment, averaging.segments) == (400, 19)
     # Half-overlapping Hann windows share (1/6)^2 of their variance: 2 K/(1 + 2/36 (K - 1)/K).
-    assert averaging.freedom == pytest.approx(38 / (1 + 18 / 19 * 2 / 36), rel=1e-3)
+    assert averaging.degrees_of_freedom == pytest.approx(38 / (1 + 18 / 19 * 2 / 36), rel=1e-3)
 
 
 def test_a_sine_in_noise_is_the_distinct_main_peak():
     wave = 0.5 * np.sin(2 * np.pi * 0.8 * STEP * np.arange(4000)) + white(2)
     peak = spectrum(series(wave, STEP)).peak
     assert peak.distinct
-    assert not peak.lowest
+    assert not peak.at_lowest_frequency
     assert peak.frequency_hz == pytest.approx(0.8, abs=0.012)
 
 
@@ -94,8 +94,8 @@ def test_intervals_of_gain_and_phase_hold_the_truth_in_19_of_20_cases():
         found = transfer_function(*ship(seed, 0.01))
         low = (found.frequency_hz > 0.01) & (found.frequency_hz < 0.06)
         ratio = found.response[low] / exact_nomoto(found.frequency_hz[low])
-        gains += list(np.abs(np.log(np.abs(ratio))) < found.half_width[low])
-        phases += list(np.abs(np.angle(ratio)) < found.half_width[low])
+        gains += list(np.abs(np.log(np.abs(ratio))) < found.half_width_95[low])
+        phases += list(np.abs(np.angle(ratio)) < found.half_width_95[low])
     assert np.mean(gains) == pytest.approx(0.95, abs=0.025)
     assert np.mean(phases) == pytest.approx(0.95, abs=0.025)
 
@@ -104,7 +104,7 @@ def test_coherence_of_independent_signals_exceeds_chance_in_1_of_20_frequencies(
     above, sure = [], []
     for seed in range(30):
         found = transfer_function(series(white(seed), name="delta_rad"), series(white(seed + 900)))
-        above.append(np.mean(found.coherence > found.significant))
+        above.append(np.mean(found.coherence > found.coherence_by_chance))
         sure.append(np.mean(found.sure))
     assert np.mean(above) == pytest.approx(0.05, abs=0.012)
     assert np.mean(sure) < 0.025

@@ -41,19 +41,19 @@ def test_a_step_in_the_level_is_no_stationary_signal():
 
 def test_the_four_outcomes_are_distinguished_by_the_two_tests():
     found = stationarity(series(white(1)), autocorrelation(series(white(1))))
-    assert found.level.dickey_fuller < 0.01
-    assert found.level.kpss > 0.05
+    assert found.about_level.dickey_fuller < 0.01
+    assert found.about_level.kpss > 0.05
     walk = series(np.cumsum(white(1)))
     found = stationarity(walk, autocorrelation(walk))
-    assert found.level.dickey_fuller > 0.05
-    assert found.level.kpss < 0.05
+    assert found.about_level.dickey_fuller > 0.05
+    assert found.about_level.kpss < 0.05
 
 
 def test_halves_tell_mean_and_variance():
     values = np.concatenate([white(1, 2000), 5.0 + white(2, 2000, spread=3.0)])
     found = stationarity(series(values), autocorrelation(series(values)))
-    assert found.mean == pytest.approx((0.0, 5.0), abs=0.2)
-    assert found.variance == pytest.approx((1.0, 9.0), rel=0.1)
+    assert found.mean_of_halves == pytest.approx((0.0, 5.0), abs=0.2)
+    assert found.variance_of_halves == pytest.approx((1.0, 9.0), rel=0.1)
 
 
 @pytest.mark.parametrize("steps", [0.01, 10.0])
@@ -85,7 +85,7 @@ def test_too_few_independent_samples_are_not_judged():
     one = series(first_order(1, 300.0))
     found = normality(one, autocorrelation(one))
     assert found.normal is None
-    assert found.count < 20
+    assert found.independent_samples < 20
 
 
 def test_the_density_of_normal_noise_is_the_normal_one():
@@ -103,6 +103,6 @@ def test_directions_have_mean_and_deviation_on_the_circle():
     assert np.degrees(mean) == pytest.approx(340.0, abs=1.5) and deviation == pytest.approx(0.4, rel=0.05)
     assert mean_and_deviation("delta_rad", values) == pytest.approx((values.mean(), values.std()))
     found = stationarity(series(values, name="psi_rad"), autocorrelation(series(values)))
-    assert np.degrees(found.mean) == pytest.approx((340.0, 340.0), abs=2.0)
-    assert found.variance == pytest.approx((0.16, 0.16), rel=0.1)
+    assert np.degrees(found.mean_of_halves) == pytest.approx((340.0, 340.0), abs=2.0)
+    assert found.variance_of_halves == pytest.approx((0.16, 0.16), rel=0.1)
     assert mean_and_deviation("psi_rad", np.full(60, 2 * np.pi))[0] == pytest.approx(0.0, abs=1e-9)

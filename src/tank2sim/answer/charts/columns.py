@@ -94,12 +94,21 @@ def motions(
 
 def measured_histories(columns: _Columns, title: str) -> alt.VConcatChart | None:
     """The signals of a record over time, but its positions; None without any."""
-    signals = _signals({"measured": columns})
-    if not signals:
+    return columns_chart({"measured": columns}, title)
+
+
+def columns_chart(
+    runs: Mapping[str, _Columns], title: str, *, measured: Sequence[str] = (), height_px: int = 60
+) -> alt.VConcatChart | None:
+    """The signals of runs over time, but their positions, `measured` ones as points; None without any."""
+    if not (signals := _signals(runs)):
         return None
-    table = _in_si(columns)
-    record = History(label="measured", time_s=table["t_s"], values=_by_stem(table))
-    return history_chart([record], signals, title=title, height_px=60)
+    tables = {label: _in_si(columns) for label, columns in runs.items()}
+    histories = [
+        History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
+        for label, table in tables.items()
+    ]
+    return history_chart(histories, signals, title=title, height_px=height_px)
 
 
 def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band_t_s: Array) -> Illustration | None:

@@ -9,12 +9,8 @@ from tank2sim.arrays import Columns, Number
 from tank2sim.records.audit import audit_trial, record_noise
 from tank2sim.records.audit.finding import ColumnFinding
 from tank2sim.records.signals.columns import file_columns
-from tank2sim.records.thinning import drawn_columns
+from tank2sim.records.thinning import MEASURED_SAMPLES, drawn_columns
 from tank2sim.records.trials import Trial, sampling_step
-
-MEASURED_SAMPLES = 400
-"""Samples of each trial in the JSON, for charts. Project choice: a chart is a few hundred pixels wide, and the record
-itself is the file."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.arrays import Columns, Number
 from tank2sim.errors import InputError
-from tank2sim.records.signals.columns import SignalName, find_signal
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, SignalName, file_columns, find_signal
 from tank2sim.records.signals.correlation import Autocorrelation, Correlation, autocorrelation, cross_correlation
+from tank2sim.records.signals.effect import Filtered, FilterEffect
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.signals.spectra import Spectrum, Transfer, spectrum, transfer_function
 from tank2sim.records.signals.statistics import (
@@ -21,70 +23,136 @@ from tank2sim.records.signals.statistics import (
     probability_density,
     stationarity,
 )
+from tank2sim.records.thinning import MEASURED_SAMPLES, drawn_columns
 from tank2sim.records.trials import RUDDERS, Trial
 
 _YAW_RATE = "r_radps"
 
 
-@dataclass(frozen=True, eq=False)
-class Randomness:
-    """What is known of a signal that varies; see the functions of the same names."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SignalStudy:
+    """A signal in the unit of its column.
 
-    correlation: Autocorrelation
-    stationarity: Stationarity
-    normality: Normality
-    density: Density
-    spectrum: Spectrum
+    Parameters
+    ----------
+    unit : str
+    samples : int
+    step_s : float
+    mean, standard_deviation : float
+        Of directions on the circle.
+    on_circle : bool
+        Whether it is a direction.
+    constant : bool
+        A constant signal has none of the following.
+    autocorrelation : Autocorrelation, optional
+    stationarity : Stationarity, optional
+    normality : Normality, optional
+    probability_density : Density, optional
+    spectrum : Spectrum, optional
+        In the square of the unit over Hz.
+    """
+
+    unit: str
+    samples: int
+    step_s: float
+    mean: Number
+    standard_deviation: Number
+    on_circle: bool
+    constant: bool
+    autocorrelation: Autocorrelation | None = None
+    stationarity: Stationarity | None = None
+    normality: Normality | None = None
+    probability_density: Density | None = None
+    spectrum: Spectrum | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class ColumnAnalysis:
-    """One signal: its values, their mean and standard deviation in SI, and the rest if it is not constant."""
-
-    series: Series
-    randomness: Randomness | None
-
-    @property
-    def mean(self) -> float:
-        """Mean value, SI; of a direction that on the circle."""
-        return mean_and_deviation(self.series.name, self.series.values)[0]
-
-    @property
-    def standard_deviation(self) -> float:
-        """Root of the mean square about the mean, SI; of a direction that on the circle."""
-        return mean_and_deviation(self.series.name, self.series.values)[1]
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Steering:
-    """How the yaw rate follows the rudder: `rudder` is the signal taken for it, angle before order."""
+    """How the yaw rate follows the rudder.
+
+    Parameters
+    ----------
+    rudder : str
+        Column taken for the rudder, angle before order.
+    cross_correlation : Correlation
+    transfer : Transfer
+        Yaw rate over rudder angle, 1/s.
+    notices : tuple of str
+    """
 
     rudder: str
-    correlation: Correlation
+    cross_correlation: Correlation
     transfer: Transfer
     notices: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class TrialAnalysis:
-    """The signals of one trial, and rudder to yaw rate where both are there and move."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialSignals:
+    """The signals of one trial.
 
-    trial: Trial
-    columns: tuple[ColumnAnalysis, ...]
-    steering: Steering | None
+    Parameters
+    ----------
+    trial : str
+        The file.
+    columns : dict
+        Signals by their columns in the trial format.
+    rudder_to_yaw_rate : Steering or None
+        None where one of both is missing or does not move.
+    notices : tuple of str
+    histories : dict
+        The signals over time, thinned to draw.
+    """
+
+    trial: str
+    columns: dict[str, SignalStudy]
+    rudder_to_yaw_rate: Steering | None
     notices: tuple[str, ...]
+    histories: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FilterStudy:
+    """A filter applied to a signal.
+
+    Parameters
+    ----------
+    name : str
+        The filter as it was asked for.
+    column : str
+        The (first) signal filtered.
+    sentence : str
+        The signal, the filter and its effect in words.
+    effect : FilterEffect
+    before, after : dict
+        The signal over time in the unit of its column, thinned to draw.
+    """
+
+    name: str
+    column: str
+    sentence: str
+    effect: FilterEffect
+    before: Columns
+    after: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SignalsStudy:
+    """Statistics and spectra of the signals of trials, and a filter."""
+
+    trials: tuple[TrialSignals, ...]
+    filter: FilterStudy | None = None
 
 
 @dataclass(frozen=True)
 class SignalSettings:
-    """What a user chooses: the columns (none: all), the longest gap to bridge, the length of spectral segments."""
+    """Columns to analyse (none: all), longest gap to bridge, and length of spectral segments."""
 
     columns: Sequence[str] = ()
     max_gap_s: float | None = None
     segment_s: float | None = None
 
 
-def analyse(trial: Trial, settings: SignalSettings) -> TrialAnalysis:
+def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
     """Analyse the signals of a trial.
 
     Raises
@@ -107,24 +175,61 @@ def analyse(trial: Trial, settings: SignalSettings) -> TrialAnalysis:
                 notices.append(f"{SignalName(name).file} is left out: it {error.problem}; {error.remedy}")
         if not series:
             raise InputError(trial.path, "", "no signal of it can be analysed", notices[-1])
-    columns = tuple(_analysed(item, settings.segment_s) for item in series.values())
     notices += [notice for item in series.values() for notice in item.notices]
-    return TrialAnalysis(trial, columns, _steering(series, settings.segment_s), tuple(notices))
+    columns = {SignalName(name).file: _analysed(item, settings.segment_s) for name, item in series.items()}
+    return TrialSignals(
+        trial=str(trial.path),
+        columns=columns,
+        rudder_to_yaw_rate=_steering(series, settings.segment_s),
+        notices=tuple(notices),
+        histories=_histories(trial, columns),
+    )
 
 
-def _analysed(series: Series, segment_s: float | None) -> ColumnAnalysis:
+def _histories(trial: Trial, names: Collection[str]) -> Columns:
+    whole = file_columns(trial)
+    return drawn_columns({"t_s": whole["t_s"], **{name: whole[name] for name in names}}, MEASURED_SAMPLES, peaks=True)
+
+
+def filtered(text: str, sentence: str, before: Series, after: Filtered) -> FilterStudy:
+    """Study of a filter by its text, the sentence on it, the signal before and after."""
+    return FilterStudy(
+        name=text,
+        column=SignalName(before.name).file,
+        sentence=sentence,
+        effect=after.effect,
+        before=_history(before),
+        after=_history(after.series),
+    )
+
+
+def _history(series: Series) -> Columns:
+    name = SignalName(series.name)
+    return drawn_columns({"t_s": series.time_s, name.file: name.factor * series.values}, peaks=True)
+
+
+def _analysed(series: Series, segment_s: float | None) -> SignalStudy:
+    name = SignalName(series.name)
+    mean, deviation = mean_and_deviation(series.name, series.values)
+    found = SignalStudy(
+        unit=name.unit,
+        samples=len(series.values),
+        step_s=series.step_s,
+        mean=name.factor * mean,
+        standard_deviation=name.factor * deviation,
+        on_circle=series.name in DIRECTION_COLUMNS,
+        constant=series.constant,
+    )
     if series.constant:
-        return ColumnAnalysis(series, None)
+        return found
     correlation = autocorrelation(series)
-    return ColumnAnalysis(
-        series,
-        Randomness(
-            correlation,
-            stationarity(series, correlation),
-            normality(series, correlation),
-            probability_density(series),
-            spectrum(series, segment_s),
-        ),
+    return replace(
+        found,
+        autocorrelation=correlation,
+        stationarity=stationarity(series, correlation).in_unit(name.factor),
+        normality=normality(series, correlation),
+        probability_density=probability_density(series).in_unit(name.factor),
+        spectrum=spectrum(series, segment_s).in_unit(name.factor),
     )
 
 
@@ -135,13 +240,18 @@ def _steering(series: dict[str, Series], segment_s: float | None) -> Steering | 
     source, result = series[rudder], series[_YAW_RATE]
     correlation = cross_correlation(source, result)
     transfer = transfer_function(source, result, segment_s)
-    return Steering(rudder, correlation, transfer, _cautions(correlation, transfer, source.step_s))
+    return Steering(
+        rudder=SignalName(rudder).file,
+        cross_correlation=correlation,
+        transfer=transfer,
+        notices=_cautions(correlation, transfer, source.step_s),
+    )
 
 
 def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tuple[str, ...]:
     messages = []
-    segment = transfer.averaging.samples * step_s
-    lag = correlation.largest[0]
+    segment = transfer.averaging.samples_in_segment * step_s
+    lag = correlation.lag_of_largest_s
     if abs(lag) > 0.1 * segment:
         messages.append(
             f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "

@@ -24,20 +24,18 @@ class Correlation:
         Rising, from minus to plus a quarter of the record; positive: the second signal comes after the first.
     coefficient : array (m,)
         Between -1 and 1.
-    bound : float
-        What 95 % of the coefficients of two independent signals with these autocorrelations stay within, by
-        Bartlett's formula: 1.96 sqrt(sum over the lags of rho_1 rho_2 / n) (Box & Jenkins 1976, section 11.1.3).
+    bound_if_independent : float
+        95 % of the coefficients of two independent signals with these autocorrelations are smaller, by Bartlett's
+        formula: 1.96 sqrt(sum over the lags of rho_1 rho_2 / n) (Box & Jenkins 1976, section 11.1.3).
+    lag_of_largest_s, largest : float
+        Lag and coefficient where the coefficient is largest in size.
     """
 
     lag_s: Array
     coefficient: Array
-    bound: float
-
-    @property
-    def largest(self) -> tuple[float, float]:
-        """Lag (s) and coefficient where the coefficient is largest in size."""
-        place = int(np.argmax(np.abs(self.coefficient)))
-        return float(self.lag_s[place]), float(self.coefficient[place])
+    bound_if_independent: float
+    lag_of_largest_s: float
+    largest: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +80,9 @@ def cross_correlation(first: Series, second: Series) -> Correlation:
     kept = np.abs(lags) <= count // 4
     auto = [_coefficients(sequence.values, sequence.values)[kept] for sequence in (first, second)]
     bound = _NORMAL * float(np.sqrt(max(float(np.sum(auto[0] * auto[1])), 1.0) / count))
-    return Correlation(first.step_s * lags[kept], coefficient[kept], bound)
+    lag, coefficient = first.step_s * lags[kept], coefficient[kept]
+    place = int(np.argmax(np.abs(coefficient)))
+    return Correlation(lag, coefficient, bound, float(lag[place]), float(coefficient[place]))
 
 
 def _coefficients(sequence: Array, second: Array) -> Array:

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, ComplexArray
 from tank2sim.records.signals.sampling import Series
 
 _FREQUENCIES = 400
@@ -24,19 +23,19 @@ class FilterEffect:
         Rising, from one period a record to below the Nyquist frequency.
     response : complex array (m,)
         Output over input; a negative angle: the output comes later. Its unit is 1, or 1/s of a derivative.
-    delay_s : array (m,)
-        Group delay: by how much a packet of waves about a frequency comes later.
-    ends_s : (float, float)
-        What is distorted at the begin and at the end of the record.
-    sentence : str
-        All that in words.
+    group_delay_s : array (m,)
+        Delay of a packet of waves about a frequency.
+    distorted_ends_s : (float, float)
+        Distorted time at the begin and at the end of the record.
+    explanation : str
+        The same in words.
     """
 
     frequency_hz: Array
-    response: NDArray[np.complex128]
-    delay_s: Array
-    ends_s: tuple[float, float]
-    sentence: str
+    response: ComplexArray
+    group_delay_s: Array
+    distorted_ends_s: tuple[float, float]
+    explanation: str
 
     @property
     def gain(self) -> Array:
@@ -50,7 +49,7 @@ class FilterEffect:
         Without delay it is not made continuous: it is 0, or half a turn where waves come out upside down.
         """
         angle: Array = np.angle(self.response)
-        if not self.delay_s.any():
+        if not self.group_delay_s.any():
             return np.where(angle < 1e-6 - math.pi, math.pi, angle)
         phase: Array = np.unwrap(angle)
         turn = 2.0 * math.pi

@@ -80,7 +80,7 @@ def butterworth(
     delay = _sections_delay(sections, grid, series) if causal else np.zeros(len(grid))
     effect = FilterEffect(grid, response, delay, (settling, 0.0 if causal else settling), "")
     sentence = _causal_sentence(effect, kind, edges) if causal else _zero_phase_sentence(effect, edges)
-    return Filtered(series.with_values(values), replace(effect, sentence=sentence))
+    return Filtered(series.with_values(values), replace(effect, explanation=sentence))
 
 
 def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int = 0) -> Filtered:
@@ -225,7 +225,7 @@ def _falls_to_half(grid: Array, gain: Array) -> float | None:
 
 def _zero_phase_sentence(effect: FilterEffect, edges: Sequence[float]) -> str:
     where = " and ".join(f"{edge:.3g}" for edge in edges)
-    return f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {effect.ends_s[0]:.3g} s"
+    return f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {effect.distorted_ends_s[0]:.3g} s"
 
 
 def _causal_sentence(effect: FilterEffect, kind: FilterType, edges: Sequence[float]) -> str:
@@ -245,10 +245,10 @@ def _causal_sentence(effect: FilterEffect, kind: FilterType, edges: Sequence[flo
         else f"brings {frequency:.3g} Hz {-shift:.3g} s early"
     )
     where = " and ".join(f"{edge:.3g}" for edge in edges)
-    packets = float(effect.delay_s[place])
+    packets = float(effect.group_delay_s[place])
     return (
         f"{way} ({math.degrees(phase):.0f} deg; packets of such waves by {packets:.3g} s), "
-        f"{decibel(math.sqrt(0.5))} at {where} Hz, begin distorted over {effect.ends_s[0]:.3g} s"
+        f"{decibel(math.sqrt(0.5))} at {where} Hz, begin distorted over {effect.distorted_ends_s[0]:.3g} s"
     )
 
 

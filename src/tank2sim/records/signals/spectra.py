@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal, stats
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, ComplexArray, Mask
 from tank2sim.errors import InputError
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.correlation import autocorrelation
@@ -33,17 +32,16 @@ class Averaging:
 
     Parameters
     ----------
-    samples : int
-        Samples of one segment.
+    samples_in_segment : int
     segments : int
-        How many there are.
-    freedom : float
+        Number of segments.
+    degrees_of_freedom : float
         Degrees of freedom of a spectrum's chi-square distribution: two a segment, less what their overlap shares.
     """
 
-    samples: int
+    samples_in_segment: int
     segments: int
-    freedom: float
+    degrees_of_freedom: float
 
 
 @dataclass(frozen=True)
@@ -58,14 +56,14 @@ class Peak:
         Its height.
     distinct : bool
         True if it rises above what surrounds it by more than scatter can (see :func:`spectrum`).
-    lowest : bool
+    at_lowest_frequency : bool
         True if it is at the lowest frequency, where it cannot be distinguished from a slow drift.
     """
 
     frequency_hz: float
     density: float
     distinct: bool
-    lowest: bool
+    at_lowest_frequency: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +77,10 @@ class Spectrum:
     density, low, high : array (m,)
         The density (unit squared over Hz), and its 95 % confidence limits by chi-square at each frequency.
     averaging : Averaging
-        What it rests on.
     peak : Peak or None
         None if the density only falls or only rises.
+    peak_in_words : str
+        Frequency of the main peak (Hz), and whether it is one.
     """
 
     frequency_hz: Array
@@ -90,15 +89,18 @@ class Spectrum:
     high: Array
     averaging: Averaging
     peak: Peak | None
+    peak_in_words: str
 
-    @property
-    def peak_in_words(self) -> str:
-        """Frequency of the main peak (Hz), and whether it is one."""
-        if self.peak is None:
-            return "none"
-        if self.peak.lowest:
-            return f"{self.peak.frequency_hz:.3g} or below"
-        return f"{self.peak.frequency_hz:.3g}" + ("" if self.peak.distinct else ", not distinct")
+    def in_unit(self, factor: float) -> Spectrum:
+        """The spectrum of the signal times a factor."""
+        square = factor**2
+        return replace(
+            self,
+            density=square * self.density,
+            low=square * self.low,
+            high=square * self.high,
+            peak=replace(self.peak, density=square * self.peak.density) if self.peak else None,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,18 +123,25 @@ class Transfer:
         sqrt(1 - coherence) / sqrt(coherence * degrees of freedom).
     cross_density : complex array (m,)
         Cross spectral density, product of the units over Hz.
-    significant : float
+    coherence_by_chance : float
         Coherence that 95 % of estimates stay below where there is none.
+    half_width_95 : array (m,)
+        Half the 95 % interval of the gain's logarithm and of the phase (rad), by Student's t: the segments are few. It
+        holds where the output mostly is the response: low coherences that are high by chance have gains that are high
+        by chance.
+    sure : array (m,)
+        Whether the coherence, its median over three neighbours, is above chance: one alone is above now and then.
     averaging : Averaging
-        What it rests on.
     """
 
     frequency_hz: Array
-    response: NDArray[np.complex128]
+    response: ComplexArray
     coherence: Array
     error: Array
-    cross_density: NDArray[np.complex128]
-    significant: float
+    cross_density: ComplexArray
+    coherence_by_chance: float
+    half_width_95: Array
+    sure: Mask
     averaging: Averaging
 
     @property
@@ -144,22 +153,6 @@ class Transfer:
     def phase_rad(self) -> Array:
         """Its angle, between -pi and pi: where there is no coherence nothing says how many turns it has made."""
         return np.angle(self.response)
-
-    @property
-    def half_width(self) -> Array:
-        """Half the 95 % interval of the gain's logarithm and of the phase (rad), by Student's t: the segments are few.
-
-        It holds where the output mostly is the response: of low coherences those that are high by chance, with gains
-        that are high by chance, are the ones that are looked at.
-        """
-        factor = float(stats.t.ppf((1.0 + CONFIDENCE) / 2.0, max(self.averaging.freedom - 2.0, 1.0)))
-        return factor * self.error
-
-    @property
-    def sure(self) -> NDArray[np.bool_]:
-        """Where the coherence is above chance, its median over three neighbours: one alone is above now and then."""
-        median: Array = signal.medfilt(self.coherence, 3)
-        return median > self.significant
 
 
 def spectrum(series: Series, segment_s: float | None = None) -> Spectrum:
@@ -186,9 +179,26 @@ def spectrum(series: Series, segment_s: float | None = None) -> Spectrum:
     frequency, density = signal.welch(series.values, **_options(series, averaging))
     inner = _inner(averaging)
     tail = (1.0 - CONFIDENCE) / 2.0
-    low, high = (averaging.freedom / stats.chi2.ppf(p, averaging.freedom) for p in (1.0 - tail, tail))
-    peak = _peak(frequency[inner], density[inner], averaging.freedom)
-    return Spectrum(frequency[inner], density[inner], low * density[inner], high * density[inner], averaging, peak)
+    freedom = averaging.degrees_of_freedom
+    low, high = (freedom / stats.chi2.ppf(p, freedom) for p in (1.0 - tail, tail))
+    peak = _peak(frequency[inner], density[inner], freedom)
+    return Spectrum(
+        frequency_hz=frequency[inner],
+        density=density[inner],
+        low=low * density[inner],
+        high=high * density[inner],
+        averaging=averaging,
+        peak=peak,
+        peak_in_words=_in_words(peak),
+    )
+
+
+def _in_words(peak: Peak | None) -> str:
+    if peak is None:
+        return "none"
+    if peak.at_lowest_frequency:
+        return f"{peak.frequency_hz:.3g} or below"
+    return f"{peak.frequency_hz:.3g}" + ("" if peak.distinct else ", not distinct")
 
 
 def transfer_function(source: Series, result: Series, segment_s: float | None = None) -> Transfer:
@@ -207,10 +217,20 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     if not np.all(power[inner] > 0):
         raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
     kept = np.clip(coherence[inner], 1e-12, 1.0)
-    error = np.sqrt((1.0 - kept) / (kept * averaging.freedom))
+    error = np.sqrt((1.0 - kept) / (kept * averaging.degrees_of_freedom))
     # Of n independent averages the coherence of nothing exceeds c with probability (1 - c)^(n - 1) (Goodman 1957).
-    significant = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / (averaging.freedom / 2.0 - 1.0))
-    return Transfer(frequency[inner], cross[inner] / power[inner], kept, error, cross[inner], significant, averaging)
+    significant = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / (averaging.degrees_of_freedom / 2.0 - 1.0))
+    return Transfer(
+        frequency_hz=frequency[inner],
+        response=cross[inner] / power[inner],
+        coherence=kept,
+        error=error,
+        cross_density=cross[inner],
+        coherence_by_chance=significant,
+        half_width_95=error * stats.t.ppf((1.0 + CONFIDENCE) / 2.0, max(averaging.degrees_of_freedom - 2.0, 1.0)),
+        sure=signal.medfilt(kept, 3) > significant,
+        averaging=averaging,
+    )
 
 
 def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
@@ -241,7 +261,7 @@ def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
 
 
 def _options(series: Series, averaging: Averaging) -> dict[str, object]:
-    samples = averaging.samples
+    samples = averaging.samples_in_segment
     return {
         "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2,
         "detrend": "constant", "scaling": "density",
@@ -254,7 +274,8 @@ def _without_scaling(options: dict[str, object]) -> dict[str, object]:
 
 def _inner(averaging: Averaging) -> slice:
     """Frequencies except for zero and, of an even number of samples, Nyquist."""
-    return slice(1, averaging.samples // 2 if averaging.samples % 2 == 0 else averaging.samples // 2 + 1)
+    samples = averaging.samples_in_segment
+    return slice(1, samples // 2 if samples % 2 == 0 else samples // 2 + 1)
 
 
 def _peak(frequency: Array, density: Array, freedom: float) -> Peak | None:
@@ -266,7 +287,7 @@ def _peak(frequency: Array, density: Array, freedom: float) -> Peak | None:
     top = float(frequency[place])
     below = density[(frequency >= top / 2) & (frequency < top)]
     above = density[(frequency > top) & (frequency <= 2 * top)]
-    lowest = place == 0
+    lowest = bool(place == 0)
     distinct = False
     if not lowest and above.size:
         # The median of a chi-square variable is below its mean.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 from scipy import stats
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.signals.correlation import Autocorrelation
 from tank2sim.records.signals.sampling import Series
@@ -65,8 +64,8 @@ class UnitRootTests:
         0.01 and 0.1, which bound what is beyond.
     """
 
-    dickey_fuller: float
-    kpss: float
+    dickey_fuller: Number
+    kpss: Number
 
 
 @dataclass(frozen=True)
@@ -77,20 +76,33 @@ class Stationarity:
     ----------
     verdict : Stationary
         In words, at 5 %.
-    level, trend : UnitRootTests
+    meaning : str
+        The verdict in full.
+    about_level, about_trend : UnitRootTests
         About a constant level, and about a linear trend.
-    block : int
+    samples_averaged : int
         Samples averaged to one value of the tests, so that their few lags reach over the correlation time.
-    mean, variance : (float, float)
+    mean_of_halves, variance_of_halves : (float, float)
         Both halves, in the signal's unit and its square, as by :func:`mean_and_deviation`.
     """
 
     verdict: Stationary
-    level: UnitRootTests
-    trend: UnitRootTests
-    block: int
-    mean: tuple[float, float]
-    variance: tuple[float, float]
+    meaning: str
+    about_level: UnitRootTests
+    about_trend: UnitRootTests
+    samples_averaged: int
+    mean_of_halves: tuple[Number, Number]
+    variance_of_halves: tuple[Number, Number]
+
+    def in_unit(self, factor: float) -> Stationarity:
+        """The stationarity of the signal times a factor."""
+        (first, second), (before, after) = self.mean_of_halves, self.variance_of_halves
+        square = factor**2
+        return replace(
+            self,
+            mean_of_halves=(factor * first, factor * second),
+            variance_of_halves=(square * before, square * after),
+        )
 
 
 @dataclass(frozen=True)
@@ -106,7 +118,7 @@ class Normality:
         False: rejected; None: too few samples to test.
     p_values : mapping
         By test: ``dagostino_pearson jarque_bera shapiro_wilk anderson_darling``.
-    count : int
+    independent_samples : int
         Samples tested, one every two correlation times. All samples together would make the tests reject what is
         normal: they take each for new evidence.
     skewness, excess_kurtosis : float
@@ -115,10 +127,10 @@ class Normality:
 
     verdict: str
     normal: bool | None
-    p_values: Mapping[str, float]
-    count: int
-    skewness: float
-    excess_kurtosis: float
+    p_values: dict[str, Number]
+    independent_samples: int
+    skewness: Number
+    excess_kurtosis: Number
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +148,10 @@ class Density:
     values: Array
     density: Array
     normal: Array
+
+    def in_unit(self, factor: float) -> Density:
+        """The density of the signal times a factor."""
+        return Density(factor * self.values, self.density / factor, self.normal / factor)
 
 
 def mean_and_deviation(name: str, values: Array) -> tuple[float, float]:
@@ -164,13 +180,15 @@ def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
     means = values[:whole].reshape(-1, block).mean(axis=1)
     level, trend = _unit_root_tests(means, "c"), _unit_root_tests(means, "ct")
     halves = [mean_and_deviation(series.name, half) for half in np.array_split(values, 2)]
+    verdict = _verdict(level, trend)
     return Stationarity(
-        _verdict(level, trend),
-        level,
-        trend,
-        block,
-        (halves[0][0], halves[1][0]),
-        (halves[0][1] ** 2, halves[1][1] ** 2),
+        verdict=verdict,
+        meaning=verdict.meaning,
+        about_level=level,
+        about_trend=trend,
+        samples_averaged=block,
+        mean_of_halves=(halves[0][0], halves[1][0]),
+        variance_of_halves=(halves[0][1] ** 2, halves[1][1] ** 2),
     )
 
 

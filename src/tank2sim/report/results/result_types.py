@@ -63,9 +63,6 @@ RESULT_TYPES = (
     ),
     ResultType("Bridge", "poster pilotcard", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
     ResultType("Ship to steer", "steer", ("ship", "steerable"), ("steerable",)),
-    ResultType("Signals", "signals", ("trials", "spectra"), ()),
-    ResultType("Signals", "signals", ("trials", "filter"), ()),
-    ResultType("Signals", "signals", ("trials",), ()),
 )
 """The results that are known, those with more particular keys first."""
 

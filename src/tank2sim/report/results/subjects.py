@@ -15,7 +15,6 @@ from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
 from tank2sim.report.results.motions import from_the_bridge
-from tank2sim.report.signals.page import signals_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
 
@@ -62,7 +61,6 @@ _PAGES: Mapping[str, _Page] = {
         | {"imo": list, "replays": list, "notices": list},
     ),
     "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
-    "Signals": _Page(signals_page, {"trials": list}),
     "Coefficients from trials": _Page(
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}

@@ -21,54 +21,51 @@ from tank2sim.answer.charts.parts import (
     records,
     series_look,
     stacked,
-    vector,
     with_unit,
 )
 from tank2sim.answer.charts.theme import BAND_OPACITY
 from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.signals.correlation import Autocorrelation, Correlation
+from tank2sim.records.signals.effect import FilterEffect
+from tank2sim.records.signals.spectra import Spectrum, Transfer
+from tank2sim.records.signals.statistics import Density
 from tank2sim.records.thinning import thin_line, thin_points
-from tank2sim.report.json_values import Json
 
 _SIZE_PX = (720, 300)
 _LEAST_DECIBEL = -120.0
 _PHASE = "phase (deg), below zero: later"
 
 
-def density_chart(name: SignalName, density: Json, *, title: str = "") -> alt.LayerChart:
-    """Probability density of a signal next to the normal one, from ``probability_density`` of the JSON."""
+def density_chart(name: SignalName, density: Density, *, title: str = "") -> alt.LayerChart:
+    """Probability density of a signal next to the normal one."""
     x = alt.X("x:Q", title=with_unit(name.words, name.unit), scale=alt.Scale(zero=False, nice=False))
     up = with_unit("probability density", f"1/({name.unit})")
-    curves = {"estimated": density["density"], "normal": density["normal"]}
-    rows = [
-        row
-        for label, curve in curves.items()
-        for row in records(label, {"x": vector(density["values"]), "v": vector(curve)})
-    ]
+    curves = {"estimated": density.density, "normal": density.normal}
+    rows = [row for label, curve in curves.items() for row in records(label, {"x": density.values, "v": curve})]
     return _lines(rows, list(curves), x, alt.Y("v:Q", title=up), title)
 
 
-def autocorrelation_chart(name: SignalName, column: Json, *, title: str = "") -> alt.LayerChart:
-    """Autocorrelation against the lag, the correlation time marked; from a column of the JSON."""
+def autocorrelation_chart(name: SignalName, found: Autocorrelation, *, title: str = "") -> alt.LayerChart:
+    """Autocorrelation against the lag, the correlation time marked."""
     label = f"{name.words} with itself"
-    rows = _thinned(label, column["autocorrelation"])
-    chart = _correlation_layers(rows, label, marks_s=[column["correlation_time_s"]], levels=[0.0], title=title)
+    rows = _thinned(label, found)
+    chart = _correlation_layers(rows, label, marks_s=[found.correlation_time_s], levels=[0.0], title=title)
     return chart.properties(description=f"Autocorrelation of {name.words}; the upright line is the correlation time.")
 
 
-def cross_correlation_chart(first: SignalName, second: SignalName, found: Json, *, title: str) -> alt.LayerChart:
-    """Cross-correlation against the lag, with its largest value and the bound of two independent signals; from
-    ``cross_correlation`` of the JSON."""
+def cross_correlation_chart(first: SignalName, second: SignalName, found: Correlation, *, title: str) -> alt.LayerChart:
+    """Cross-correlation against the lag, with its largest value and the bound of two independent signals."""
     label = f"{second.words} after {first.words}"
-    bound = found["bound_if_independent"]
-    levels, marks = [-bound, 0.0, bound], [found["lag_of_largest_s"]]
+    bound = found.bound_if_independent
+    levels, marks = [-bound, 0.0, bound], [found.lag_of_largest_s]
     chart = _correlation_layers(_thinned(label, found), label, marks_s=marks, levels=levels, title=title)
     return chart.properties(description=f"Correlation of {second.words} with {first.words} against the lag.")
 
 
-def spectrum_chart(name: SignalName, spectrum: Json, *, title: str = "") -> alt.LayerChart:
-    """Power spectral density with its 95 % confidence band, both axes logarithmic; from ``spectrum`` of the JSON."""
+def spectrum_chart(name: SignalName, spectrum: Spectrum, *, title: str = "") -> alt.LayerChart:
+    """Power spectral density with its 95 % confidence band, both axes logarithmic."""
     keys = {"x": "frequency_hz", "v": "density", "low": "low", "high": "high"}
-    columns = {name: vector(spectrum[key]) for name, key in keys.items()}
+    columns = {name: getattr(spectrum, key) for name, key in keys.items()}
     kept = thin_line([np.log10(np.maximum(columns["v"], np.finfo(float).tiny))], LINE_SAMPLES)
     label = name.words
     rows = records(label, {name: values[kept] for name, values in columns.items()})
@@ -84,15 +81,14 @@ def spectrum_chart(name: SignalName, spectrum: Json, *, title: str = "") -> alt.
     )
 
 
-def transfer_chart(source: SignalName, result: SignalName, transfer: Json, *, title: str = "") -> alt.VConcatChart:
+def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer, *, title: str = "") -> alt.VConcatChart:
     """Gain (1/s), phase and coherence against frequency; gain and phase with 95 % intervals, where coherence is
-    above chance; from ``rudder_to_yaw_rate`` of the JSON."""
-    keys = ("frequency_hz", "gain_per_s", "phase_rad", "half_width_95", "coherence")
-    frequency, gain, phase, half_width, coherence_of = (vector(transfer[key]) for key in keys)
-    sure = np.flatnonzero(transfer["sure"])
+    above chance."""
+    frequency, gain, phase, coherence_of = transfer.frequency_hz, transfer.gain, transfer.phase_rad, transfer.coherence
+    sure = np.flatnonzero(transfer.sure)
     kept = sure[thin_points([np.log10(gain[sure]), phase[sure]], POINT_SAMPLES)]
     # A wider interval than a whole gain only stretches the axis.
-    error = np.minimum(half_width[kept], 1.0)
+    error = np.minimum(transfer.half_width_95[kept], 1.0)
     gain, phase, half = gain[kept], np.rad2deg(phase[kept]), np.rad2deg(error)
     label = f"{source.words} to {result.words}"
     gains = records(
@@ -105,7 +101,7 @@ def transfer_chart(source: SignalName, result: SignalName, transfer: Json, *, ti
     panels = [
         _points_panel(gains, span, axis_above(with_unit("gain", "1/s"), format="~g"), alt.Scale(type="log")),
         _points_panel(phases, span, axis_above(_PHASE, values=[-180, -90, 0, 90, 180]), alt.Scale(domain=[-180, 180])),
-        _coherence_panel(coherence, span, transfer["coherence_by_chance"]),
+        _coherence_panel(coherence, span, transfer.coherence_by_chance),
     ]
     return stacked(
         [panel.properties(width=_SIZE_PX[0], height=150) for panel in panels],
@@ -114,10 +110,9 @@ def transfer_chart(source: SignalName, result: SignalName, transfer: Json, *, ti
     )
 
 
-def effect_chart(label: str, effect: Json, *, title: str = "") -> alt.VConcatChart:
-    """Gain (dB), phase (deg) and group delay (s) of a filter against frequency; from ``filter`` of the JSON."""
-    keys = ("frequency_hz", "gain", "phase_rad", "group_delay_s")
-    frequency, gain, phase, delay = (vector(effect[key]) for key in keys)
+def effect_chart(label: str, effect: FilterEffect, *, title: str = "") -> alt.VConcatChart:
+    """Gain (dB), phase (deg) and group delay (s) of a filter against frequency."""
+    frequency, gain, phase, delay = effect.frequency_hz, effect.gain, effect.phase_rad, effect.group_delay_s
     decibel = np.maximum(20.0 * np.log10(np.maximum(gain, 1e-30)), _LEAST_DECIBEL)
     # Where nothing passes, the phase is that of rounding.
     phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(phase), np.nan)
@@ -132,8 +127,8 @@ def effect_chart(label: str, effect: Json, *, title: str = "") -> alt.VConcatCha
     return stacked(panels, title=title, description=f"Gain, phase and group delay of {label}.")
 
 
-def _thinned(label: str, correlation: Json) -> list[ChartRecord]:
-    lag, coefficient = vector(correlation["lag_s"]), vector(correlation["coefficient"])
+def _thinned(label: str, correlation: Autocorrelation | Correlation) -> list[ChartRecord]:
+    lag, coefficient = correlation.lag_s, correlation.coefficient
     kept = thin_line([coefficient], LINE_SAMPLES)
     return records(label, {"x": lag[kept], "v": coefficient[kept]})
 

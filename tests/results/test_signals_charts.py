@@ -2,14 +2,12 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.files import plain_json
 from tank2sim.records.signals.analysis import SignalSettings, analyse
-from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.correlation import autocorrelation, cross_correlation
 from tank2sim.records.signals.filtering import FilterType, butterworth
 from tank2sim.records.signals.spectra import spectrum, transfer_function
-from tank2sim.report.signals.charts import (
+from tank2sim.results.signals_charts import (
     autocorrelation_chart,
     cross_correlation_chart,
     density_chart,
@@ -29,9 +27,8 @@ def rate():
 
 @pytest.fixture(scope="module")
 def column(rate):
-    """A yaw rate in the JSON."""
-    found = analyse(trial(rate.time_s, r_radps=rate.values), SignalSettings())
-    return plain_json(analysis_as_json(found))["columns"]["r_degps"]
+    """A yaw rate in the study."""
+    return analyse(trial(rate.time_s, r_radps=rate.values), SignalSettings()).columns["r_degps"]
 
 
 def panels(chart):
@@ -46,7 +43,7 @@ def rows(specification, panel, mark):
 
 
 def test_the_density_is_in_degrees_and_its_area_is_one(column):
-    specification, (panel,) = panels(density_chart(YAW, column["probability_density"]))
+    specification, (panel,) = panels(density_chart(YAW, column.probability_density))
     points, encoding = rows(specification, panel, "line")
     assert encoding["x"]["title"] == "yaw rate (deg/s)"
     assert encoding["y"]["title"] == "probability density (1/(deg/s))"
@@ -59,7 +56,7 @@ def test_the_density_is_in_degrees_and_its_area_is_one(column):
 
 def test_the_spectrum_is_in_degrees_with_its_band(rate, column):
     found = spectrum(rate)
-    specification, (panel,) = panels(spectrum_chart(YAW, column["spectrum"]))
+    specification, (panel,) = panels(spectrum_chart(YAW, column.spectrum))
     points, encoding = rows(specification, panel, "line")
     assert encoding["x"]["title"] == "frequency (Hz)"
     assert encoding["y"]["title"] == "power density ((deg/s)²/Hz)"
@@ -73,15 +70,13 @@ def test_the_spectrum_is_in_degrees_with_its_band(rate, column):
 
 
 def test_the_correlation_time_and_the_lag_of_the_largest_are_marked(rate, column):
-    text = str(chart_specification(autocorrelation_chart(YAW, column)))
+    text = str(chart_specification(autocorrelation_chart(YAW, column.autocorrelation)))
     assert f"'x': {autocorrelation(rate).correlation_time_s:.6g}" in text
     later = series(np.roll(rate.values, 30))
     crossed = cross_correlation(rate, later)
-    found = {"lag_s": crossed.lag_s, "coefficient": crossed.coefficient, "bound_if_independent": crossed.bound}
-    found["lag_of_largest_s"] = crossed.largest[0]
-    text = str(chart_specification(cross_correlation_chart(RUDDER, YAW, found, title="")))
+    text = str(chart_specification(cross_correlation_chart(RUDDER, YAW, crossed, title="")))
     assert "'x': 3.0}" in text
-    assert f"'v': {crossed.bound:.6g}" in text
+    assert f"'v': {crossed.bound_if_independent:.6g}" in text
 
 
 def test_gain_and_phase_of_the_ship_are_drawn_where_they_are_sure():
@@ -89,8 +84,8 @@ def test_gain_and_phase_of_the_ship_are_drawn_where_they_are_sure():
     rate = nomoto(rudder, 0.1, 0.08, 3.0)
     found = transfer_function(series(rudder, name="delta_rad"), series(rate))
     steered = trial(series(rate).time_s, delta_rad=rudder, r_radps=rate)
-    content = plain_json(analysis_as_json(analyse(steered, SignalSettings())))
-    specification, drawn = panels(transfer_chart(RUDDER, YAW, content["rudder_to_yaw_rate"]))
+    steering = analyse(steered, SignalSettings()).rudder_to_yaw_rate
+    specification, drawn = panels(transfer_chart(RUDDER, YAW, steering.transfer))
     titles = [panel["layer"][0]["encoding"]["y"]["axis"]["title"] for panel in drawn]
     assert titles == ["gain (1/s)", "phase (deg), below zero: later", "coherence; dotted: by chance"]
     gains, _ = rows(specification, drawn[0], "point")
@@ -104,7 +99,7 @@ def test_gain_and_phase_of_the_ship_are_drawn_where_they_are_sure():
 
 def test_what_a_filter_does_is_drawn_in_decibel_degrees_and_seconds(rate):
     effect = butterworth(rate, FilterType.LOW, [0.5], causal=True).effect
-    specification, drawn = panels(effect_chart("lowpass:0.5,causal", plain_json(effect_as_json(effect))))
+    specification, drawn = panels(effect_chart("lowpass:0.5,causal", effect))
     titles = [panel["layer"][0]["encoding"]["y"]["axis"]["title"] for panel in drawn]
     assert titles == ["gain (dB)", "phase (deg), below zero: later", "group delay (s)"]
     gain, phase, delay = (rows(specification, panel, "line")[0] for panel in drawn)
