@@ -111,14 +111,6 @@ def test_the_tiles_of_coefficients_say_whether_the_trials_held_out_are_followed_
     assert (tile.value, tile.verdict) == (f"0.997 → {found:g}", verdict) and tile.note.startswith(reported)
 
 
-def test_a_unit_that_is_in_the_key_above_is_that_of_each_value_below():
-    values = {"energy_least_squares": 0.03022, "two_intervals": 0.027}
-    method = {"added_inertia_kgm2": 0.03022, "added_inertia_standard_error_kgm2": 0.00016}
-    result = {"records": ["rig.csv"], "added_inertia_kgm2": values, "methods": {"energy_least_squares": method}}
-    page = result_page(result, "r.json")
-    assert [row[-1] for row in section(page, "Added inertia").tables[0].rows] == ["kg m²", "kg m²"]
-
-
 def test_few_rows_of_many_columns_are_turned_and_what_nobody_knows_is_left_out():
     keys = [f"length_{place}_m" for place in range(12)]
     one = dict.fromkeys(keys, 1.5) | {"nowhere": None, "empty": []}
