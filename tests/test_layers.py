@@ -33,7 +33,7 @@ KNOWN_CIRCLES = (
     {"audit", "signals", "trial"},
     {
         *("ship", "autopilot", "bridge", "craft_stability", "fmu", "glide", "influence"),
-        *("manoeuvre", "stability", "steering_page", "turn_tuning"),
+        *("manoeuvre", "stability", "steering_page", "turn_tuning", "verbs", "bundled_ships"),
     },
 )
 """Modules of ``api`` that still import each other: to be removed with the results that ``Ship`` imports."""

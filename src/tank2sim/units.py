@@ -77,6 +77,7 @@ _WRITTEN = {
     "Nm": "N m",
     "Hz": "Hz",
     "kg": "kg",
+    "kn": "kn",
     "kN": "kN",
     "m2": "m²",
     "m3": "m³",

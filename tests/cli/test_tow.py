@@ -26,7 +26,7 @@ def test_tow_by_tow_models_and_page(tmp_path) -> None:
 
 
 def test_a_force_that_varies_and_a_known_mass(tmp_path) -> None:
-    arguments = ("--force-polynomial", "11.63,0.001", "--total-mass-kg", "2800", "--terms", "B3", "--json", "t.json")
+    arguments = ("--force-N", "11.63,0.001", "--total-mass-kg", "2800", "--terms", "B3", "--json", "t.json")
     result = tank2sim("tow", TOWS, *arguments, cwd=tmp_path)
     assert result.returncode == 0 and "T = 11.63 + 0.001 t N" in result.stdout, result.stderr
     found = json.loads((tmp_path / "t.json").read_text())
@@ -37,9 +37,9 @@ def test_a_force_that_varies_and_a_known_mass(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--force-polynomial", "11.63,fast"], ["--force-polynomial", "fast"]),
-        (["--force-polynomial", "11.63", "--force-N", "11.63"], ["--force-polynomial", "--force-N"]),
-        (["--force-polynomial", "1,-1"], ["--force-polynomial", "50 s"]),
+        (["--force-N", "11.63,fast"], ["--force-N", "fast"]),
+        (["--force-N", "11.63", "--force-N", "11.63"], ["--force-N", "--force-N"]),
+        (["--force-N", "1,-1"], ["--force-N", "50 s"]),
         (["--total-mass-kg", "0"], ["--total-mass-kg"]),
         (["--length-m", "-3"], ["--length-m"]),
     ],

@@ -30,7 +30,7 @@ def write_controller(
     result: AutopilotResult | CraftAutopilotResult,
     path: Path,
     *,
-    fmi: Literal[2, 3] = 3,
+    fmi: Literal[2, 3] = 2,
     verify: bool = False,
     report: Progress = lambda _: None,
 ) -> AutopilotResult | CraftAutopilotResult:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from tank2sim.bundled import bundled_cards
-from tank2sim.cards import read_card
-from tank2sim.results.ships import BundledShip, BundledShips, ShipsResult
+from typing import TYPE_CHECKING
+
+from tank2sim.api.verbs import verb
+
+if TYPE_CHECKING:
+    from tank2sim.results.ships import ShipsResult
 
 
+@verb("the bundled ships, by the names that CARD takes")
 def list_ships() -> ShipsResult:
-    """The bundled ships, by the names that :func:`.load` takes."""
+    """List the bundled ships, by the names that CARD takes."""
+    from tank2sim.bundled import bundled_cards
+    from tank2sim.cards import read_card
+    from tank2sim.results.ships import BundledShip, BundledShips, ShipsResult
+
     cards = {name: read_card(path) for name, path in bundled_cards().items()}
     ships = tuple(
         BundledShip(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
@@ -669,7 +669,13 @@ class Ship:
 
     @checked
     def to_fmu(
-        self, path: str | Path, *, fmi: int = 3, platforms: str = "host", sources: bool = True, osp: bool = False
+        self,
+        path: str | Path,
+        *,
+        fmi: Literal[2, 3] = 2,
+        platforms: str = "host",
+        sources: bool = True,
+        osp: bool = False,
     ) -> ExportResult:
         """Write the FMU (Model Exchange and Co-Simulation).
 

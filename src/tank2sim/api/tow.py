@@ -4,19 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
-from numpy.polynomial import Polynomial
+from tank2sim.api.verbs import Output, verb
+from tank2sim.arguments import NumberArgument
+from tank2sim.errors import ArgumentError
+from tank2sim.files import CARD
 
-from tank2sim.api.bounds import NumberArgument, checked
-from tank2sim.errors import InputError
-from tank2sim.identification.tow.identify import TOW_METHODS, identify_tow, parse_terms
-from tank2sim.identification.tow.output_error import TowOptions
-from tank2sim.identification.tow.study import study_tows, towed_body
-from tank2sim.records.tows import read_tows
-from tank2sim.results.tow import TowResult
+if TYPE_CHECKING:
+    from tank2sim.results.tow import TowResult
 
 
-@checked
+def _parsed_force(text: str) -> float | list[float]:
+    try:
+        coefficients = [float(part) for part in text.split(",")]
+    except ValueError:
+        remedy = "give a force in N, or coefficients in rising powers of t with commas between: 11.6,-0.02"
+        raise ArgumentError("force_N", text, "is not a force", remedy) from None
+    return coefficients[0] if len(coefficients) == 1 else coefficients
+
+
+@verb(
+    "surge mass and drag from accelerating tows",
+    Output("-o", CARD, "Write a surge card.", lambda result, path: result.card.files(path), "CARD.toml"),
+    texts={"force_N": _parsed_force},
+)
 def tow(
     tows: str | Path,
     *,
@@ -28,7 +40,7 @@ def tow(
     length_m: NumberArgument | None = None,
     beam_m: NumberArgument | None = None,
     volume_m3: NumberArgument | None = None,
-    method: str = "output_error",
+    method: Literal["paper", "qr", "output_error"] = "output_error",
     name: str | None = None,
 ) -> TowResult:
     """Estimate M and the drag of M dv/dt + B1 v^4 + B2 v^3 + B3 v^2 = T from tows from rest (Wilinski & Zellman 1984).
@@ -39,7 +51,7 @@ def tow(
         CSV file with ``t_s`` and the speeds ``speed_1_mps``, ...
     force_N : float or sequence of float, optional
         Towing force T, N: a constant, or the coefficients of a polynomial of the time since the release in rising
-        powers (N, N/s, ...); by default that in the file.
+        powers (N, N/s, ...; on the command line with commas between); by default that in the file.
     mass_kg : float, optional
         Mass m with the water inside, kg; by default that in the file.
     terms : str or sequence of str
@@ -48,11 +60,14 @@ def tow(
         The body starts late, by a time that the output error estimates.
     total_mass_kg : float, optional
         Hold M at this value and estimate the drag alone.
-    length_m, beam_m, volume_m3 : float, optional
-        Size of the body, for drag coefficients and the mass by theory; by default that in the file, and the volume of
-        a body that floats.
+    length_m : float, optional
+        Length, for drag coefficients; by default that in the file.
+    beam_m : float, optional
+        Breadth, for the mass by theory; by default that in the file.
+    volume_m3 : float, optional
+        Volume; by default that in the file, or the volume of a body that floats.
     method : str
-        Method whose numbers the card gets: ``paper``, ``qr`` or ``output_error``.
+        Method whose numbers the card gets.
     name : str, optional
         Name of the body on the card; by default that of the file.
 
@@ -69,8 +84,14 @@ def tow(
     >>> found.mass_range_kg[0] < found.total_mass_kg < found.mass_range_kg[1]
     True
     """
-    if method not in TOW_METHODS:
-        raise InputError("--method", "", f"{method!r} is not known", f"there are: {', '.join(TOW_METHODS)}")
+    from numpy.polynomial import Polynomial
+
+    from tank2sim.identification.tow.identify import identify_tow, parse_terms
+    from tank2sim.identification.tow.output_error import TowOptions
+    from tank2sim.identification.tow.study import study_tows, towed_body
+    from tank2sim.records.tows import read_tows
+    from tank2sim.results.tow import TowResult
+
     read = read_tows(tows)
     force = force_N if force_N is None or isinstance(force_N, int | float) else Polynomial(list(force_N))
     chosen = parse_terms(terms if isinstance(terms, str) else ",".join(terms) or "none")

@@ -21,6 +21,21 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
+class Written:
+    """Mark of an argument that names a file to be written: the ``files`` of the result hold its content.
+
+    Parameters
+    ----------
+    endings : tuple of str, optional
+        As of :class:`Output`.
+    metavar : str
+    """
+
+    endings: tuple[str, ...] | None
+    metavar: str = "FILE"
+
+
+@dataclass(frozen=True)
 class Output:
     """A file that a command can write of its result, in addition to page, pictures and JSON.
 

@@ -75,9 +75,14 @@ COMMANDS = {name: words for group in GROUPS.values() for name, words in group.it
 
 VERBS = {
     "autopilot": "api.autopilot:autopilot",
+    "check": "api.fmu:check_fmu",
     "convention": "api.convention:convention",
     "convert": "api.conversion:convert",
     "design": "api.design:design_campaign",
+    "export": "api.fmu:make_fmu_file",
+    "guess": "api.guess:guess",
+    "ships": "api.bundled_ships:list_ships",
+    "tow": "api.tow:tow",
 }
 """Commands that are derived from their function."""
 

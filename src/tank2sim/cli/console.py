@@ -136,8 +136,8 @@ def write_outputs(
         A file cannot be written, is an input or is given twice.
     """
     contents = dict(files)
+    screen.stderr = json is STANDARD_OUTPUT  # then standard output is JSON and nothing else
     if json:
-        screen.stderr = json is STANDARD_OUTPUT  # then standard output is JSON and nothing else
         contents[json] = result.to_json()
     if page:
         contents[page] = result.page()

@@ -17,7 +17,7 @@ from click.core import ParameterSource
 from docstring_parser import Docstring, DocstringStyle, parse
 
 from tank2sim import arguments
-from tank2sim.api.verbs import Output, Verb
+from tank2sim.api.verbs import Output, Verb, Written
 from tank2sim.cli.options import OutputFile
 from tank2sim.errors import InputError
 from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled
@@ -86,7 +86,7 @@ def command_of(name: str, verb: Verb) -> click.Command:
             own.setdefault(parameter.name, parameter)
     flags = [_option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.") for flag, other in others.items()]
     documented, _ = _documented(verb.function)
-    main = [] if any(output.option == "-o" for output in verb.outputs) else ["-o"]
+    main = [] if any("-o" in parameter.opts for parameter in own.values()) else ["-o"]
     shared = [
         _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page."),
         _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, .pdf),"
@@ -149,7 +149,7 @@ def _parts(kind: Any) -> list[Any]:
 def _several(kind: Any) -> Any:
     """The sequence among the alternatives of a type that takes several words; None without one."""
     parts = _parts(kind)
-    words = str in parts or Path in parts
+    words = any(one in parts for one in (str, Path, float, int))
     sequences = [part for part in parts if get_origin(part) is Sequence]
     return next((one for one in sequences if not words or {str, Path} & set(_parts(get_args(one)[0]))), None)
 
@@ -168,10 +168,17 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         required = one.default is inspect.Parameter.empty
         card = click.Argument([one.name], metavar="CARD", required=required)
         return [card, change] if required else [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+    if written := _written(kind):
+        output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
+        required = one.default is inspect.Parameter.empty
+        return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
+                        required=required)]  # fmt: skip
     if one.kind is not inspect.Parameter.KEYWORD_ONLY and one.default is inspect.Parameter.empty:
         nargs = -1 if several else 1
         return [click.Argument([one.name], nargs=nargs, required=True, type=_type(kind, several))]
     default = None if one.default in (inspect.Parameter.empty, None) else one.default
+    if several and isinstance(default, str):
+        default = (default,)
     words = "; ".join(f"{choice}: {text}" for choice, text in verb.choices.get(one.name, {}).items())
     shown: dict[str, Any] = {"help": " ".join(filter(None, (helps.get(one.name), words))), "default": default}
     stem, unit = _stem(one.name)
@@ -186,6 +193,12 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
     metavar = unit.upper().replace("/", "P") if unit else None
     shown["show_default"] = default not in (None, "", ())
     return [_option(names, name=one.name, type=_type(kind, several), multiple=bool(several), metavar=metavar, **shown)]
+
+
+def _written(kind: Any) -> Written | None:
+    """The mark of an argument that names a file to be written."""
+    marks = (mark for part in _parts(kind) if get_origin(part) is Annotated for mark in get_args(part))
+    return next((mark for mark in marks if isinstance(mark, Written)), None)
 
 
 def _stem(name: str) -> tuple[str, str]:
@@ -250,6 +263,8 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             call["report"] = stack.enter_context(showing_stages(verb.words))
         result = verb.function(**call)
         contents: dict[Path, str | bytes] = {}
+        if any(_written(kind) for _, kind in _arguments(verb.function)):
+            contents |= result.files
         for output in verb.outputs:
             if (path := _value_of(output, values)) is None:
                 continue
@@ -296,7 +311,8 @@ def _values_for(
             value = texts[one.name](value)
         elif _literal(kind):
             value = next(choice for choice in _literal(kind) if str(choice) == value)
-        inputs += [path for path in (value if isinstance(value, tuple) else (value,)) if isinstance(path, Path)]
+        if not _written(kind):
+            inputs += [path for path in (value if isinstance(value, tuple) else (value,)) if isinstance(path, Path)]
         call[one.name] = value
     return call
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
@@ -93,7 +93,7 @@ class ResultWithController(Result[_S]):
         self,
         path: str | Path,
         *,
-        fmi: int = 3,
+        fmi: Literal[2, 3] = 2,
         verify: bool = False,
         report: Callable[[str], None] = lambda _: None,
     ) -> Self:
@@ -136,7 +136,7 @@ class ResultWithController(Result[_S]):
         )
         return replace(self, study=replace(self.study, export=export), files={Path(path): made.content})
 
-    def to_fmu(self, path: str | Path, *, fmi: int = 3, verify: bool = False) -> Self:
+    def to_fmu(self, path: str | Path, *, fmi: Literal[2, 3] = 2, verify: bool = False) -> Self:
         """Write the FMU of the controller, and return the result with it.
 
         Parameters

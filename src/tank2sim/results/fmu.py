@@ -13,6 +13,9 @@ from tank2sim.answer.result import Result
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.export import ExportedFmu
 
+MOST_PROBLEMS = 8
+"""Problems that the screen shows. Project choice: they fit under the table."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ExportStudy:
@@ -157,8 +160,10 @@ class CheckResult(Result[CheckReport]):
         report, sections = self.study, []
         if self.problems:
             rows: list[list[Cell]] = [[problem] for problem in self.problems]
-            listed = table("Problems", ["problem"], rows, on_screen=False)
-            sections.append(Section(heading="Problems", tables=[listed]))
+            first = table(f"Problems, {MOST_PROBLEMS} of {len(rows)}", ["problem"], rows[:MOST_PROBLEMS])
+            listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
+            tables = [listed] if listed.on_screen else [first, listed]
+            sections.append(Section(heading="Problems", tables=tables))
         if not report.errors:
             return sections
         rows = [[name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error]
