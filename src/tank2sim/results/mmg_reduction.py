@@ -125,7 +125,7 @@ class MmgReductionResult(Result[MmgStudy]):
             title = "Certainty of the coefficients"
             certainty = [Illustration(chart=derivative_certainty_chart(known, title=title))]
         readings = [
-            Illustration(chart=computed_chart(name, readings), half=True, name=_CHANNELS[name].replace(" ", "_"))
+            Illustration(chart=computed_chart(name, readings), half=True)
             for name, readings in self.study.readings.items()
         ]
         return [
