@@ -18,6 +18,11 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "convention": ("results.convention:ConventionResult",),
     "convert": ("results.conversion:ConversionResult",),
     "export": ("results.fmu:ExportResult",),
+    "influence": (
+        "results.influence:InfluenceResult",
+        "results.steering_models:SteeringModelsResult",
+        "results.turn_tuning:TurnTuningResult",
+    ),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "ships": ("results.ships:ShipsResult",),
     "tow": ("results.tow:TowResult",),

@@ -43,7 +43,6 @@ _GAP_NOTE = (
 
 RESULT_TYPES = (
     ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
-    ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType(
         "Captive campaign, designed", "design", ("usual_matrix", "certainty", "runs"), ("hours_for_usual_certainty",)
     ),
@@ -58,8 +57,6 @@ RESULT_TYPES = (
     ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Underwater glider", "glide", ("glider", "states"), ()),
-    ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
-    ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
     ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),

@@ -14,12 +14,10 @@ from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.glide.page import glide_page
 from tank2sim.report.identification.page import identification_page
-from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
 from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.signals.page import signals_page
-from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
 from tank2sim.report.yaw.page import yaw_page
 
@@ -62,10 +60,6 @@ _PAGES: Mapping[str, _Page] = {
     "Underwater glider": _Page(
         glide_page, {"source": str, "states": list, "design": dict, "polar": dict, "notices": list}
     ),
-    "Steering catalogue": _Page(
-        steering_catalogue_page,
-        {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
-    ),
     "Validation": _Page(
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
@@ -97,9 +91,6 @@ _PAGES: Mapping[str, _Page] = {
         | {"cautions": list, "notices": list},
     ),
     "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
-    "Influence coefficients": _Page(
-        influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
-    ),
 }
 """Subjects whose whole page is made of their JSON."""
 
