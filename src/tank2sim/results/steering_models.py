@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from tank2sim.analysis.catalogue.comparison import SteeringComparison
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
 from tank2sim.answer.charts.motion import TrackData, track_chart
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.cards.steering_card import SteeringCard
 from tank2sim.results.steering_models_charts import influence_bars, steering_diagram_chart
@@ -121,21 +121,20 @@ class SteeringModelsResult(Result[SteeringComparison]):
 
     def _turning(self) -> Section:
         study = self.study
-        rows: list[list[Cell]] = [
-            [study.titles[model], turn.rudder_deg, turn.radius_m, turn.yaw_rate_degpmin, turn.drift_deg]
+        points = study.diagrams.points
+        fields = ("rudder_deg", "radius_m", "yaw_rate_degpmin", "drift_deg")
+        tables = [
+            records_table(f"Steady turns, {study.titles[model]}", turns, fields=fields)
             for model, turns in study.steady_turns.items()
             if model in study.manoeuvres
-            for turn in turns
         ]
-        points = study.diagrams.points
-        heads = ("model", "rudder (deg)", "radius (m)", "yaw rate (deg/min)", "drift (deg)")
         chart = steering_diagram_chart(study.diagrams)
         return Section(
             heading="Steady turning",
             text="The speed of each model does not fall in the turn. Its steady turns are followed from the straight "
             "course, so they are those that the ship reaches.",
             charts=[Illustration(chart=chart, caption="Lines: models. Points: known turns.")],
-            tables=[table("Steady turns", heads, rows)],
+            tables=tables,
             notes=[f"{point.label}: {point.source}" for point in points if point.radius_measured],
         )
 
