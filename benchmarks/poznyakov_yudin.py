@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from dataclasses import asdict
 
 from paper_numbers import PaperNumbers
 
@@ -75,9 +76,11 @@ def main() -> int:
     print("Tuning to the trial points, 47 deg/min at 15 deg and 61 deg/min at 35 deg")
     found = tuned(card, "inoue-hirano")
     if isinstance(found, TwoPointTuning):
-        rates = ", ".join(f"{60 * math.degrees(turn.yaw_rate_radps):.2f}" for turn in found.after)
-        print(f"  hull factor {found.hull:.4f}, rudder factor {found.rudder:.4f}: {rates} deg/min;", end=" ")
-        print(f"stable on a straight course: before {found.stable_before}, after {found.stable_after}")
+        rates = ", ".join(f"{turn.yaw_rate_degpmin:.2f}" for turn in found.after)
+        print(
+            f"  hull factor {found.hull_factor:.4f}, rudder factor {found.rudder_factor:.4f}: {rates} deg/min;", end=" "
+        )
+        print(f"stable on a straight course: before {found.course_stable_before}, after {found.course_stable_after}")
     print("Missing")
     for name, told in missing_of(card).items():
         for words in told:
@@ -99,11 +102,11 @@ def turning(card: SteeringCard, report: PaperNumbers) -> None:
         report.heading(f"Table 1, {card.models[name].title}")
         for place, turn in enumerate(turns_of(card, name, RUDDERS).turns):
             for key, values in printed.items():
-                report(f"{RUDDERS[place]:2} deg, {key}", values[place], turn.as_json()[key], TOLERANCES[key])
+                report(f"{RUDDERS[place]:2} deg, {key}", values[place], asdict(turn.in_degrees())[key], TOLERANCES[key])
             speed = turn.radius_m * turn.yaw_rate_radps
             report(f"{RUDDERS[place]:2} deg, radius times yaw rate, m/s", 7.7, speed, 0.01)
     report.heading("Fig. 1, curve 3 with its printed coefficients: yaw rate, deg/min, beside the trials'")
-    at_15, at_35 = (turn.as_json()["yaw_rate_degpmin"] for turn in turns_of(card, "curve-3", (15, 35)).turns)
+    at_15, at_35 = (turn.in_degrees().yaw_rate_degpmin for turn in turns_of(card, "curve-3", (15, 35)).turns)
     report("15 deg", 47.0, at_15, None, "the printed coefficients give 38")
     report("35 deg", 61.0, at_35, 0.6)
     drop = "the trials' 424 m at 20 deg and 61 deg/min at 35 deg need a loss of speed, which the models lack"

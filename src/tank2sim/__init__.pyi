@@ -30,8 +30,6 @@ from .api.gap import find_gap as find_gap
 from .api.guess import guess as guess
 from .api.identification import IdentificationResult as IdentificationResult
 from .api.identification import identify as identify
-from .api.influence import InfluenceResult as InfluenceResult
-from .api.influence import TuningResult as TuningResult
 from .api.log import LogResult as LogResult
 from .api.log import log as log
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
@@ -44,16 +42,12 @@ from .api.ship import load as load
 from .api.ship import ships as ships
 from .api.signals import signals as signals
 from .api.steering_models import (
-    SteeringModelsResult as SteeringModelsResult,
-)
-from .api.steering_models import (
     steering_models as steering_models,
 )
 from .api.steering_page import SteeringPageResult as SteeringPageResult
 from .api.tow import tow as tow
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
-from .api.turn_tuning import TurnTuningResult as TurnTuningResult
 from .api.validation import ValidationResult as ValidationResult
 from .api.validation import validate as validate
 from .api.yaw import simulate_yaw as simulate_yaw
@@ -71,13 +65,17 @@ from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
+from .results.influence import InfluenceResult as InfluenceResult
+from .results.influence import TuningResult as TuningResult
 from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult
 from .results.signals import SignalsResult as SignalsResult
 from .results.stability import StabilityResult as StabilityResult
+from .results.steering_models import SteeringModelsResult as SteeringModelsResult
 from .results.tow import TowResult as TowResult
+from .results.turn_tuning import TurnTuningResult as TurnTuningResult
 from .results.yaw import YawResult as YawResult
 
 __version__: str

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -14,12 +12,10 @@ from tank2sim.analysis.stability.imo import limits_of
 from tank2sim.arrays import Columns
 from tank2sim.dynamics.model import Model
 from tank2sim.marks import CHECK
+from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run
 from tank2sim.simulation.trial_file import histories
-
-ReadFigures = dict[str, float | list[float] | None]
-"""Manoeuvring figures by name with unit: a number, several in their order, or None where the run does not show it."""
 
 _LEAST_DEG, _MOST_DEG = 5.0, 45.0
 """Rudder angles that are ordered in manoeuvres, where the card states no largest one: IMO MSC.137(76) has 10 to 35 deg,
@@ -30,7 +26,7 @@ spirals go down to 5. Project choice."""
 class OtherSide:
     """Figures and motion of the pull-out from the other side."""
 
-    figures: ReadFigures
+    figures: Figures
     histories: Columns
 
 
@@ -66,7 +62,7 @@ class ManoeuvreStudy:
     length_m: float | None
     beam_m: float | None
     manoeuvre: str
-    figures: ReadFigures
+    figures: Figures
     limits: dict[str, float]
     left_card_range_s: float | None
     left_card_range_by: str
@@ -106,14 +102,14 @@ def study_manoeuvre(
     """
     other = None
     if other_side is not None:
-        other = OtherSide(_read(other_side.figures), histories(other_side.trajectory))
+        other = OtherSide(other_side.figures, histories(other_side.trajectory))
     reading = run.reading
     return ManoeuvreStudy(
         ship=model.name,
         length_m=getattr(particulars, "length_m", None),
         beam_m=getattr(particulars, "beam_m", None),
         manoeuvre=words,
-        figures=_read(run.figures),
+        figures=run.figures,
         limits={} if words.startswith("file:") else limits_of(parse_manoeuvre(words), model),
         left_card_range_s=reading.exit_s,
         left_card_range_by=reading.how,
@@ -122,10 +118,6 @@ def study_manoeuvre(
         notices=tuple(dict.fromkeys([*_doubt_of_radians(run), *run.notices])),
         other_side=other,
     )
-
-
-def _read(figures: Mapping[str, Any]) -> ReadFigures:
-    return dict(figures)
 
 
 def _doubt_of_radians(run: Run) -> list[str]:

@@ -20,6 +20,11 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),
     "export": ("results.fmu:ExportResult",),
     "glide": ("results.glide:GlideResult",),
+    "influence": (
+        "results.influence:InfluenceResult",
+        "results.steering_models:SteeringModelsResult",
+        "results.turn_tuning:TurnTuningResult",
+    ),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),

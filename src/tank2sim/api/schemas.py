@@ -36,16 +36,6 @@ class _Keys(_Part):
     schema: str
 
 
-class BandKeys(_Part):
-    """Quantiles over the members of an ensemble, and how many members show the figure."""
-
-    p5: JsonNumber
-    p50: JsonNumber
-    p95: JsonNumber
-    shown_by: int
-    standard_deviation: NotRequired[JsonNumber]
-
-
 class ImoKeys(_Part):
     """A criterion of IMO MSC.137(76), the worse of starboard and port."""
 
@@ -58,17 +48,6 @@ class ImoKeys(_Part):
     passed: bool | None
     margin: JsonNumber
     margin_percent: JsonNumber
-
-
-class EnsembleKeys(_Part):
-    """Members of an ensemble, and the bands of figures over them."""
-
-    members: int
-    seed: int
-    usable: int
-    unusable: dict[str, int]
-    notices: list[str]
-    figures: dict[str, BandKeys]
 
 
 class ComparedFigureKeys(_Part):
@@ -439,52 +418,6 @@ class DemoKeys(_Keys):
     files: list[str]
 
 
-class InfluenceKeys(_Keys):
-    """Sensitivity of figures to the numbers of a card, in per cent for 10 %; a tuning where one was asked for."""
-
-    ship: str
-    standard_errors: str
-    figures: dict[str, dict[str, Any]]
-    parameters: dict[str, dict[str, Any]]
-    influence_percent: dict[str, dict[str, Any]]
-    agreed: NotRequired[dict[str, Any]]
-    tuned: NotRequired[dict[str, Any]]
-    ensemble: NotRequired[EnsembleKeys]
-    notices: list[str]
-
-
-class SteeringModelsKeys(_Keys):
-    """The models of a steering card compared."""
-
-    ship: str
-    main_model: str
-    rudder_deg: float
-    steady_turns: dict[str, list[dict[str, JsonNumber]]]
-    influence: dict[str, dict[str, Any]]
-    manoeuvres: dict[str, dict[str, FigureValues]]
-    combined_predictions: dict[str, dict[str, Any]]
-    printed_influence: dict[str, Any] | None
-    influence_over_draught: dict[str, list[JsonNumber]]
-    two_point_tuning: dict[str, Any] | str | None
-    missing: dict[str, list[str]]
-    titles: dict[str, str]
-    diagrams: dict[str, Any]
-    histories: dict[str, JsonColumns]
-
-
-class TwoPointKeys(_Keys):
-    """A card tuned through two steady turns."""
-
-    hull_factor: float
-    rudder_factor: float
-    parameters: dict[str, JsonNumber]
-    before: list[dict[str, JsonNumber]]
-    after: list[dict[str, JsonNumber]]
-    course_stable_before: bool
-    course_stable_after: bool
-    notices: list[str]
-
-
 class BridgeKeys(_Keys):
     """Data of a wheelhouse poster or a pilot card."""
 
@@ -541,7 +474,6 @@ KEYS: dict[str, Any] = {
     "demo": DemoKeys,
     "gap": GapKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
-    "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
     "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,

@@ -38,15 +38,15 @@ if TYPE_CHECKING:
 
     from tank2sim.answer.result import Result
     from tank2sim.api.bridge import PilotCardResult, PosterResult
-    from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.steering_page import SteeringPageResult
-    from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.dynamics.model import Model
     from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
     from tank2sim.results.glide import GlideResult
+    from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
     from tank2sim.results.stability import StabilityResult
+    from tank2sim.results.turn_tuning import TurnTuningResult
     from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
 

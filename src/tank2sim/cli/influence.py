@@ -10,10 +10,9 @@ import click
 from tank2sim.analysis.influence.figures import forms
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN
 from tank2sim.api.bounds import TuningRange
-from tank2sim.api.influence import InfluenceResult, TuningResult
 from tank2sim.api.ship import Ship, load
-from tank2sim.api.steering_models import SteeringModelsResult, steering_models
-from tank2sim.api.turn_tuning import THROUGH_OPTION, THROUGH_REMEDY, TurnTuningResult
+from tank2sim.api.steering_models import steering_models
+from tank2sim.api.turn_tuning import THROUGH_OPTION, THROUGH_REMEDY
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.joint_variation import parse_agreed, parse_bounds
@@ -21,6 +20,9 @@ from tank2sim.cli.options import OutputFile, ensemble_options, number, page_opti
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
 from tank2sim.files import CARD
+from tank2sim.results.influence import InfluenceResult, TuningResult
+from tank2sim.results.steering_models import SteeringModelsResult
+from tank2sim.results.turn_tuning import TurnTuningResult
 
 
 @click.command("influence", cls=TakesSeveral, several=("--figure", "--tune", "--agreed", "--through"))
@@ -141,7 +143,8 @@ def command(
             _refuse("has no meaning without --tune", {"-o": output, **tuning})
             joint = parse_agreed(agreed)
             result = ship.influence(figures, joint_variation=joint, members=members or 0, seed=seed, executor=executor)
-    files = result.card.files(output) if output and isinstance(result, TuningResult | TurnTuningResult) else {}
+    card_found = result.card if output and isinstance(result, TuningResult | TurnTuningResult) else None
+    files = card_found.files(output) if output and card_found else {}
     write_result(result, [source], json_file=json_file, page=page, plot=plot, files=files)
     show_result(result)
 

@@ -100,7 +100,7 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
     @cached_property
     def figures(self) -> dict[str, float]:
         """Manoeuvring figures (ITTC 7.5-04-02-01) by name with unit; entries of lists as ``overshoot_1_deg``."""
-        return single_figures(dict(self.study.figures))
+        return single_figures(self.study.figures)
 
     @property
     def limits(self) -> dict[str, float]:

@@ -73,7 +73,7 @@ def manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
         motion = motion_of(study.histories, study.length_m, study.beam_m)
     except KeyError:  # a craft or a file without a position or a yaw rate
         return []
-    figures = single_figures(dict(study.figures))
+    figures = single_figures(study.figures)
     title = manoeuvre_title(study)
     title = title[:1].upper() + title[1:]
     bands, shaded = {}, ""

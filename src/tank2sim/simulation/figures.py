@@ -16,7 +16,8 @@ from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn,
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 
-Figures = dict[str, object]
+Figures = dict[str, float | list[float] | None]
+"""Manoeuvring figures by name with unit: a number, several in their order, or None where the run does not show it."""
 
 LOOP_HEIGHT = 0.05
 """Difference of two yaw rates at a rudder angle of a spiral, as a share of the largest rate, from which they are two

@@ -43,9 +43,9 @@ def test_known_factors_are_found_from_two_yaw_rates_of_the_mariner() -> None:
     truth = _scaled(model, levers, 1.15, 0.85)
     wanted = [WantedTurn(at, points.turn_at(at, truth)[0].yaw_rate_radps) for at in (HARD_OVER, SMALL)]
     found = tune_to_two_points(model, levers, *wanted)
-    assert (found.hull, found.rudder) == pytest.approx((1.15, 0.85), rel=1e-5)
+    assert (found.hull_factor, found.rudder_factor) == pytest.approx((1.15, 0.85), rel=1e-5)
     assert dict(found.parameters) == pytest.approx(truth, rel=1e-5)
-    assert found.stable_before and found.stable_after
+    assert found.course_stable_before and found.course_stable_after
 
 
 def test_the_tuned_ship_simulated_turns_as_wanted() -> None:
@@ -63,8 +63,8 @@ def test_an_unstable_ship_is_tuned_by_its_turn_with_the_rudder_amidships() -> No
     truth = _scaled(model, levers, 1.03, 1.05)
     wanted = [WantedTurn(at, points.turn_at(at, truth)[0].yaw_rate_radps) for at in (math.radians(5.0), 0.0)]
     found = tune_to_two_points(model, levers, *wanted)
-    assert (found.hull, found.rudder) == pytest.approx((1.03, 1.05), rel=1e-5)
-    assert not found.stable_before and not found.stable_after
+    assert (found.hull_factor, found.rudder_factor) == pytest.approx((1.03, 1.05), rel=1e-5)
+    assert not found.course_stable_before and not found.course_stable_after
 
 
 def test_the_trials_of_the_paper_are_met_only_by_a_ship_that_is_unstable() -> None:
@@ -76,9 +76,9 @@ def test_the_trials_of_the_paper_are_met_only_by_a_ship_that_is_unstable() -> No
         WantedTurn(math.radians(35), math.radians(61 / 60)),
     ]
     found = tune_to_two_points(model, levers_of_form(form), *points)
-    assert [turn.as_json()["yaw_rate_degpmin"] for turn in found.after] == pytest.approx([47, 61])
-    assert found.hull < 1 and found.rudder < 1
-    assert found.stable_before and not found.stable_after
+    assert [turn.yaw_rate_degpmin for turn in found.after] == pytest.approx([47, 61])
+    assert found.hull_factor < 1 and found.rudder_factor < 1
+    assert found.course_stable_before and not found.course_stable_after
 
 
 def test_a_steadier_hull_turns_less_and_a_better_rudder_more() -> None:
@@ -106,7 +106,9 @@ def test_a_linear_ship_meets_two_points_in_proportion_and_no_others(mariner_card
     levers = levers_of_ship(card, model)
     slope = TurningPoints(model).turn_at(0.1)[0].yaw_rate_radps / 0.1
     found = tune_to_two_points(model, levers, WantedTurn(0.2, 0.9 * slope * 0.2), WantedTurn(0.1, 0.9 * slope * 0.1))
-    assert [turn.yaw_rate_radps for turn in found.after] == pytest.approx([0.18 * slope, 0.09 * slope])
+    assert [math.radians(turn.yaw_rate_degpmin / 60) for turn in found.after] == pytest.approx(
+        [0.18 * slope, 0.09 * slope]
+    )
     with pytest.raises(InputError, match="nearly alike"):
         tune_to_two_points(model, levers, WantedTurn(0.2, 0.9 * slope * 0.2), WantedTurn(0.1, slope * 0.1))
 

@@ -122,8 +122,8 @@ def turn_inside_its_band(folder, seed):
     turn = parse_manoeuvre(TURN)
     figures = simulate(build(ship), turn).figures
     own = simulate(build(found), turn).trajectory
-    bands = manoeuvre_bands(found, turn, (None, float(own.t[-1])), EnsembleRequest(100, 1)).as_json()["figures"]
-    return [bands[name]["p5"] <= figures[name] <= bands[name]["p95"] for name in FIGURES]
+    bands = manoeuvre_bands(found, turn, (None, float(own.t[-1])), EnsembleRequest(100, 1)).figures
+    return [bands[name].p5 <= figures[name] <= bands[name].p95 for name in FIGURES]
 
 
 def found_text(text, derivatives):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from tank2sim.analysis.catalogue.tables import (
     RUDDERS_DEG,
     CombinedPrediction,
     InfluenceTable,
-    ModelTurns,
     combined_prediction,
     complete,
     draught_polynomials,
@@ -20,16 +21,16 @@ from tank2sim.analysis.catalogue.tables import (
     not_given,
     turns_of,
 )
-from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
+from tank2sim.analysis.turning.points import TurnInDegrees, TurningPoints
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_form, tune_to_two_points
-from tank2sim.arrays import Columns
-from tank2sim.cards.steering_card import PrintedInfluence, SteeringCard, SteeringPoint
+from tank2sim.arrays import Array, Columns
+from tank2sim.cards.steering_card import PrintedInfluence, SteeringCard
 from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.run import simulate
+from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 
 _TUNED = "through the two trial points"
@@ -41,15 +42,50 @@ ZIGZAG_DEG = 10.0
 
 
 @dataclass(frozen=True)
-class ModelRuns:
-    """Manoeuvres of a model: a turning circle, its figures, and those of the 10/10 zigzag."""
+class ModelFigures:
+    """Figures of the manoeuvres of a model: a turning circle and the 10/10 zigzag."""
 
-    turn: Trajectory
-    turn_figures: Figures
-    zigzag_figures: Figures
+    turn: Figures
+    zigzag: Figures
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
+class PrintedCoefficients:
+    """Influence coefficients (%) that the source prints at its last draught, and those that it confuses."""
+
+    draught_m: float
+    K_percent: dict[str, float]
+    misread_as: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class DiagramLine:
+    """Steering diagram of a model: yaw rate over the rudder (n,), positive to starboard."""
+
+    rudder_deg: Array
+    yaw_rate_degpmin: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownPoint:
+    """A known turn, with its source; `radius_measured` if its yaw rate is from a measured radius."""
+
+    label: str
+    source: str
+    rudder_deg: float
+    yaw_rate_degpmin: float
+    radius_measured: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SteeringDiagrams:
+    """Diagrams of the models by their words, the tuned one too, and known turns."""
+
+    models: dict[str, DiagramLine]
+    points: tuple[KnownPoint, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SteeringComparison:
     """Comparison of the models of a card on its ship.
 
@@ -57,95 +93,46 @@ class SteeringComparison:
     ----------
     ship : str
         Name of the ship.
-    main : str
+    main_model : str
         The model of the printed influence and of the tuning.
     rudder_deg : float
         Rudder of the influence and of the turning circle.
-    turns : tuple of ModelTurns
-        Steady turns of every complete model at the rudders of Table 1.
-    influence : tuple of InfluenceTable
-        Influence coefficients of every complete model at the main model's draught.
-    runs : mapping
-        Manoeuvres of the same models, by name.
-    predictions : mapping
+    steady_turns : dict
+        Complete models to their steady turns at the rudders of Table 1.
+    influence : dict
+        Complete models at the main model's draught to their influence coefficients.
+    manoeuvres : dict
+        The same models to their figures.
+    combined_predictions : dict
         Table 5 for the other draughts, by model.
-    polynomials : mapping
+    printed_influence : PrintedCoefficients or None
+    influence_over_draught : dict
         K over the draught, (4): coefficients of 1, T, T^2.
-    tuning : TwoPointTuning, str or None
+    two_point_tuning : TwoPointTuning, str or None
         The main model through the first two measured points; a text with the reason without one.
-    missing : mapping
+    missing : dict
         Model to its missing data.
-    titles : mapping
+    titles : dict
         Model to its words.
-    diagrams : mapping
-        Words to the steering diagram of each model of `runs`, and of the tuned one.
-    points : tuple of SteeringPoint
-        Known points of the diagram.
-    speed_mps : float
-        Approach speed, which converts a radius into a yaw rate.
-    printed : PrintedInfluence or None
-        Influence coefficients that the source prints.
+    diagrams : SteeringDiagrams
+    histories : dict
+        Words of the models of `manoeuvres` to their turning circles, thinned for a chart.
     """
 
     ship: str
-    main: str
+    main_model: str
     rudder_deg: float
-    turns: tuple[ModelTurns, ...]
-    influence: tuple[InfluenceTable, ...]
-    runs: Mapping[str, ModelRuns]
-    predictions: Mapping[str, CombinedPrediction]
-    polynomials: Mapping[str, tuple[float, ...]]
-    tuning: TwoPointTuning | str | None
-    missing: Mapping[str, tuple[str, ...]]
-    titles: Mapping[str, str]
-    diagrams: Mapping[str, tuple[SteadyTurn, ...]]
-    points: tuple[SteeringPoint, ...]
-    speed_mps: float
-    printed: PrintedInfluence | None
-
-    def as_json(self) -> dict[str, object]:
-        """All values, in m, deg and deg/min; turning circles thinned for a chart."""
-        tuning = self.tuning.as_json() if isinstance(self.tuning, TwoPointTuning) else self.tuning
-        return {
-            "ship": self.ship,
-            "main_model": self.main,
-            "rudder_deg": self.rudder_deg,
-            "steady_turns": {row.model: [turn.as_json() for turn in row.turns] for row in self.turns},
-            "influence": {row.model: vars(row) for row in self.influence},
-            "manoeuvres": {
-                name: {"turn": dict(run.turn_figures), "zigzag": dict(run.zigzag_figures)}
-                for name, run in self.runs.items()
-            },
-            "combined_predictions": {name: vars(prediction) for name, prediction in self.predictions.items()},
-            "printed_influence": self.printed
-            and {
-                "draught_m": self.printed.draughts_m[-1],
-                "K_percent": {name: values[-1] for name, values in self.printed.K_percent.items() if values},
-                "misread_as": dict(self.printed.misread_as),
-            },
-            "influence_over_draught": {name: list(values) for name, values in self.polynomials.items()},
-            "two_point_tuning": tuning,
-            "missing": {name: list(words) for name, words in self.missing.items()},
-            "titles": dict(self.titles),
-            "diagrams": self._diagrams(),
-            "histories": {self.titles[name]: _circle(run.turn) for name, run in self.runs.items()},
-        }
-
-    def _diagrams(self) -> dict[str, object]:
-        names = ("rudder_deg", "yaw_rate_degpmin")
-        points = []
-        for point in self.points:
-            rate = point.yaw_rate_radps or math.copysign(
-                self.speed_mps / (point.radius_m or math.inf), point.rudder_rad
-            )
-            row = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
-            known = {"radius_measured": bool(point.measured and point.radius_m)}
-            points.append({"label": point.label, "source": point.source, **row, **known})
-        models = {
-            label: {name: [turn.as_json()[name] for turn in turns] for name in names}
-            for label, turns in self.diagrams.items()
-        }
-        return {"models": models, "points": points}
+    steady_turns: dict[str, tuple[TurnInDegrees, ...]]
+    influence: dict[str, InfluenceTable]
+    manoeuvres: dict[str, ModelFigures]
+    combined_predictions: dict[str, CombinedPrediction]
+    printed_influence: PrintedCoefficients | None
+    influence_over_draught: dict[str, tuple[float, ...]]
+    two_point_tuning: TwoPointTuning | str | None
+    missing: dict[str, tuple[str, ...]]
+    titles: dict[str, str]
+    diagrams: SteeringDiagrams
+    histories: dict[str, Columns]
 
 
 def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComparison:
@@ -166,36 +153,68 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     main = printed.model if printed else names[0]
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
     candidates = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
-    turns, runs = tuple(turns_of(card, name, RUDDERS_DEG) for name in names), {n: _runs(card, n, rudder) for n in same}
+    turns = {name: turns_of(card, name, RUDDERS_DEG).turns for name in names}
+    runs = {name: _runs(card, name, rudder) for name in same}
     tuning = tuned(card, main)
+    largest = max(turn.rudder_rad for row in turns.values() for turn in row)
     return SteeringComparison(
         ship=card.ship.name,
-        main=main,
+        main_model=main,
         rudder_deg=rudder,
-        turns=turns,
-        influence=tuple(influence_of(card, name, rudder) for name in same),
-        runs=runs,
-        predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
-        polynomials=draught_polynomials(card) if printed else {},
-        tuning=tuning,
+        steady_turns={name: tuple(turn.in_degrees() for turn in row) for name, row in turns.items()},
+        influence={name: influence_of(card, name, rudder) for name in same},
+        manoeuvres={name: ModelFigures(turn.figures, zigzag.figures) for name, (turn, zigzag) in runs.items()},
+        combined_predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
+        printed_influence=_printed(printed) if printed else None,
+        influence_over_draught=draught_polynomials(card) if printed else {},
+        two_point_tuning=tuning,
         missing=missing_of(card),
         titles={name: entry.title for name, entry in card.models.items()},
-        diagrams=_diagrams(card, max(turn.rudder_rad for row in turns for turn in row.turns), same, (main, tuning)),
-        points=card.points,
-        speed_mps=card.ship.speed_mps,
-        printed=printed,
+        diagrams=SteeringDiagrams(_diagrams(card, largest, same, (main, tuning)), _known_points(card)),
+        histories={card.models[name].title: _circle(turn.trajectory) for name, (turn, _) in runs.items()},
     )
+
+
+def _printed(printed: PrintedInfluence) -> PrintedCoefficients:
+    return PrintedCoefficients(
+        draught_m=printed.draughts_m[-1],
+        K_percent={name: values[-1] for name, values in printed.K_percent.items() if values},
+        misread_as=dict(printed.misread_as),
+    )
+
+
+def _known_points(card: SteeringCard) -> tuple[KnownPoint, ...]:
+    """Known turns of the ship; a radius becomes a yaw rate by the approach speed."""
+    found = []
+    for point in card.points:
+        rate = point.yaw_rate_radps or math.copysign(
+            card.ship.speed_mps / (point.radius_m or math.inf), point.rudder_rad
+        )
+        found.append(
+            KnownPoint(
+                label=point.label,
+                source=point.source,
+                rudder_deg=math.degrees(point.rudder_rad),
+                yaw_rate_degpmin=60 * math.degrees(rate),
+                radius_measured=bool(point.measured and point.radius_m),
+            )
+        )
+    return tuple(found)
 
 
 def _diagrams(
     card: SteeringCard, largest: float, names: Sequence[str], tuned: tuple[str, TwoPointTuning | str | None]
-) -> dict[str, tuple[SteadyTurn, ...]]:
+) -> dict[str, DiagramLine]:
     """Diagrams of the models by their titles, to the largest rudder, and of the tuned one."""
     found = {card.models[name].title: TurningPoints(model_of(card, name)).diagram(largest) for name in names}
     main, tuning = tuned
     if isinstance(tuning, TwoPointTuning):
         found[_TUNED] = TurningPoints(model_of(card, main)).diagram(largest, tuning.parameters)
-    return {label: tuple(turns) for label, turns in found.items()}
+    lines = {}
+    for label, turns in found.items():
+        rudder, rate = np.degrees([[turn.rudder_rad, 60 * turn.yaw_rate_radps] for turn in turns]).T
+        lines[label] = DiagramLine(rudder, rate)
+    return lines
 
 
 def _circle(turn: Trajectory) -> Columns:
@@ -230,10 +249,10 @@ def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
         return error.problem
 
 
-def _runs(card: SteeringCard, name: str, rudder_deg: float) -> ModelRuns:
+def _runs(card: SteeringCard, name: str, rudder_deg: float) -> tuple[Run, Run]:
+    """The turning circle and the zigzag of a model."""
     model = model_of(card, name)
     angle = math.radians(ZIGZAG_DEG)
     integrator = Integrator(model)
     turn = simulate(model, Turn(math.radians(rudder_deg)), integrator=integrator)
-    zigzag = simulate(model, Zigzag(angle, angle), integrator=integrator)
-    return ModelRuns(turn.trajectory, turn.figures, zigzag.figures)
+    return turn, simulate(model, Zigzag(angle, angle), integrator=integrator)

@@ -15,6 +15,7 @@ import numpy as np
 
 from tank2sim.analysis.influence.percent import change_percent, combined_percent, difference_percent
 from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
+from tank2sim.arrays import Number
 from tank2sim.cards.steering_card import PrintedInfluence, SteeringCard
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.steering_models import STEERING_FORMS, SteeringForm, steering_model
@@ -107,7 +108,7 @@ class InfluenceTable:
         The turn.
     change_percent : float
         Change of each coefficient.
-    K_percent, radii_m : mapping
+    K_percent, radii_m : dict
         By coefficient: change of the radius, and the radius after it.
     """
 
@@ -115,8 +116,8 @@ class InfluenceTable:
     rudder_rad: float
     radius_m: float
     change_percent: float
-    K_percent: Mapping[str, float]
-    radii_m: Mapping[str, float]
+    K_percent: dict[str, Number]
+    radii_m: dict[str, Number]
 
 
 def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percent: float = 10.0) -> InfluenceTable:
@@ -155,7 +156,7 @@ class CombinedPrediction:
 
     Parameters
     ----------
-    agreed_percent : mapping
+    agreed_percent : dict
         Kc by coefficient.
     radius_m : float
         Before the variation, computed.
@@ -171,7 +172,7 @@ class CombinedPrediction:
         By that model with the variations applied to the confused coefficients.
     """
 
-    agreed_percent: Mapping[str, float]
+    agreed_percent: dict[str, float]
     radius_m: float
     percent: float
     predicted_m: float

@@ -12,10 +12,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tank2sim.analysis.ensemble.results import FigureBands
 from tank2sim.analysis.influence.figures import InfluenceFigure
 from tank2sim.analysis.influence.percent import STEP_PERCENT, change_percent, changed_together, combined_percent
 from tank2sim.analysis.influence.study import Study
-from tank2sim.arrays import Array
+from tank2sim.analysis.tuning.result import TunedStudy
+from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, agreed_by_name, joint_errors
 from tank2sim.errors import InputError
 
@@ -111,56 +113,125 @@ class CardInfluence:
         # Numbers that go together may leave less than rounding of what each would make of the figure alone.
         return np.asarray(np.maximum(found, 0.0))
 
-    def as_json(self) -> dict[str, object]:
-        """``influence_percent``: {figure: {parameter: {exact, difference}}}; ``figures`` with standard errors.
-
-        Parameters have their dotted keys and values in the card's file.
-        """
+    def reported(self) -> InfluenceStudy:
+        """Return the study that results report: parameters have their dotted keys and values in the card's file."""
         exact, errors, shares = self.exact, self.standard_errors, self.shares
-        names = [parameter.key for parameter in self.parameters]
-        rows = range(len(self.figures))
-        result: dict[str, object] = {
-            "ship": self.ship,
-            "standard_errors": self.of_errors,
-            "figures": {
-                self.figures[row].text: {
-                    "value": float(self.values[row]),
-                    "standard_error": float(errors[row]),
-                    "share_of_variance": dict(zip(names, shares[row].tolist(), strict=True)),
-                }
-                for row in rows
+        keys = [parameter.key for parameter in self.parameters]
+        texts = [figure.text for figure in self.figures]
+        return InfluenceStudy(
+            ship=self.ship,
+            standard_errors=self.of_errors,
+            figures={
+                text: FigureErrors(value, error, dict(zip(keys, share, strict=True)))
+                for text, value, error, share in zip(
+                    texts, self.values.tolist(), errors.tolist(), shares.tolist(), strict=True
+                )
             },
-            "parameters": {
-                parameter.key: {
-                    "value": parameter.value * parameter.factor,
-                    "standard_error": parameter.standard_error * abs(parameter.factor),
-                    "assumed": parameter.assumed,
-                    "name": parameter.short,
-                }
+            parameters={
+                parameter.key: CardNumber(
+                    value=parameter.value * parameter.factor,
+                    standard_error=parameter.standard_error * abs(parameter.factor),
+                    assumed=parameter.assumed,
+                    name=parameter.short,
+                )
                 for parameter in self.parameters
             },
-            "influence_percent": {
-                self.figures[row].text: {
-                    name: {"exact": float(exact[row, k]), "difference": float(self.difference[row, k])}
-                    for k, name in enumerate(names)
+            influence_percent={
+                text: {
+                    key: InfluenceCoefficient(slope, step) for key, slope, step in zip(keys, slopes, steps, strict=True)
                 }
-                for row in rows
+                for text, slopes, steps in zip(texts, exact.tolist(), self.difference.tolist(), strict=True)
             },
-        }
-        if self.agreed:
-            result["agreed"] = self._agreed_as_json(self.agreed)
-        return {**result, "notices": list(self.notices)}
+            agreed=self._reported_agreed(self.agreed) if self.agreed else None,
+            notices=self.notices,
+        )
 
-    def _agreed_as_json(self, agreed: Agreed) -> dict[str, object]:
+    def _reported_agreed(self, agreed: Agreed) -> AgreedVariation:
         columns = zip(self.figures, agreed.predicted, agreed.predicted_by_difference, agreed.direct, strict=True)
         keys = {parameter.name: parameter.key for parameter in self.parameters}
-        return {
-            "percent": {keys[name]: percent for name, percent in agreed.percent.items()},
-            "figures": {
-                figure.text: {"foretold_exact": exact, "foretold_difference": difference, "direct": direct}
-                for figure, exact, difference, direct in columns
-            },
-        }
+        return AgreedVariation(
+            percent={keys[name]: percent for name, percent in agreed.percent.items()},
+            figures={figure.text: AgreedChange(*changes) for figure, *changes in columns},
+        )
+
+
+@dataclass(frozen=True)
+class FigureErrors:
+    """A figure in the unit of its name, its standard error, and the share of its variance that would go if a number
+    of the card (by its key) were known exactly."""
+
+    value: float
+    standard_error: float
+    share_of_variance: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CardNumber:
+    """A number as the card's file has it, with its standard error (`assumed` if not stated) and its short name."""
+
+    value: float
+    standard_error: float
+    assumed: bool
+    name: str
+
+
+@dataclass(frozen=True)
+class InfluenceCoefficient:
+    """K %: change of a figure for 10 % more of a number, by exact slopes and by the 10 % difference; nan if not
+    known."""
+
+    exact: Number
+    difference: Number
+
+
+@dataclass(frozen=True)
+class AgreedChange:
+    """Change of a figure in % by an agreed variation: by the sums of Kc K / 10, and of the changed ship (`direct`)."""
+
+    foretold_exact: Number
+    foretold_difference: Number
+    direct: Number
+
+
+@dataclass(frozen=True)
+class AgreedVariation:
+    """Numbers that change together: Kc % by key, and the change of each figure."""
+
+    percent: dict[str, float]
+    figures: dict[str, AgreedChange]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InfluenceStudy:
+    """Influence of each number of a card on figures of the ship.
+
+    Parameters
+    ----------
+    ship : str
+    standard_errors : str
+        Origin of the standard errors of the figures.
+    figures : dict
+        By their text: ``steady_radius_m@20``.
+    parameters : dict
+        By their keys on the card.
+    influence_percent : dict
+        Figure to parameter to its coefficient.
+    notices : tuple of str
+    agreed : AgreedVariation, optional
+    tuned : TunedStudy, optional
+        The card tuned to targets.
+    ensemble : FigureBands, optional
+    """
+
+    ship: str
+    standard_errors: str
+    figures: dict[str, FigureErrors]
+    parameters: dict[str, CardNumber]
+    influence_percent: dict[str, dict[str, InfluenceCoefficient]]
+    notices: tuple[str, ...]
+    agreed: AgreedVariation | None = None
+    tuned: TunedStudy | None = None
+    ensemble: FigureBands | None = None
 
 
 def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardInfluence:

@@ -109,41 +109,86 @@ class Tuned:
         """True if all targets are met."""
         return not self.contradiction
 
-    def as_json(self, figures: Mapping[str, float] | None = None) -> dict[str, object]:
-        """``tuned`` of the command: targets before and after, moves, and a contradiction, if any.
+    def reported(self, figures: Mapping[str, float]) -> TunedStudy:
+        """Return the part that results report.
 
         Parameters
         ----------
-        figures : mapping, optional
+        figures : mapping
             All requested figures of the tuned card.
         """
-        pairs = zip(self.targets, self.before, self.after, strict=True)
-        return {
-            "reached": self.reached,
-            "by": self.means.by,
-            "within_standard_errors": self.means.within,
-            "targets": {
-                target.text: {
-                    "figure": target.figure.text,
-                    "wanted": target.value,
-                    "before": float(a),
-                    "after": float(b),
-                }
-                | {"relation": target.relation}
-                for target, a, b in pairs
+        pairs = zip(self.targets, self.before.tolist(), self.after.tolist(), strict=True)
+        return TunedStudy(
+            reached=self.reached,
+            by=self.means.by,
+            within_standard_errors=self.means.within,
+            targets={
+                target.text: TunedTarget(
+                    figure=target.figure.text, wanted=target.value, relation=target.relation, before=old, after=new
+                )
+                for target, old, new in pairs
             },
-            "parameters": {
-                move.parameter.key: {
-                    "before": move.before * move.parameter.factor,
-                    "after": move.after * move.parameter.factor,
-                    "standard_errors": move.in_standard_errors,
-                }
+            parameters={
+                move.parameter.key: TunedNumber(
+                    name=move.parameter.short,
+                    before=move.before * move.parameter.factor,
+                    after=move.after * move.parameter.factor,
+                    standard_errors=move.in_standard_errors,
+                )
                 for move in self.moves
             },
-            "agreed_times": self.agreed_times,
-            "contradiction": [target.text for target in self.contradiction],
-            "figures": dict(figures or {}),
-        }
+            agreed_times=self.agreed_times,
+            contradiction=tuple(target.text for target in self.contradiction),
+            figures=dict(figures),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TunedTarget:
+    """A target: figure, relation (``=``, ``<=``, ``>=``) and value, and the figure before and after."""
+
+    figure: str
+    wanted: float
+    relation: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TunedNumber:
+    """A number that changed, as the card's file has it; the move in standard errors, None for an exact number."""
+
+    name: str
+    before: float
+    after: float
+    standard_errors: float | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TunedStudy:
+    """A card tuned to targets, as results report it; fields as of :class:`Means` and :class:`Tuned`.
+
+    Targets are by their text, parameters by their keys, the largest move first; `figures` are those of the tuned card.
+    """
+
+    reached: bool
+    by: str
+    within_standard_errors: float
+    targets: dict[str, TunedTarget]
+    parameters: dict[str, TunedNumber]
+    agreed_times: float | None
+    contradiction: tuple[str, ...]
+    figures: dict[str, float]
+
+    @property
+    def contradiction_text(self) -> str:
+        """Which targets cannot be reached, and the nearest that can; empty if all are reached."""
+        if self.reached:
+            return ""
+        names = self.contradiction
+        nearest = ", ".join(f"{target.figure} {target.after:.5g}" for target in self.targets.values())
+        what = f"{names[0]} cannot be reached" if len(names) == 1 else f"{' and '.join(names)} contradict each other"
+        return f"{what} within the bounds; the nearest is {nearest}"
 
 
 _DIGITS = 10

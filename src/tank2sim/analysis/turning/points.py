@@ -41,15 +41,26 @@ class SteadyTurn:
         """Radius of the origin's circle, m, positive."""
         return self.speed_mps / abs(self.yaw_rate_radps)
 
-    def as_json(self) -> dict[str, float]:
-        """The turn in m, deg and deg/min."""
-        return {
-            "rudder_deg": math.degrees(self.rudder_rad),
-            "radius_m": self.radius_m,
-            "yaw_rate_degpmin": 60 * math.degrees(self.yaw_rate_radps),
-            "drift_deg": math.degrees(self.drift_rad),
-            "speed_mps": self.speed_mps,
-        }
+    def in_degrees(self) -> TurnInDegrees:
+        """Return the turn as results report it."""
+        return TurnInDegrees(
+            rudder_deg=math.degrees(self.rudder_rad),
+            radius_m=self.radius_m,
+            yaw_rate_degpmin=60 * math.degrees(self.yaw_rate_radps),
+            drift_deg=math.degrees(self.drift_rad),
+            speed_mps=self.speed_mps,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TurnInDegrees:
+    """A steady turn as results report it; rudder, yaw rate and drift are positive to starboard, the radius always."""
+
+    rudder_deg: float
+    radius_m: float
+    yaw_rate_degpmin: float
+    drift_deg: float
+    speed_mps: float
 
 
 class TurningPoints:

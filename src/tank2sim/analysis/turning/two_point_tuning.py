@@ -29,7 +29,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
+from tank2sim.analysis.turning.points import SteadyTurn, TurnInDegrees, TurningPoints
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import parse_term
@@ -133,41 +133,38 @@ class WantedTurn:
         return float(self.yaw_rate_radps if self.radius_m is None else self.radius_m)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TwoPointTuning:
     """A ship whose steering diagram goes through two measured points.
 
     Parameters
     ----------
-    hull, rudder : float
+    hull_factor, rudder_factor : float
         The factors h and e.
-    parameters : mapping
+    parameters : dict
         Values of the scaled parameters of the model, by name.
-    before, after : pairs of SteadyTurn
+    before, after : pairs of TurnInDegrees
         At the two rudder angles, with the model before and after.
-    stable_before, stable_after : bool
+    course_stable_before, course_stable_after : bool
         True if the straight course is stable with the rudder held.
     """
 
-    hull: float
-    rudder: float
-    parameters: Mapping[str, float]
-    before: tuple[SteadyTurn, SteadyTurn]
-    after: tuple[SteadyTurn, SteadyTurn]
-    stable_before: bool
-    stable_after: bool
+    hull_factor: float
+    rudder_factor: float
+    parameters: dict[str, float]
+    before: tuple[TurnInDegrees, TurnInDegrees]
+    after: tuple[TurnInDegrees, TurnInDegrees]
+    course_stable_before: bool
+    course_stable_after: bool
 
-    def as_json(self) -> dict[str, object]:
-        """The tuning, turns in m, deg and deg/min."""
-        return {
-            "hull_factor": self.hull,
-            "rudder_factor": self.rudder,
-            "parameters": dict(self.parameters),
-            "before": [turn.as_json() for turn in self.before],
-            "after": [turn.as_json() for turn in self.after],
-            "course_stable_before": self.stable_before,
-            "course_stable_after": self.stable_after,
-        }
+
+@dataclass(frozen=True, kw_only=True)
+class TwoPointStudy(TwoPointTuning):
+    """A ship tuned to two points, which are texts as a user writes them: ``61@35``."""
+
+    ship: str
+    points: tuple[str, str]
+    notices: tuple[str, ...]
 
 
 def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: WantedTurn) -> TwoPointTuning:
@@ -204,13 +201,13 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
         if abs(wanted.measure(turn) / wanted.value - 1) > 1e-6:
             raise system.fault("the two points lie on different branches of the steering diagram")
     return TwoPointTuning(
-        hull=hull,
-        rudder=rudder,
+        hull_factor=hull,
+        rudder_factor=rudder,
         parameters=changed,
-        before=(found[0][0], found[1][0]),
-        after=(after[0], after[1]),
-        stable_before=points.holds_course(),
-        stable_after=points.holds_course(changed),
+        before=(found[0][0].in_degrees(), found[1][0].in_degrees()),
+        after=(after[0].in_degrees(), after[1].in_degrees()),
+        course_stable_before=points.holds_course(),
+        course_stable_after=points.holds_course(changed),
     )
 
 

@@ -43,14 +43,11 @@ _GAP_NOTE = (
 
 RESULT_TYPES = (
     ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
-    ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
     ResultType(
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
-    ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
-    ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
     ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),

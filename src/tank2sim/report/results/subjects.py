@@ -11,11 +11,9 @@ from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.identification.page import identification_page
-from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
 from tank2sim.report.logs.page import log_page
 from tank2sim.report.results.motions import from_the_bridge
-from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
 
 
@@ -51,10 +49,6 @@ _PAGES: Mapping[str, _Page] = {
     "Cards compared": _Page(
         compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),
-    "Steering catalogue": _Page(
-        steering_catalogue_page,
-        {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
-    ),
     "Validation": _Page(
         validation_page,
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
@@ -74,9 +68,6 @@ _PAGES: Mapping[str, _Page] = {
         | {"cautions": list, "notices": list},
     ),
     "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
-    "Influence coefficients": _Page(
-        influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
-    ),
 }
 """Subjects whose whole page is made of their JSON."""
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import altair as alt
 import numpy as np
 
+from tank2sim.analysis.influence.card_influence import InfluenceStudy
+from tank2sim.analysis.tuning.result import TunedStudy
 from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, data, plain, series_look
 from tank2sim.arrays import Array
-from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 EXACT, DIFFERENCE = "exact slope", "10 % difference"
@@ -39,24 +39,17 @@ class InfluenceData:
     shares: Array
 
     @staticmethod
-    def of(found: Json) -> InfluenceData:
-        """From what JSON has of a :class:`tank2sim.analysis.influence.card_influence.CardInfluence`."""
-        figures, parameters = found["influence_percent"], found["parameters"]
-
-        def table(values: Mapping[str, Mapping[str, Json]]) -> Array:
-            return np.array([[row.get(key) for key in parameters] for row in values.values()], dtype=float)
-
-        def part(name: str) -> Array:
-            return table({text: {key: cell[name] for key, cell in row.items()} for text, row in figures.items()})
-
-        shares = table({text: found["figures"][text]["share_of_variance"] for text in figures})
-        names = tuple(short_name(key, parameter) for key, parameter in parameters.items())
-        return InfluenceData(tuple(figures), names, part("exact"), part("difference"), shares)
-
-
-def short_name(key: str, parameter: Mapping[str, Json]) -> str:
-    """Name of a parameter as a chart has it."""
-    return str(parameter.get("name") or key.removeprefix("derivatives."))
+    def of(study: InfluenceStudy) -> InfluenceData:
+        """From the study."""
+        rows = [[row[key] for key in study.parameters] for row in study.influence_percent.values()]
+        shares = [[figure.share_of_variance[key] for key in study.parameters] for figure in study.figures.values()]
+        return InfluenceData(
+            figures=tuple(study.figures),
+            names=tuple(number.name for number in study.parameters.values()),
+            exact=np.array([[cell.exact for cell in row] for row in rows]),
+            difference=np.array([[cell.difference for cell in row] for row in rows]),
+            shares=np.array(shares),
+        )
 
 
 _ORDINALS = ("first", "second", "third", "fourth")
@@ -155,16 +148,13 @@ def variance_chart(result: InfluenceData) -> alt.Chart:
     )
 
 
-def moves_chart(tuned: Json, names: Mapping[str, str]) -> alt.LayerChart:
-    """What tuning changed, in standard errors of the card, with the bounds; `names` are those of the keys."""
-    moves = {
-        key: parameter for key, parameter in tuned["parameters"].items() if parameter["standard_errors"] is not None
-    }
+def moves_chart(tuned: TunedStudy) -> alt.LayerChart:
+    """Numbers that tuning changed, in standard errors of the card, with the bounds."""
     rows: list[ChartRecord] = [
-        {"name": names.get(key, key), "z": plain(parameter["standard_errors"])}
-        | {"before": plain(parameter["before"]), "after": plain(parameter["after"])}
-        for key, parameter in list(moves.items())[:_MOST_ROWS]
-    ]
+        {"name": one.name, "z": plain(one.standard_errors), "before": plain(one.before), "after": plain(one.after)}
+        for one in tuned.parameters.values()
+        if one.standard_errors is not None
+    ][:_MOST_ROWS]
     shown = [row["name"] for row in rows]
     x = alt.X("z:Q", title="move (standard errors of the card)")
     y = alt.Y("name:N", sort=shown, axis=alt.Axis(title=None, grid=True, labelLimit=170))
@@ -173,7 +163,7 @@ def moves_chart(tuned: Json, names: Mapping[str, str]) -> alt.LayerChart:
         *(alt.Tooltip(f"{key}:Q", title=key, format=".6~g") for key in ("before", "after")),
         alt.Tooltip("z:Q", title="standard errors", format=".3f"),
     ]
-    within = tuned["within_standard_errors"]
+    within = tuned.within_standard_errors
     bounds = Chart(data([{"z": -within}, {"z": within}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(x=x)
     zero = Chart(data([{"z": 0.0}])).mark_rule(style="reference").encode(x=x)
     bars = Chart(data(rows)).mark_bar(height=10, opacity=0.75).encode(x=x, y=y, tooltip=tooltip)
