@@ -11,9 +11,6 @@ from .api.comparison import compare as compare
 from .api.convention import convention as convention
 from .api.conversion import convert as convert
 from .api.craft_identification import (
-    CraftIdentificationResult as CraftIdentificationResult,
-)
-from .api.craft_identification import (
     identify_craft as identify_craft,
 )
 from .api.demo import DemoResult as DemoResult
@@ -32,7 +29,6 @@ from .api.identification import IdentificationResult as IdentificationResult
 from .api.identification import identify as identify
 from .api.influence import InfluenceResult as InfluenceResult
 from .api.influence import TuningResult as TuningResult
-from .api.log import LogResult as LogResult
 from .api.log import log as log
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
 from .api.reduction import reduce as reduce
@@ -72,6 +68,12 @@ from .results.fmu import ExportResult as ExportResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
 from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
+from .results.craft_identification import (
+    CraftIdentificationResult as CraftIdentificationResult,
+)
+from .results.fmu import CheckResult as CheckResult
+from .results.fmu import ExportResult as ExportResult
+from .results.log import LogResult as LogResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult

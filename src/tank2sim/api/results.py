@@ -20,15 +20,16 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),
     "export": ("results.fmu:ExportResult",),
     "glide": ("results.glide:GlideResult",),
+    "guess": ("results.guess:GuessResult",),
+    "log": ("results.log:LogResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),
     "signals": ("results.signals:SignalsResult",),
-    "tow": ("results.tow:TowResult",),
-    "yaw": ("results.yaw:YawResult",),
-    "guess": ("results.guess:GuessResult",),
     "simulate": ("results.manoeuvre:ManoeuvreResult",),
     "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
+    "tow": ("results.tow:TowResult",),
+    "yaw": ("results.yaw:YawResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -363,61 +363,6 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-class LogChannelKeys(_Part):
-    """A stream and the quantity that it holds."""
-
-    quantity: str
-    stream: str
-    unit: str
-    sign: int
-    confidence: float
-    use: bool
-    why: str
-
-
-class LogStretchKeys(_Part):
-    """A stretch of a voyage, and the trial that it became."""
-
-    kind: str
-    excites: bool
-    begins_utc: str | None
-    begins_s: float
-    duration_s: float
-    steering: str | None
-    heading_change_deg: JsonNumber
-    reversals: int
-    speed_mps: JsonNumber
-    least_speed_mps: JsonNumber
-    largest_speed_mps: JsonNumber
-    yaw_rate_rms_degps: JsonNumber
-    file: str | None
-
-
-class LogIdentifiedKeys(_Part):
-    """What the trials of a log say of the coefficients of a craft."""
-
-    coefficients: dict[str, CraftEstimateKeys]
-    next_trials: list[CandidateTrialKeys]
-    notices: list[str]
-
-
-class LogKeys(_Keys):
-    """What a vessel's log holds."""
-
-    logs: list[dict[str, Any]]
-    begins_utc: str | None
-    duration_s: float
-    origin_deg: list[float] | None
-    channels: list[LogChannelKeys]
-    stretches: list[LogStretchKeys]
-    current: dict[str, str | float] | None
-    track: JsonColumns | None
-    time_line: dict[str, JsonColumns]
-    identified: NotRequired[LogIdentifiedKeys | None]
-    findings: list[dict[str, Any]]
-    notices: list[str]
-
-
 class CompareKeys(_Keys):
     """Cards of one ship side by side."""
 
@@ -542,7 +487,6 @@ KEYS: dict[str, Any] = {
     "gap": GapKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
     "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
-    "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "steer": SteerKeys,

@@ -17,7 +17,7 @@ from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, 
 from tank2sim.analysis.validation.study import validate_card as validate_figures
 from tank2sim.answer.parts import Table
 from tank2sim.api.bounds import PositiveArgument, SmallEnsemble, checked
-from tank2sim.api.craft_validation import CraftValidationResult, validate_craft
+from tank2sim.api.craft_validation import validate_craft
 from tank2sim.api.result import OldResult, screen_table, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, trial_files, trials_of
@@ -32,6 +32,7 @@ from tank2sim.identification.trials.assessment.other_ship import evidence_of_oth
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.marks import CHECK
 from tank2sim.records.thinning import drawn_columns
+from tank2sim.results.craft_validation import CraftValidationResult
 from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.units import in_words
 

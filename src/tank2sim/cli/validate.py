@@ -9,11 +9,11 @@ import click
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.analysis.validation.study import REQUIRED
 from tank2sim.api.bounds import PositiveArgument, SmallEnsemble
-from tank2sim.api.craft_validation import CraftValidationResult
 from tank2sim.api.ship import load
 from tank2sim.api.validation import validate
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import number, page_option, plot_folder_option, set_option
+from tank2sim.results.craft_validation import CraftValidationResult
 
 
 @click.command("validate")

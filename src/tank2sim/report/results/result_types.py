@@ -48,7 +48,6 @@ RESULT_TYPES = (
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),

@@ -13,7 +13,6 @@ from tank2sim.report.gap.page import gap_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
-from tank2sim.report.logs.page import log_page
 from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.validation.page import validation_page
@@ -60,7 +59,6 @@ _PAGES: Mapping[str, _Page] = {
         {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
         | {"imo": list, "replays": list, "notices": list},
     ),
-    "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Coefficients from trials": _Page(
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}
