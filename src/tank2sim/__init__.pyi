@@ -6,7 +6,6 @@ from .api.audit import audit as audit
 from .api.bridge import PilotCardResult as PilotCardResult
 from .api.bridge import PosterResult as PosterResult
 from .api.captive_run import reduce_runs as reduce_runs
-from .api.comparison import ComparisonResult as ComparisonResult
 from .api.comparison import compare as compare
 from .api.convention import convention as convention
 from .api.conversion import convert as convert
@@ -59,6 +58,7 @@ from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.captive_run import CaptiveRunResult as CaptiveRunResult
+from .results.comparison import ComparisonResult as ComparisonResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
 from .results.design import CampaignDesignResult as CampaignDesignResult

@@ -15,6 +15,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "audit": ("results.audit:AuditResult",),
     "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
     "check": ("results.fmu:CheckResult",),
+    "compare": ("results.comparison:ComparisonResult",),
     "convention": ("results.convention:ConventionResult",),
     "convert": ("results.conversion:ConversionResult",),
     "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),

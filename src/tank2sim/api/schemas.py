@@ -363,19 +363,6 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-class CompareKeys(_Keys):
-    """Cards of one ship side by side."""
-
-    kind: str
-    cards: list[dict[str, Any]]
-    summary: list[dict[str, Any]]
-    coefficients: list[dict[str, Any]]
-    effects: list[dict[str, Any]]
-    trials: list[dict[str, Any]]
-    members: int
-    notices: list[str]
-
-
 class DemoKeys(_Keys):
     """The demonstration: figures of its two halves, and the files that it wrote."""
 
@@ -482,7 +469,6 @@ class ValidateKeys(_Keys):
 
 
 KEYS: dict[str, Any] = {
-    "compare": CompareKeys,
     "demo": DemoKeys,
     "gap": GapKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,

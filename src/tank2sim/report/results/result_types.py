@@ -52,7 +52,6 @@ RESULT_TYPES = (
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
-    ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),
     ResultType("Validation", "validate", ("verification", "counts", "figures"), ("verdict",)),
     ResultType(
         "Validation of a craft",

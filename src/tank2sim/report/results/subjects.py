@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
-from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.identification.page import identification_page
@@ -47,8 +46,6 @@ _SECTIONS: Mapping[str, _Sections] = {
 }
 
 _PAGES: Mapping[str, _Page] = {
-    "Cards compared": _Page(
-        compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),
     "Steering catalogue": _Page(
         steering_catalogue_page,
