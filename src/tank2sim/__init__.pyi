@@ -61,19 +61,17 @@ from .results.captive_run import CaptiveRunResult as CaptiveRunResult
 from .results.comparison import ComparisonResult as ComparisonResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
+from .results.craft_identification import (
+    CraftIdentificationResult as CraftIdentificationResult,
+)
 from .results.design import CampaignDesignResult as CampaignDesignResult
 from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
-from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
-from .results.craft_identification import (
-    CraftIdentificationResult as CraftIdentificationResult,
-)
-from .results.fmu import CheckResult as CheckResult
-from .results.fmu import ExportResult as ExportResult
 from .results.log import LogResult as LogResult
+from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
 from .results.ships import ShipsResult as ShipsResult

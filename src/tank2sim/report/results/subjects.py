@@ -46,7 +46,6 @@ _SECTIONS: Mapping[str, _Sections] = {
 }
 
 _PAGES: Mapping[str, _Page] = {
-    ),
     "Steering catalogue": _Page(
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
