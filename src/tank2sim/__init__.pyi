@@ -49,7 +49,6 @@ from .api.tow import tow as tow
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
 from .api.turn_tuning import TurnTuningResult as TurnTuningResult
-from .api.validation import ValidationResult as ValidationResult
 from .api.validation import validate as validate
 from .api.yaw import simulate_yaw as simulate_yaw
 from .api.yaw import yaw as yaw
@@ -78,6 +77,7 @@ from .results.ships import ShipsResult as ShipsResult
 from .results.signals import SignalsResult as SignalsResult
 from .results.stability import StabilityResult as StabilityResult
 from .results.tow import TowResult as TowResult
+from .results.validation import ValidationResult as ValidationResult
 from .results.yaw import YawResult as YawResult
 
 __version__: str

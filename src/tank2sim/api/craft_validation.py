@@ -50,4 +50,4 @@ def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         raise InputError("trials", "", f"none is longer than {least:g} s", "give longer ones")
     study = study_predictions(card, [str(path) for path in paths], predictions, alike)
-    return CraftValidationResult(study, ship, tuple(paths))
+    return CraftValidationResult(study, card, tuple(paths))

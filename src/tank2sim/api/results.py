@@ -30,6 +30,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "simulate": ("results.manoeuvre:ManoeuvreResult",),
     "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
     "tow": ("results.tow:TowResult",),
+    "validate": ("results.validation:ValidationResult", "results.craft_validation:CraftValidationResult"),
     "yaw": ("results.yaw:YawResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""

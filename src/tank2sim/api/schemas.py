@@ -46,20 +46,6 @@ class BandKeys(_Part):
     standard_deviation: NotRequired[JsonNumber]
 
 
-class ImoKeys(_Part):
-    """A criterion of IMO MSC.137(76), the worse of starboard and port."""
-
-    name: str
-    found: JsonNumber
-    allowed: float
-    unit: str
-    remark: str
-    beyond_card: bool
-    passed: bool | None
-    margin: JsonNumber
-    margin_percent: JsonNumber
-
-
 class EnsembleKeys(_Part):
     """Members of an ensemble, and the bands of figures over them."""
 
@@ -69,45 +55,6 @@ class EnsembleKeys(_Part):
     unusable: dict[str, int]
     notices: list[str]
     figures: dict[str, BandKeys]
-
-
-class ComparedFigureKeys(_Part):
-    """A figure of a trial next to the simulated one: D, S, E, standard uncertainties, U_val and outcome."""
-
-    trial: str
-    manoeuvre: str
-    name: str
-    measured: float
-    simulated: JsonNumber
-    numerical: float
-    inputs: JsonNumber
-    data: float
-    required_percent: float
-    made_card: bool
-    error: JsonNumber
-    uncertainty: JsonNumber
-    level_percent: JsonNumber
-    outcome: str
-
-
-class VerifiedFigureKeys(_Part):
-    """A figure of a standard trial: change by half the step, deviation by the inputs, numerical uncertainty."""
-
-    trial: str
-    name: str
-    value: float
-    halving: JsonNumber
-    deviation: JsonNumber
-    U_num: JsonNumber
-
-
-class ReplayKeys(_Part):
-    """A trial replayed: errors by signal, and what was measured and simulated, thinned to draw."""
-
-    trial: str
-    errors: list[dict[str, str | float | None]]
-    measured: JsonColumns
-    simulated: JsonColumns
 
 
 class EstimateKeys(_Part):
@@ -166,28 +113,6 @@ class CraftIdentifyKeys(_Keys):
     order_responses: dict[str, OrderResponseKeys]
     held_out: list[str]
     next_trials: list[CandidateTrialKeys]
-    notices: list[str]
-
-
-class CraftReplayKeys(_Part):
-    """Free-running predictions of a trial: their number, rms errors of the motion, and of the pose at their ends."""
-
-    predictions: JsonNumber
-    rms_u_mps: JsonNumber
-    rms_v_mps: JsonNumber
-    rms_r_degps: JsonNumber
-    end_distance_m: JsonNumber
-    end_heading_deg: JsonNumber
-
-
-class CraftValidateKeys(_Keys):
-    """R^2 of u, v and r of free-running predictions of a craft, and rms errors at their ends next to measurements."""
-
-    ship: str
-    determination: dict[str, JsonNumber]
-    end_distance_m: JsonNumber
-    end_heading_deg: JsonNumber
-    trials: dict[str, CraftReplayKeys]
     notices: list[str]
 
 
@@ -449,25 +374,6 @@ class SteerKeys(_Keys):
     notices: list[str]
 
 
-class ValidateKeys(_Keys):
-    """A validation report after ITTC 7.5-02-06-03."""
-
-    kind: str
-    ship: str
-    source: str
-    documentation: dict[str, str]
-    coefficients: dict[str, dict[str, float | bool]]
-    propulsion: bool
-    verdict: str
-    counts: dict[str, int]
-    figures: list[ComparedFigureKeys]
-    members: int
-    verification: list[VerifiedFigureKeys]
-    imo: list[ImoKeys]
-    replays: list[ReplayKeys]
-    notices: list[str]
-
-
 KEYS: dict[str, Any] = {
     "demo": DemoKeys,
     "gap": GapKeys,
@@ -476,7 +382,6 @@ KEYS: dict[str, Any] = {
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "steer": SteerKeys,
-    "validate": ValidateKeys | CraftValidateKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 

@@ -13,7 +13,7 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.marks import assumed_words
-from tank2sim.results.comparison_charts import Percent, errors_chart, percent_chart
+from tank2sim.results.comparison_charts import FigurePercent, errors_chart, percent_chart
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class ComparisonResult(Result[CardComparison]):
     def _others(self) -> list[tuple[int, str]]:
         return list(enumerate(self.labels))[1:]
 
-    def _percents(self) -> list[Percent]:
+    def _percents(self) -> list[FigurePercent]:
         """Differences of the figures that both cards show."""
         return [
             (label, trial.name.replace(" deg to", ""), in_words(name)[0], 100 * apart / abs(first), z)

@@ -9,7 +9,7 @@ import altair as alt
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow
 from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, SeriesLook, data, plain, series_look, stacked
 
-Percent = tuple[str, str, str, float, float | None]
+FigurePercent = tuple[str, str, str, float, float | None]
 """Card, trial, figure in words, difference from the reference in per cent, and in standard errors."""
 
 
@@ -41,7 +41,7 @@ def errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str]) 
     return chart
 
 
-def percent_chart(percents: Sequence[Percent], labels: Sequence[str], assumed: str) -> alt.VConcatChart:
+def percent_chart(percents: Sequence[FigurePercent], labels: Sequence[str], assumed: str) -> alt.VConcatChart:
     """Differences in per cent of the reference's figure: a panel a manoeuvre, a row a figure, a shape and colour for
     each card. `assumed` is added to the title."""
     panels: dict[str, list[ChartRecord]] = {}

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from tank2sim.answer.parts import KeyFigure, Section, records_table
 from tank2sim.answer.result import Result
+from tank2sim.cards import CraftCard
 from tank2sim.identification.craft.fit import PREDICTED_S
 from tank2sim.identification.craft.study import CraftValidationStudy
 
@@ -20,14 +21,14 @@ class CraftValidationResult(Result[CraftValidationStudy]):
     Parameters
     ----------
     study : CraftValidationStudy
-    ship : Ship, optional
-        None if the result was read from its JSON.
+    card : CraftCard, optional
+        None if the result was read from its JSON; ``ship`` is its ship.
     paths : tuple of Path
         Files of all trials.
     """
 
     study: CraftValidationStudy
-    ship: Any = None
+    card: CraftCard | None = None
     paths: tuple[Path, ...] = ()
     command: ClassVar[str] = "validate"
 

@@ -52,13 +52,6 @@ RESULT_TYPES = (
     ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
-    ResultType("Validation", "validate", ("verification", "counts", "figures"), ("verdict",)),
-    ResultType(
-        "Validation of a craft",
-        "validate",
-        ("determination", "end_distance_m", "trials"),
-        ("determination.u", "determination.v", "determination.r"),
-    ),
     ResultType("Bridge", "poster pilotcard", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
     ResultType("Ship to steer", "steer", ("ship", "steerable"), ("steerable",)),
 )

@@ -14,7 +14,6 @@ from tank2sim.report.influence.page import influence_page
 from tank2sim.report.json_values import Json
 from tank2sim.report.results.motions import from_the_bridge
 from tank2sim.report.steering_card.page import steering_catalogue_page
-from tank2sim.report.validation.page import validation_page
 
 
 @dataclass(frozen=True)
@@ -49,11 +48,6 @@ _PAGES: Mapping[str, _Page] = {
     "Steering catalogue": _Page(
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
-    ),
-    "Validation": _Page(
-        validation_page,
-        {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
-        | {"imo": list, "replays": list, "notices": list},
     ),
     "Coefficients from trials": _Page(
         identification_page,
