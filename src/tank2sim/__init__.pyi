@@ -6,13 +6,9 @@ from .api.audit import audit as audit
 from .api.bridge import PilotCardResult as PilotCardResult
 from .api.bridge import PosterResult as PosterResult
 from .api.captive_run import reduce_runs as reduce_runs
-from .api.comparison import ComparisonResult as ComparisonResult
 from .api.comparison import compare as compare
 from .api.convention import convention as convention
 from .api.conversion import convert as convert
-from .api.craft_identification import (
-    CraftIdentificationResult as CraftIdentificationResult,
-)
 from .api.craft_identification import (
     identify_craft as identify_craft,
 )
@@ -30,7 +26,6 @@ from .api.gap import find_gap as find_gap
 from .api.guess import guess as guess
 from .api.identification import IdentificationResult as IdentificationResult
 from .api.identification import identify as identify
-from .api.log import LogResult as LogResult
 from .api.log import log as log
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
 from .api.reduction import reduce as reduce
@@ -48,7 +43,6 @@ from .api.steering_page import SteeringPageResult as SteeringPageResult
 from .api.tow import tow as tow
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
-from .api.validation import ValidationResult as ValidationResult
 from .api.validation import validate as validate
 from .api.yaw import simulate_yaw as simulate_yaw
 from .api.yaw import yaw as yaw
@@ -57,8 +51,12 @@ from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
 from .results.captive_run import CaptiveRunResult as CaptiveRunResult
+from .results.comparison import ComparisonResult as ComparisonResult
 from .results.convention import ConventionResult as ConventionResult
 from .results.conversion import ConversionResult as ConversionResult
+from .results.craft_identification import (
+    CraftIdentificationResult as CraftIdentificationResult,
+)
 from .results.design import CampaignDesignResult as CampaignDesignResult
 from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
@@ -67,6 +65,7 @@ from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
 from .results.influence import InfluenceResult as InfluenceResult
 from .results.influence import TuningResult as TuningResult
+from .results.log import LogResult as LogResult
 from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult
 from .results.reduction import ReductionResult as ReductionResult
@@ -76,6 +75,7 @@ from .results.stability import StabilityResult as StabilityResult
 from .results.steering_models import SteeringModelsResult as SteeringModelsResult
 from .results.tow import TowResult as TowResult
 from .results.turn_tuning import TurnTuningResult as TurnTuningResult
+from .results.validation import ValidationResult as ValidationResult
 from .results.yaw import YawResult as YawResult
 
 __version__: str

@@ -36,12 +36,12 @@ def test_the_true_card_predicts_and_one_of_half_the_thrust_does_not(truth, ship,
     paths = written(tmp_path, truth, ["zigzag"])
     right = t2s.validate(ship, paths)
     assert min(right.determination.values()) > 0.97
-    content = right.content()
+    content = right.to_dict()
     # 1 cm and 0.1 deg of noise, in the state from which the prediction begins, too
     assert content["end_distance_m"] < 1.0 and content["end_heading_deg"] < 3.0
     half = {f"thrusters.{number}.ahead_Ns2": 0.5 * truth["ahead"] for number in (0, 1)}
     wrong = t2s.validate(ship.replace(half), paths)
-    assert wrong.content()["end_distance_m"] > 3 * content["end_distance_m"]
+    assert wrong.to_dict()["end_distance_m"] > 3 * content["end_distance_m"]
     assert wrong.determination["u"] < right.determination["u"] - 0.1
 
 

@@ -13,7 +13,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.logs.channels import channels_text, read_channels
-from tank2sim.report.logs.page import log_page
+from tank2sim.results.log import LogResult
 from tests.cli.command_line import refused, tank2sim
 from tests.logs.made_logs import T0, frame, nmea_lines
 from tests.marks import first_fast
@@ -45,6 +45,7 @@ def test_a_folder_of_trials_channels_and_json(folder) -> None:
     assert page.startswith("<!doctype html>") and "01_zigzag_+20.csv" in page and "Map" in page
     again = tank2sim("report", "log.json", "-o", "again.html", cwd=folder)
     assert again.returncode == 0, again.stderr
+    assert (folder / "again.html").read_text(encoding="utf-8") == page
 
 
 def test_the_page_names_all_trials_however_many(folder) -> None:
@@ -53,9 +54,9 @@ def test_the_page_names_all_trials_however_many(folder) -> None:
     zigzag = next(stretch for stretch in found["stretches"] if stretch["kind"] == "zigzag")
     files = [f"{place:02d}_zigzag_{5 + place:+d}.csv" for place in range(19)]
     found["stretches"] = [{**zigzag, "file": name} for name in files]
-    page = log_page(found)
-    assert all(f"{5 + place:+d}" in page.verdict for place in range(19))
-    chart = next(section for section in page.sections if section.heading == "Map").charts[0]
+    result = LogResult.read(found, "log.json")
+    assert all(f"{5 + place:+d}" in " ".join(result.headline) for place in range(19))
+    chart = next(section for section in result.sections if section.heading == "Map").charts[0]
     assert "8 of 19" in chart.caption
 
 

@@ -31,12 +31,12 @@ def found(craft, tmp_path_factory) -> t2s.CraftIdentificationResult:
 
 @pytest.mark.slow
 def test_position_and_heading_alone_give_thrust_curve_and_damping(craft, found) -> None:
-    coefficients = found.content()["coefficients"]
+    coefficients = found.study.coefficients
     for name in ("port.ahead", "port.astern", "Xu", "Xuabsu", "Nr", "Nrabsr"):
         entry, truth = coefficients[name], craft[name.rpartition(".")[2]]
-        assert abs(entry["value"] - truth) < 3 * entry["standard_error"], name
-    assert coefficients["port.ahead"]["value"] == pytest.approx(craft["ahead"], rel=0.1)
-    assert abs(coefficients["port.ahead"]["before"] / craft["ahead"] - 1) > 0.1
+        assert abs(entry.value - truth) < 3 * entry.standard_error, name
+    assert coefficients["port.ahead"].value == pytest.approx(craft["ahead"], rel=0.1)
+    assert abs(coefficients["port.ahead"].before / craft["ahead"] - 1) > 0.1
 
 
 @pytest.mark.slow
@@ -59,17 +59,17 @@ def test_orders_alone_give_thrust_curve_damping_and_lag(craft, tmp_path) -> None
     lines = f"max_rpm = {craft['rpm']!r}\ntime_constant_s = {1.5 * craft['lag']!r}"
     text = text.replace(f"max_rpm = {1.05 * craft['rpm']!r}", lines)
     found = t2s.identify_craft(t2s.Ship(parse_card(text, "first.toml")), paths)
-    assert found.driven_by == "orders" and found.content()["driven_by"] == "orders"
-    coefficients = found.content()["coefficients"]
+    assert found.study.driven_by == "orders"
+    coefficients = found.study.coefficients
     for name, truth in [(f"port.{key}", craft[key]) for key in ("ahead", "astern")] + [
         ("port.time_constant", craft["lag"])
     ]:
         entry = coefficients[name]
-        assert abs(entry["value"] - truth) < 3 * entry["standard_error"], name
-        assert entry["standard_error"] < 0.1 * truth
+        assert abs(entry.value - truth) < 3 * entry.standard_error, name
+        assert entry.standard_error < 0.1 * truth
     for name in ("Xu", "Xuabsu", "Nr", "Nrabsr"):
-        assert abs(coefficients[name]["value"] - craft[name]) < 3 * coefficients[name]["standard_error"], name
-    assert found.card.thrusters[1].time_constant_s == pytest.approx(coefficients["port.time_constant"]["value"])
+        assert abs(coefficients[name].value - craft[name]) < 3 * coefficients[name].standard_error, name
+    assert found.card.thrusters[1].time_constant_s == pytest.approx(coefficients["port.time_constant"].value)
 
 
 def test_a_fit_that_drives_the_craft_on_is_not_blamed_on_the_card(craft) -> None:
@@ -105,7 +105,7 @@ def test_trials_by_revolutions_and_by_orders_are_not_mixed(craft, tmp_path) -> N
 def test_a_held_out_trial_is_predicted(found) -> None:
     r_squared = found.determination
     assert r_squared["u"] > 0.9 and r_squared["r"] > 0.9
-    assert found.content()["held_out"] == ["zigzag"]
+    assert found.study.held_out == ("zigzag",)
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_what_straight_runs_do_not_show_is_said_and_a_manoeuvre_that_would_is_na
     assert found.marks and "astern" in found.marks[0]
     best = found.next_trials[0]
     assert {"Nr", "Nrabsr"} <= set(best.determines)
-    assert max(best.as_json()["t_s"]) < 300
+    assert max(best.t_s) < 300
     straight = next(entry for entry in found.next_trials if entry.words.startswith("straight"))
     assert "Nrabsr" not in straight.determines and "port.astern" not in straight.determines
 

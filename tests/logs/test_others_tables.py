@@ -139,7 +139,7 @@ def test_a_log_of_few_instants_is_refused_or_has_no_trial(written, rows) -> None
         result = log(written({"time": seconds}))
     except InputError:
         return
-    assert result.cuts == []
+    assert result.cuts == ()
 
 
 # Numbers for missing values ---------------------------------------------------------------------------------------
@@ -221,7 +221,7 @@ def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(tmp_path, nam
 @first_fast("name", ["rudder_raw", "rudder_adc"])
 def test_counts_of_a_converter_have_a_zero_and_no_unit(tmp_path, name) -> None:
     result = steering(tmp_path, **{name: np.round(512 + (2 if name == "rudder_raw" else 8) * rudder())})
-    assert result.cuts == [] and any(name in mark for mark in result.marks)
+    assert result.cuts == () and any(name in mark for mark in result.marks)
 
 
 def test_a_small_helm_stays_and_a_larger_one_is_marked(tmp_path) -> None:

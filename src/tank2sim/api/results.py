@@ -15,6 +15,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "audit": ("results.audit:AuditResult",),
     "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
     "check": ("results.fmu:CheckResult",),
+    "compare": ("results.comparison:ComparisonResult",),
     "convention": ("results.convention:ConventionResult",),
     "convert": ("results.conversion:ConversionResult",),
     "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),
@@ -25,15 +26,17 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
         "results.steering_models:SteeringModelsResult",
         "results.turn_tuning:TurnTuningResult",
     ),
+    "guess": ("results.guess:GuessResult",),
+    "log": ("results.log:LogResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),
     "ships": ("results.ships:ShipsResult",),
     "signals": ("results.signals:SignalsResult",),
-    "tow": ("results.tow:TowResult",),
-    "yaw": ("results.yaw:YawResult",),
-    "guess": ("results.guess:GuessResult",),
     "simulate": ("results.manoeuvre:ManoeuvreResult",),
     "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
+    "tow": ("results.tow:TowResult",),
+    "validate": ("results.validation:ValidationResult", "results.craft_validation:CraftValidationResult"),
+    "yaw": ("results.yaw:YawResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 

@@ -36,59 +36,6 @@ class _Keys(_Part):
     schema: str
 
 
-class ImoKeys(_Part):
-    """A criterion of IMO MSC.137(76), the worse of starboard and port."""
-
-    name: str
-    found: JsonNumber
-    allowed: float
-    unit: str
-    remark: str
-    beyond_card: bool
-    passed: bool | None
-    margin: JsonNumber
-    margin_percent: JsonNumber
-
-
-class ComparedFigureKeys(_Part):
-    """A figure of a trial next to the simulated one: D, S, E, standard uncertainties, U_val and outcome."""
-
-    trial: str
-    manoeuvre: str
-    name: str
-    measured: float
-    simulated: JsonNumber
-    numerical: float
-    inputs: JsonNumber
-    data: float
-    required_percent: float
-    made_card: bool
-    error: JsonNumber
-    uncertainty: JsonNumber
-    level_percent: JsonNumber
-    outcome: str
-
-
-class VerifiedFigureKeys(_Part):
-    """A figure of a standard trial: change by half the step, deviation by the inputs, numerical uncertainty."""
-
-    trial: str
-    name: str
-    value: float
-    halving: JsonNumber
-    deviation: JsonNumber
-    U_num: JsonNumber
-
-
-class ReplayKeys(_Part):
-    """A trial replayed: errors by signal, and what was measured and simulated, thinned to draw."""
-
-    trial: str
-    errors: list[dict[str, str | float | None]]
-    measured: JsonColumns
-    simulated: JsonColumns
-
-
 class EstimateKeys(_Part):
     """A coefficient identified from trials, and what was known of it before."""
 
@@ -145,28 +92,6 @@ class CraftIdentifyKeys(_Keys):
     order_responses: dict[str, OrderResponseKeys]
     held_out: list[str]
     next_trials: list[CandidateTrialKeys]
-    notices: list[str]
-
-
-class CraftReplayKeys(_Part):
-    """Free-running predictions of a trial: their number, rms errors of the motion, and of the pose at their ends."""
-
-    predictions: JsonNumber
-    rms_u_mps: JsonNumber
-    rms_v_mps: JsonNumber
-    rms_r_degps: JsonNumber
-    end_distance_m: JsonNumber
-    end_heading_deg: JsonNumber
-
-
-class CraftValidateKeys(_Keys):
-    """R^2 of u, v and r of free-running predictions of a craft, and rms errors at their ends next to measurements."""
-
-    ship: str
-    determination: dict[str, JsonNumber]
-    end_distance_m: JsonNumber
-    end_heading_deg: JsonNumber
-    trials: dict[str, CraftReplayKeys]
     notices: list[str]
 
 
@@ -342,74 +267,6 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-class LogChannelKeys(_Part):
-    """A stream and the quantity that it holds."""
-
-    quantity: str
-    stream: str
-    unit: str
-    sign: int
-    confidence: float
-    use: bool
-    why: str
-
-
-class LogStretchKeys(_Part):
-    """A stretch of a voyage, and the trial that it became."""
-
-    kind: str
-    excites: bool
-    begins_utc: str | None
-    begins_s: float
-    duration_s: float
-    steering: str | None
-    heading_change_deg: JsonNumber
-    reversals: int
-    speed_mps: JsonNumber
-    least_speed_mps: JsonNumber
-    largest_speed_mps: JsonNumber
-    yaw_rate_rms_degps: JsonNumber
-    file: str | None
-
-
-class LogIdentifiedKeys(_Part):
-    """What the trials of a log say of the coefficients of a craft."""
-
-    coefficients: dict[str, CraftEstimateKeys]
-    next_trials: list[CandidateTrialKeys]
-    notices: list[str]
-
-
-class LogKeys(_Keys):
-    """What a vessel's log holds."""
-
-    logs: list[dict[str, Any]]
-    begins_utc: str | None
-    duration_s: float
-    origin_deg: list[float] | None
-    channels: list[LogChannelKeys]
-    stretches: list[LogStretchKeys]
-    current: dict[str, str | float] | None
-    track: JsonColumns | None
-    time_line: dict[str, JsonColumns]
-    identified: NotRequired[LogIdentifiedKeys | None]
-    findings: list[dict[str, Any]]
-    notices: list[str]
-
-
-class CompareKeys(_Keys):
-    """Cards of one ship side by side."""
-
-    kind: str
-    cards: list[dict[str, Any]]
-    summary: list[dict[str, Any]]
-    coefficients: list[dict[str, Any]]
-    effects: list[dict[str, Any]]
-    trials: list[dict[str, Any]]
-    members: int
-    notices: list[str]
-
-
 class DemoKeys(_Keys):
     """The demonstration: figures of its two halves, and the files that it wrote."""
 
@@ -450,35 +307,13 @@ class SteerKeys(_Keys):
     notices: list[str]
 
 
-class ValidateKeys(_Keys):
-    """A validation report after ITTC 7.5-02-06-03."""
-
-    kind: str
-    ship: str
-    source: str
-    documentation: dict[str, str]
-    coefficients: dict[str, dict[str, float | bool]]
-    propulsion: bool
-    verdict: str
-    counts: dict[str, int]
-    figures: list[ComparedFigureKeys]
-    members: int
-    verification: list[VerifiedFigureKeys]
-    imo: list[ImoKeys]
-    replays: list[ReplayKeys]
-    notices: list[str]
-
-
 KEYS: dict[str, Any] = {
-    "compare": CompareKeys,
     "demo": DemoKeys,
     "gap": GapKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
-    "log": LogKeys,
     "pilotcard": BridgeKeys,
     "poster": BridgeKeys,
     "steer": SteerKeys,
-    "validate": ValidateKeys | CraftValidateKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 

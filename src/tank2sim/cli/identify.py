@@ -58,7 +58,7 @@ def _of_craft(
             raise InputError(option, "", "is not for a craft with thrusters", "leave it out")
     with showing_progress("fitting") as progress:
         result = identify_craft(ship, trials, holdout=holdout, progress=progress)
-    files = result.card.files(output) if output else {}
+    files = result.card.files(output) if output and result.card else {}
     inputs = [Path(ship.card.source), *craft_trial_files(trials), *craft_trial_files(holdout)]
     write_result(result, inputs, json_file=json_file, page=page, files=files)
     show_result(result)

@@ -9,7 +9,6 @@ import click
 from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.analysis.validation.study import REQUIRED
 from tank2sim.api.bounds import PositiveArgument, SmallEnsemble
-from tank2sim.api.craft_validation import CraftValidationResult
 from tank2sim.api.ship import load
 from tank2sim.api.validation import validate
 from tank2sim.cli.console import json_option, show_result, write_result
@@ -55,9 +54,6 @@ def command(
     with thrusters is validated by free-running predictions of 30 s of trials that log cut.
     """
     result = validate(load(card, values), trials, members=members, required_percent=required_percent)
-    if isinstance(result, CraftValidationResult):
-        inputs: list[str | Path] = [result.ship.card.source, *result.paths]
-    else:
-        inputs = [result.ready.card.source, *(trial.path for trial in result.trials.trials)]
+    inputs: list[str | Path] = [*([result.card.source] if result.card else []), *result.paths]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots)
     show_result(result)

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import numpy as np
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number
 from tank2sim.errors import InputError
 
 OVERLAP_S = 2.0
@@ -65,7 +65,7 @@ class LogFinding:
     kind: str
     text: str
     stream: str = ""
-    evidence: Mapping[str, float] = field(default_factory=dict)
+    evidence: Mapping[str, Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,9 @@ from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Tr
 
 CUT_BY = "cut by tank2sim"
 """Words in a comment of every trial that is cut from a log."""
+
+_HEAD_LINES = 100
+"""Lines of a file in which the comments of a trial are looked for."""
 
 LEAD_S = 5.0
 """Time before the execute with which a trial begins, s. Project choice: long enough to see the approach, too short for
@@ -211,3 +215,24 @@ def _with_thrusters(text: str, trial: Trial, thrusters: Mapping[str, Array], rem
         cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
         out.write(f"{line},{','.join(cells)}\n")
     return out.getvalue()
+
+
+def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
+    """Remove the trials that an earlier run cut into a folder and this one did not write; return their names.
+
+    Only files that say in their comments that they were cut by tank2sim are removed.
+
+    Parameters
+    ----------
+    folder : Path
+    written : iterable of Path
+        Files of this run, which stay.
+    """
+    removed = []
+    for path in sorted(set(folder.glob("[0-9][0-9]*_*.csv")) - set(written)):
+        with path.open(encoding="utf-8", errors="replace") as file:
+            head = [line for line in itertools.islice(file, _HEAD_LINES) if line.startswith("#")]
+        if any(CUT_BY in line for line in head):
+            path.unlink()
+            removed.append(path.name)
+    return removed

@@ -11,7 +11,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.logs.channel_search import find_channels
-from tank2sim.logs.channels import SURE_FROM, ChannelSet, LogChannel
+from tank2sim.logs.channels import SURE_FROM, ChannelSet
 from tank2sim.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.logs.content import AGREES
 from tank2sim.logs.missing import without_missing
@@ -316,23 +316,3 @@ def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
         text = f"nothing for {shown}{more}: {'; '.join(words for words, _ in members)}"
         findings.append(LogFinding("note", text, evidence={"total_s": sum(end - begin for begin, end in gaps)}))
     return findings
-
-
-def channel_rows(voyage: Voyage) -> list[list[object]]:
-    """Rows of a table of the channels: quantity, stream, unit, sign, confidence, use, why."""
-    return [
-        [
-            channel.quantity,
-            channel.stream,
-            _unit_text(channel),
-            channel.sign,
-            channel.confidence,
-            channel.use,
-            channel.why,
-        ]
-        for channel in voyage.channels.channels
-    ]
-
-
-def _unit_text(channel: LogChannel) -> str:
-    return channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}"

@@ -44,17 +44,16 @@ def found(esso, scaled):
 def test_a_model_and_her_ship_make_the_same_tracks_at_one_size(found) -> None:
     assert [trial.name for trial in found.trials][-1] == "full astern stop"
     for trial in found.trials:
-        for row in trial.figures:
-            assert row.values[1] == pytest.approx(row.values[0], rel=2e-5, abs=1e-5), (trial.name, row.name)
+        for name, row in trial.figures.items():
+            assert row.values[1] == pytest.approx(row.values[0], rel=2e-5, abs=1e-5), (trial.name, name)
         one, two = trial.tracks
         assert two.x_m[-1] == pytest.approx(one.x_m[-1], rel=2e-4, abs=1e-3)
-        assert two.time_s[-1] == pytest.approx(one.time_s[-1], rel=2e-4)
+        assert two.t_s[-1] == pytest.approx(one.t_s[-1], rel=2e-4)
 
 
 def test_members_are_the_same_ships_at_both_sizes_and_again(found, esso) -> None:
-    rows = {row.name: row for row in found.trials[0].figures}
-    row = rows["advance_m"]
-    assert row.deviations[0] and row.deviations[1] == pytest.approx(row.deviations[0], rel=1e-3)
+    first, second = found.trials[0].figures["advance_m"].standard_deviations
+    assert first and second == pytest.approx(first, rel=1e-3)
     ship = ship_of(esso)
     assert members(esso, ship.model, 3)[0] == members(esso, ship.model, 5)[0][:3]
 
@@ -77,17 +76,16 @@ def test_members_vary_together_as_the_covariance_next_to_the_card_says(mariner_c
 
 def test_the_summary_counts_what_is_beyond_two_errors(found, esso) -> None:
     # One card at two sizes has no second number that could agree or differ.
-    assert found.beyond(1) == 0 and found.rms(1) is None and found.in_errors(1) == ()
-    summary = found.as_json()["summary"][0]
-    assert summary["compared"] == 0 and summary["same_number"] == found.same(1) > 20
+    (summary,) = found.summary
+    assert summary.compared == 0 and summary.beyond_two_standard_errors == 0 and summary.rms_standard_errors is None
+    assert summary.same_number > 20
 
 
 def test_a_stronger_rudder_turns_in_less_room(esso) -> None:
     stronger = {**esso.derivatives, "Nd": 1.3 * esso.derivatives["Nd"]}
     found = compare_cards([esso, replace(esso, derivatives=stronger)], 0)
-    rows = {row.name: row for row in found.trials[0].figures}
-    assert rows["tactical_diameter_m"].difference(1) < 0
-    assert rows["tactical_diameter_m"].in_errors(1) is None
+    diameter = found.trials[0].figures["tactical_diameter_m"]
+    assert diameter.differences[0] < 0 and diameter.differences_standard_errors == (None,)
     (rudder,) = [row.differences[0] for row in found.coefficients if row.name == "Nd"]
     assert rudder.standard_errors == pytest.approx(0.3 * 0.0015 / (math.sqrt(2) * 0.0006))
 

@@ -133,7 +133,7 @@ def test_the_step_hardly_matters_and_a_coarse_one_does(mariner_card) -> None:
     coarse, _ = verify(replace(ship, model=coarse_model, integrator=type(ship.integrator)(coarse_model)), 0)
     own, rough = ({(one.trial, one.name): one for one in rows} for rows in (fine, coarse))
     key = ("zigzag 20/20", "overshoot_1_deg")
-    assert own[key].numerical < 1e-3 < rough[key].numerical
+    assert own[key].U_num < 1e-3 < rough[key].U_num
     assert own[key].deviation is None
 
 

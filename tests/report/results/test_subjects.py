@@ -27,31 +27,6 @@ HISTORIES = {
     "x_m": [0.0, 7.0, 14.0, 21.0],
     "y_m": [0.0, 0.1, 0.3, 0.6],
 }
-VALIDATED = {
-    "kind": "validate",
-    "ship": "A ship",
-    "documentation": {"Ship": "length 100 m"},
-    "coefficients": {},
-    "propulsion": True,
-    "imo": [],
-    "notices": [],
-    "verdict": "of 1 figures 1 validated",
-    "counts": {"validated": 1, "not validated": 0},
-    "figures": [
-        {"trial": "zigzag", "name": "overshoot_1_deg", "measured": 10.0, "simulated": 11.0, "error": 1.0}
-        | {"level_percent": 15.0, "outcome": "validated", "manoeuvre": "zigzag 20/20", "inputs": 0.5, "data": 0.5}
-        | {"numerical": 0.0, "uncertainty": 1.5, "required_percent": 20.0}
-    ],
-    "verification": [],
-    "replays": [
-        {
-            "trial": "zigzag",
-            "errors": [],
-            "measured": HISTORIES,
-            "simulated": {**HISTORIES, "u_mps": [7.0, 6.95, 6.9, 6.85]},
-        }
-    ],
-}
 WAY = {"name": "starboard", "figures": {}, "ahead_m": [0.0, 500.0, 600.0], "starboard_m": [0.0, 50.0, 400.0]}
 POSTER = {"ship": "A ship", "turning_circles_deep": [WAY], "turning_circles_shallow": [], "stops": [], "telegraph": []}
 
@@ -78,14 +53,6 @@ def drawn(result: Any) -> dict[str, Illustration]:
     return charts_of(result_page(json.loads(json_text(result)), "r.json"))
 
 
-def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -> None:
-    charts = drawn(VALIDATED)
-    (row,) = (row for row in rows_of(charts["Comparison error and validation uncertainty"].chart) if "e" in row)
-    assert (row["e"], row["low"], row["high"]) == (10.0, -15.0, 15.0)
-    speeds = panels_of(charts["Histories: zigzag"])["surge velocity (m/s)"]
-    assert [row["v"] for row in speeds if row["run"] == "simulated"] == [7.0, 6.95, 6.9, 6.85]
-
-
 def test_the_turning_circle_of_a_poster_is_drawn_with_the_way_ahead_up() -> None:
     track = [row for row in rows_of(drawn(POSTER)["Turning circles in deep water"].chart) if row.get("i") is not None]
     assert [(row["x"], row["y"]) for row in track[:3]] == list(zip(WAY["ahead_m"], WAY["starboard_m"], strict=True))
@@ -107,7 +74,7 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
 def test_the_charts_of_every_kind_open_without_a_word_in_the_console(tmp_path: Any) -> None:
-    results = [VALIDATED, POSTER]
+    results = [POSTER]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         Section(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

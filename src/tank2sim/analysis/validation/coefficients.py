@@ -78,14 +78,6 @@ class CoefficientRow:
     cards: tuple[CardCoefficient, ...]
     differences: tuple[Difference, ...]
 
-    def as_json(self) -> dict[str, object]:
-        """The JSON form."""
-        return {
-            "name": self.name,
-            "cards": [vars(card) for card in self.cards],
-            "differences": [vars(difference) for difference in self.differences],
-        }
-
 
 @dataclass(frozen=True)
 class Expansion:

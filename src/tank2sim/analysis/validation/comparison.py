@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,156 +40,121 @@ SAME_SIZE = 0.03
 """Lengths and breadths that differ by less than this share are of the same ship: definitions differ. Project choice."""
 
 
-@dataclass(frozen=True, eq=False)
-class CardTrack:
-    """The path of a card's ship in a trial, at the reference's size: s, m."""
+_TRACK_POINTS = 200
+"""Points of a track in the JSON, for charts."""
 
-    label: str
-    time_s: Array
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CardTrack:
+    """Path of a card's ship in a trial at the reference's size, thinned to draw: s, and m north and east (n,)."""
+
+    card: str
+    t_s: Array
     x_m: Array
     y_m: Array
 
 
-@dataclass(frozen=True)
-class FigureRow:
+@dataclass(frozen=True, kw_only=True)
+class ComparedFigure:
     """A figure by all cards at the reference's size.
 
     Parameters
     ----------
-    name : str
-        With its unit.
-    values, deviations : tuple of float or None
+    values, standard_deviations : tuple of float or None
         One for each card, the reference first; None where the run did not show it, or its error is unknown.
-    outside : tuple of bool
-        True where the run had left the card's range before the figure was reached.
+    outside_card_range : tuple of bool
+        Whether the run had left the card's range before the figure was reached.
+    differences : tuple of float or None
+        Each card but the reference less the reference.
+    differences_standard_errors : tuple of float or None
+        The same over the root of both variances.
     """
 
-    name: str
     values: tuple[float | None, ...]
-    deviations: tuple[float | None, ...]
-    outside: tuple[bool, ...] = ()
-
-    def difference(self, place: int) -> float | None:
-        """A card's figure less the reference's."""
-        value, first = self.values[place], self.values[0]
-        return None if value is None or first is None else value - first
-
-    def in_errors(self, place: int) -> float | None:
-        """The difference over the root of both variances."""
-        apart, deviation, first = self.difference(place), self.deviations[place], self.deviations[0]
-        if apart is None or deviation is None or first is None or not math.hypot(deviation, first):
-            return None
-        return apart / math.hypot(deviation, first)
+    standard_deviations: tuple[float | None, ...]
+    outside_card_range: tuple[bool, ...]
+    differences: tuple[float | None, ...]
+    differences_standard_errors: tuple[float | None, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class TrialComparison:
-    """A standard trial by all cards: figures, tracks, and errors."""
+    """A standard trial by all cards: figures by name with their unit, and tracks."""
 
     name: str
-    figures: tuple[FigureRow, ...]
+    figures: dict[str, ComparedFigure]
     tracks: tuple[CardTrack, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
+class ComparedCard:
+    """A card: its label, the name of its ship, and the source of its numbers."""
+
+    label: str
+    ship: str
+    source: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class CardSummary:
+    """Coefficients of a card next to those of the reference.
+
+    Parameters
+    ----------
+    card : str
+        Label.
+    compared : int
+        Coefficients compared in standard errors.
+    same_number : int
+        Coefficients identical to the reference's; they are not compared.
+    beyond_two_standard_errors : int
+        Coefficients that differ by more than :data:`.BEYOND_STANDARD_ERRORS`.
+    rms_standard_errors : float or None
+        Root mean square of the differences: 1 if they are by chance; None without any.
+    """
+
+    card: str
+    compared: int
+    same_number: int
+    beyond_two_standard_errors: int
+    rms_standard_errors: float | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CardComparison:
     """Comparison of cards; the first is the reference.
 
     Parameters
     ----------
-    labels, ships, sources : tuple of str
-        Label of each card, its ship, and the source of its numbers.
+    cards : tuple of ComparedCard
+    summary : tuple of CardSummary
+        One for each card but the reference.
     coefficients, effects : tuple of CoefficientRow
-        Coefficients in the reference's convention (of craft SI), and parameters of the effects and thrusters, SI.
-    trials : tuple
+        Coefficients in the reference's convention (those of craft in SI), and parameters of effects and thrusters, SI.
+    trials : tuple of TrialComparison
+    craft : bool
+        Whether the cards are those of a craft with thrusters.
     members : int
         Size of the ensembles behind the deviations of the figures.
     notices : tuple of str
+    kind : str
+        Always ``compare``.
     """
 
-    labels: tuple[str, ...]
-    ships: tuple[str, ...]
-    sources: tuple[str, ...]
+    cards: tuple[ComparedCard, ...]
+    summary: tuple[CardSummary, ...]
     coefficients: tuple[CoefficientRow, ...]
     effects: tuple[CoefficientRow, ...]
     trials: tuple[TrialComparison, ...]
+    craft: bool
     members: int
-    notices: tuple[str, ...] = field(default=())
+    notices: tuple[str, ...]
+    kind: str = "compare"
 
     @property
     def rows(self) -> tuple[CoefficientRow, ...]:
         """Coefficients and parameters of effects."""
         return (*self.coefficients, *self.effects)
-
-    def in_errors(self, place: int) -> tuple[float, ...]:
-        """Differences of a card (1 is the first after the reference) in standard errors, except for :data:`.SAME`."""
-        found = [row.differences[place - 1].standard_errors for row in self.rows]
-        return tuple(difference for difference in found if difference is not None)
-
-    def same(self, place: int) -> int:
-        """Number of coefficients of a card that are identical to the reference's."""
-        return sum(row.differences[place - 1].why == SAME for row in self.rows)
-
-    def beyond(self, place: int) -> int:
-        """Number of coefficients that differ by more than :data:`.BEYOND` standard errors."""
-        return sum(abs(difference) > BEYOND_STANDARD_ERRORS for difference in self.in_errors(place))
-
-    def rms(self, place: int) -> float | None:
-        """Root mean square of the differences in standard errors: 1 if they are by chance."""
-        found = self.in_errors(place)
-        return math.sqrt(sum(difference**2 for difference in found) / len(found)) if found else None
-
-    def as_json(self) -> dict[str, object]:
-        """All values; tracks thinned to 200 points."""
-        columns = range(1, len(self.labels))
-        return {
-            "kind": "compare",
-            "cards": [
-                {"label": label, "ship": ship, "source": source}
-                for label, ship, source in zip(self.labels, self.ships, self.sources, strict=True)
-            ],
-            "summary": [
-                {
-                    "card": self.labels[place],
-                    "compared": len(self.in_errors(place)),
-                    "same_number": self.same(place),
-                    "beyond_two_standard_errors": self.beyond(place),
-                    "rms_standard_errors": self.rms(place),
-                }
-                for place in columns
-            ],
-            "coefficients": [row.as_json() for row in self.coefficients],
-            "effects": [row.as_json() for row in self.effects],
-            "trials": [self._trial_json(trial) for trial in self.trials],
-            "members": self.members,
-            "notices": list(self.notices),
-        }
-
-    def _trial_json(self, trial: TrialComparison) -> dict[str, object]:
-        columns = range(1, len(self.labels))
-        return {
-            "name": trial.name,
-            "figures": {
-                row.name: {
-                    "values": list(row.values),
-                    "standard_deviations": list(row.deviations),
-                    "outside_card_range": list(row.outside),
-                    "differences": [row.difference(place) for place in columns],
-                    "differences_standard_errors": [row.in_errors(place) for place in columns],
-                }
-                for row in trial.figures
-            },
-            "tracks": [
-                {
-                    "card": track.label,
-                    **{
-                        name: values[:: max(1, len(values) // 200)]
-                        for name, values in (("t_s", track.time_s), ("x_m", track.x_m), ("y_m", track.y_m))
-                    },
-                }
-                for track in trial.tracks
-            ],
-        }
 
 
 def compare_cards(cards: Sequence[SteeredCard], count: int = MEMBERS) -> CardComparison:
@@ -223,11 +188,33 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = MEMBERS) -> CardCom
         trial, trouble = _trial(name, manoeuvre, ships, labels, [draws for draws, _ in drawn])
         trials.append(trial)
         notices += trouble
-    names = tuple(card.ship.name for card in cards)
-    sources = tuple(card.ship.source for card in cards)
-    unique = tuple(dict.fromkeys(notices))
     effects = compare_effects(cards, [ship.model for ship in ships])
-    return CardComparison(labels, names, sources, rows, effects, tuple(trials), count, unique)
+    return CardComparison(
+        cards=tuple(
+            ComparedCard(label=label, ship=card.ship.name, source=card.ship.source)
+            for label, card in zip(labels, cards, strict=True)
+        ),
+        summary=tuple(_summary(label, place, (*rows, *effects)) for place, label in enumerate(labels[1:])),
+        coefficients=rows,
+        effects=effects,
+        trials=tuple(trials),
+        craft=bool(craft),
+        members=count,
+        notices=tuple(dict.fromkeys(notices)),
+    )
+
+
+def _summary(label: str, place: int, rows: Sequence[CoefficientRow]) -> CardSummary:
+    """Summary of a card by the place of its differences."""
+    differences = [row.differences[place] for row in rows]
+    known = [one.standard_errors for one in differences if one.standard_errors is not None]
+    return CardSummary(
+        card=label,
+        compared=len(known),
+        same_number=sum(one.why == SAME for one in differences),
+        beyond_two_standard_errors=sum(abs(difference) > BEYOND_STANDARD_ERRORS for difference in known),
+        rms_standard_errors=math.sqrt(sum(difference**2 for difference in known) / len(known)) if known else None,
+    )
 
 
 def _craft_of(cards: Sequence[SteeredCard]) -> list[CraftCard]:
@@ -316,16 +303,35 @@ def _trial(
         deviations.append(_scaled(spread, ratio))
         tracks.append(_track(label, run.trajectory, ratio))
     names = dict.fromkeys(figure for figures in found for figure in figures)
-    rows = tuple(
-        FigureRow(
-            name,
-            tuple(figures.get(name) for figures in found),
-            tuple(errors.get(name) for errors in deviations),
-            tuple(name in beyond for beyond in outside),
+    figures = {
+        figure: _compared(
+            [values.get(figure) for values in found],
+            [errors.get(figure) for errors in deviations],
+            [figure in beyond for beyond in outside],
         )
-        for name in names
+        for figure in names
+    }
+    return TrialComparison(name=name, figures=figures, tracks=tuple(tracks)), messages
+
+
+def _compared(
+    values: Sequence[float | None], deviations: Sequence[float | None], outside: Sequence[bool]
+) -> ComparedFigure:
+    first, first_deviation = values[0], deviations[0]
+    differences: list[float | None] = []
+    in_errors: list[float | None] = []
+    for value, deviation in zip(values[1:], deviations[1:], strict=True):
+        apart = None if value is None or first is None else value - first
+        both = None if deviation is None or first_deviation is None else math.hypot(deviation, first_deviation)
+        differences.append(apart)
+        in_errors.append(apart / both if apart is not None and both else None)
+    return ComparedFigure(
+        values=tuple(values),
+        standard_deviations=tuple(deviations),
+        outside_card_range=tuple(outside),
+        differences=tuple(differences),
+        differences_standard_errors=tuple(in_errors),
     )
-    return TrialComparison(name, rows, tuple(tracks)), messages
 
 
 def _numbers(run: Run | str) -> Numbers:
@@ -349,7 +355,9 @@ def _scaled(figures: Numbers, ratio: float) -> Numbers:
 def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
     # To the same course: a card's ship may start at rest on another heading only by its file, never here.
     x, y = run["motion.x"] - run["motion.x"][0], run["motion.y"] - run["motion.y"][0]
-    return CardTrack(label, np.sqrt(ratio) * run.t, ratio * x, ratio * y)
+    every = max(1, len(x) // _TRACK_POINTS)
+    time = np.sqrt(ratio) * run.t
+    return CardTrack(card=label, t_s=time[::every], x_m=ratio * x[::every], y_m=ratio * y[::every])
 
 
 def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[str]:

@@ -101,6 +101,15 @@ class Validated:
         U_reqd in per cent of D.
     made_card : bool
         True if the card was identified from the trial.
+    error : float or None
+        E = S - D. This and the following are derived from the others, whatever is given.
+    uncertainty : float or None
+        U_val, expanded; None where u_input is unknown.
+    level_percent : float or None
+        U_val in per cent of the measured figure.
+    outcome : ComparisonOutcome
+        Open where U_val is unknown, not validated where the simulation does not reach the figure. A figure of a trial
+        that the card was identified from is at best fitted, not validated.
     """
 
     trial: str
@@ -113,63 +122,59 @@ class Validated:
     data: float = 0.0
     required_percent: float = REQUIRED
     made_card: bool = False
+    error: float | None = None
+    uncertainty: float | None = None
+    level_percent: float | None = None
+    outcome: ComparisonOutcome = ComparisonOutcome.OPEN
 
-    @property
-    def error(self) -> float | None:
-        """E = S - D."""
-        return None if self.simulated is None else self.simulated - self.measured
+    def __post_init__(self) -> None:
+        error = None if self.simulated is None else self.simulated - self.measured
+        uncertainty = level = None
+        if self.inputs is not None:
+            uncertainty = COVERAGE * math.sqrt(self.numerical**2 + self.inputs**2 + self.data**2)
+            level = 100 * uncertainty / abs(self.measured) if self.measured else None
+        derived = {"error": error, "uncertainty": uncertainty, "level_percent": level}
+        for name, value in (derived | {"outcome": self._outcome(error, uncertainty)}).items():
+            object.__setattr__(self, name, value)
 
-    @property
-    def uncertainty(self) -> float | None:
-        """U_val, expanded; None where u_input is unknown."""
-        if self.inputs is None:
-            return None
-        return COVERAGE * math.sqrt(self.numerical**2 + self.inputs**2 + self.data**2)
-
-    @property
-    def level_percent(self) -> float | None:
-        """U_val in per cent of the measured figure."""
-        if self.uncertainty is None or not self.measured:
-            return None
-        return 100 * self.uncertainty / abs(self.measured)
-
-    @property
-    def outcome(self) -> ComparisonOutcome:
-        """Outcome: open where U_val is unknown, not validated where the simulation does not reach the figure.
-
-        A figure of a trial that the card was identified from is at best fitted, not validated.
-        """
-        if self.error is None:
+    def _outcome(self, error: float | None, uncertainty: float | None) -> ComparisonOutcome:
+        if error is None:
             return ComparisonOutcome.REFUTED
-        if self.uncertainty is None:
+        if uncertainty is None:
             return ComparisonOutcome.OPEN
-        if abs(self.error) > self.uncertainty:
+        if abs(error) > uncertainty:
             return ComparisonOutcome.REFUTED
         if self.made_card:
             return ComparisonOutcome.FITTED
-        loose = self.uncertainty > self.required_percent / 100 * abs(self.measured)
+        loose = uncertainty > self.required_percent / 100 * abs(self.measured)
         return ComparisonOutcome.UNCERTAIN if loose else ComparisonOutcome.VALIDATED
-
-    def as_json(self) -> dict[str, object]:
-        """With E, U_val and outcome."""
-        result = {"error": self.error, "uncertainty": self.uncertainty, "level_percent": self.level_percent}
-        return {**vars(self), **result, "outcome": str(self.outcome)}
 
 
 @dataclass(frozen=True)
 class Verified:
-    """One figure of a standard trial: its value, its change when the step is halved, its deviation by the inputs."""
+    """A figure of a standard trial.
+
+    Parameters
+    ----------
+    trial, name : str
+    value : float
+    halving : float or None
+        Change when the step is halved.
+    deviation : float or None
+        Standard deviation by the errors of the card.
+    U_num : float or None
+        Numerical uncertainty, expanded; derived from `halving`, whatever is given.
+    """
 
     trial: str
     name: str
     value: float
     halving: float | None
     deviation: float | None
+    U_num: float | None = None
 
-    @property
-    def numerical(self) -> float | None:
-        """U_num, expanded."""
-        return None if self.halving is None else SAFETY * abs(self.halving)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "U_num", None if self.halving is None else SAFETY * abs(self.halving))
 
 
 @dataclass(frozen=True)
@@ -180,26 +185,20 @@ class Validation:
     members: int
     notices: tuple[str, ...] = ()
 
-    def count(self, outcome: ComparisonOutcome) -> int:
-        """Number of figures with an outcome."""
-        return sum(figure.outcome is outcome for figure in self.figures)
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of figures by outcome."""
+        return {
+            outcome.value: sum(figure.outcome is outcome for figure in self.figures) for outcome in ComparisonOutcome
+        }
 
     @property
     def verdict(self) -> str:
         """Summary in words."""
         if not self.figures:
             return "not validated: no trial can be compared"
-        messages = [f"{self.count(outcome)} {outcome}" for outcome in ComparisonOutcome if self.count(outcome)]
-        return f"of {len(self.figures)} figures {', '.join(messages)}"
-
-    def as_json(self) -> dict[str, object]:
-        """All values."""
-        return {
-            "verdict": self.verdict,
-            "counts": {str(outcome): self.count(outcome) for outcome in ComparisonOutcome},
-            "figures": [figure.as_json() for figure in self.figures],
-            "members": self.members,
-        }
+        found = ", ".join(f"{count} {outcome}" for outcome, count in self.counts.items() if count)
+        return f"{len(self.figures)} figures: {found}"
 
 
 def validate_card(

@@ -32,25 +32,18 @@ class CandidateTrial:
     ----------
     words : str
         Orders in words, revolutions in % of the largest: port/starboard.
-    orders : tuple of (float, float, float)
-        Time (s) and orders of the thrusters at port and at starboard, shares of their largest revolutions.
+    t_s : tuple of float
+    order_port, order_starboard : tuple of float
+        Orders of the thrusters at these times, shares of their largest revolutions.
     determines : tuple of str
         Coefficients that the trials so far do not determine and that it would.
     """
 
     words: str
-    orders: tuple[tuple[float, float, float], ...]
+    t_s: tuple[float, ...]
+    order_port: tuple[float, ...]
+    order_starboard: tuple[float, ...]
     determines: tuple[str, ...]
-
-    def as_json(self) -> dict[str, object]:
-        """Plain data for a JSON file."""
-        return {
-            "words": self.words,
-            "t_s": [row[0] for row in self.orders],
-            "order_port": [row[1] for row in self.orders],
-            "order_starboard": [row[2] for row in self.orders],
-            "determines": list(self.determines),
-        }
 
 
 def _patterns() -> dict[str, list[tuple[float, float, float]]]:
@@ -109,7 +102,8 @@ def next_trials(card: CraftCard, fit: CraftFit) -> list[CandidateTrial]:
             if errors[place] <= TRIALS_SHARE * problem.prior_error[place]
             or errors[place] <= IDENTIFIED_SHARE * abs(fit.estimate.values[place])
         ]
-        found.append(CandidateTrial(words, orders, tuple(determined)))
+        times, port, starboard = zip(*orders, strict=True)
+        found.append(CandidateTrial(words, times, port, starboard, tuple(determined)))
     return sorted(found, key=lambda candidate: -len(candidate.determines))
 
 

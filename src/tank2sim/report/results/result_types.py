@@ -47,17 +47,8 @@ RESULT_TYPES = (
         "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("Log of a voyage", "log", ("logs", "channels", "stretches"), ()),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
     ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
-    ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),
-    ResultType("Validation", "validate", ("verification", "counts", "figures"), ("verdict",)),
-    ResultType(
-        "Validation of a craft",
-        "validate",
-        ("determination", "end_distance_m", "trials"),
-        ("determination.u", "determination.v", "determination.r"),
-    ),
     ResultType("Bridge", "poster pilotcard", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
     ResultType("Ship to steer", "steer", ("ship", "steerable"), ("steerable",)),
 )

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
-from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.json_values import Json
-from tank2sim.report.logs.page import log_page
 from tank2sim.report.results.motions import from_the_bridge
-from tank2sim.report.validation.page import validation_page
 
 
 @dataclass(frozen=True)
@@ -46,15 +43,6 @@ _SECTIONS: Mapping[str, _Sections] = {
 }
 
 _PAGES: Mapping[str, _Page] = {
-    "Cards compared": _Page(
-        compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
-    ),
-    "Validation": _Page(
-        validation_page,
-        {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
-        | {"imo": list, "replays": list, "notices": list},
-    ),
-    "Log of a voyage": _Page(log_page, {"logs": list, "channels": list, "stretches": list, "time_line": dict}),
     "Coefficients from trials": _Page(
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}

@@ -1,4 +1,4 @@
-"""Charts of a validation: comparison errors next to their uncertainty, and replays of trials."""
+"""Chart of a validation: comparison errors next to their uncertainty."""
 
 from __future__ import annotations
 
@@ -6,33 +6,33 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
+from tank2sim.analysis.validation.study import Validated
 from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
-from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 COMPARISON_ERRORS = (
     "Points: error E of the simulation. Bars: plus and minus its uncertainty U_val; a point within its bar is "
     "validated, if the bar is short enough. The number is that of the trial."
 )
-"""What the chart of comparison errors shows."""
+"""Caption of the chart of comparison errors."""
 
 
-def comparison_error_chart(figures: Sequence[Mapping[str, Json]], numbers: Mapping[str, int]) -> alt.LayerChart:
-    """E of each of the ``figures`` of the JSON next to plus and minus U_val, in per cent of D.
+def comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, int]) -> alt.LayerChart:
+    """E of each figure next to plus and minus U_val, in per cent of D.
 
     `numbers` are those of the trials by name.
     """
     rows = []
     for figure in figures:
-        if figure["error"] is None or not figure["measured"]:
+        if figure.error is None or not figure.measured:
             continue
         content = {
-            "name": f"{numbers[figure['trial']]}: {in_words(figure['name'])[0]}",
-            "trial": figure["trial"],
-            "e": 100 * figure["error"] / abs(figure["measured"]),
+            "name": f"{numbers[figure.trial]}: {in_words(figure.name)[0]}",
+            "trial": figure.trial,
+            "e": 100 * figure.error / abs(figure.measured),
         }
-        level = figure["level_percent"] or 0.0
-        rows.append({**content, "low": -level, "high": level, "run": str(figure["outcome"])})
+        level = figure.level_percent or 0.0
+        rows.append({**content, "low": -level, "high": level, "run": figure.outcome.value})
     names = [str(row["name"]) for row in rows]
     y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=170))
     outcomes = list(dict.fromkeys(str(row["run"]) for row in rows))

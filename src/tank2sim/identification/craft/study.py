@@ -1,0 +1,324 @@
+"""Studies of a craft's trials: coefficients with their verdicts, and free-running predictions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.arrays import Array, Number
+from tank2sim.cards.card import CraftCard
+from tank2sim.cards.examination import doubts
+from tank2sim.identification.craft.fit import (
+    PREDICTION_LEAD_S,
+    SHORTEST_PREDICTION_S,
+    CoefficientVerdict,
+    CraftFit,
+    FreePrediction,
+    determination,
+)
+from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
+from tank2sim.identification.craft.order_response import OrderResponse
+from tank2sim.marks import CHECK
+from tank2sim.units import from_si
+
+NOT_ITS_OWN = (
+    "a trial that the card was identified from shows how well it was fitted, and not how well the card predicts"
+)
+"""Notice of each validation: a card of a craft does not say what it was identified from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CraftCoefficient:
+    """A coefficient of a craft, SI.
+
+    Parameters
+    ----------
+    value, standard_error : float
+    before, prior_standard_error : float
+        Value and standard error of the card.
+    verdict : CoefficientVerdict
+    by : str or None
+        Trial without which the standard error would grow most; None where no trial determines it.
+    """
+
+    value: float
+    standard_error: float
+    before: float
+    prior_standard_error: float
+    verdict: CoefficientVerdict
+    by: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThrusterResponse:
+    """Response of a thruster to its orders.
+
+    Parameters
+    ----------
+    lag_s, lag_error_s : float
+        Time constant and its standard error.
+    dead_band_rpm, dead_band_error_rpm : float or None
+        None where no order left the propeller at rest.
+    rest_rpm, turning_rpm : float
+        Largest order at which the propeller rested, 0 without any, and least order at which it turned.
+    """
+
+    lag_s: float
+    lag_error_s: float
+    dead_band_rpm: float | None
+    dead_band_error_rpm: float | None
+    rest_rpm: float
+    turning_rpm: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CraftIdentificationStudy:
+    """Coefficients and thrust curves of a craft with thrusters.
+
+    Parameters
+    ----------
+    ship, method : str
+    trials, held_out : tuple of str
+        Names of the trials that were fitted, and held out (also those too short to be predicted).
+    coefficients : dict
+        By name without ``derivatives.`` and ``thrusters.``.
+    noise : dict
+        Standard deviation of the noise by signal, SI.
+    determination : dict or None
+        R^2 of u, v and r of all predictions of held-out trials, next to the smoothed motion; None without any.
+    driven_by : str
+        ``revolutions`` of the thrusters, or their ``orders``.
+    order_responses : dict
+        By thruster, where the trials hold orders next to revolutions.
+    next_trials : tuple of CandidateTrial
+        Manoeuvres of five minutes; the first determines most of the coefficients that these trials do not.
+    notices : tuple of str
+    """
+
+    ship: str
+    method: str
+    trials: tuple[str, ...]
+    coefficients: dict[str, CraftCoefficient]
+    noise: dict[str, Number]
+    determination: dict[str, Number] | None
+    driven_by: str
+    order_responses: dict[str, ThrusterResponse]
+    held_out: tuple[str, ...]
+    next_trials: tuple[CandidateTrial, ...]
+    notices: tuple[str, ...]
+
+
+def study_craft(
+    card: CraftCard,
+    found: CraftCard,
+    fit: CraftFit,
+    held: Mapping[str, FreePrediction | None],
+    responses: Mapping[str, OrderResponse],
+    driven_by: str,
+) -> CraftIdentificationStudy:
+    """Study of the fit of a craft.
+
+    Parameters
+    ----------
+    card, found : CraftCard
+        Given and found.
+    fit : CraftFit
+    held : mapping
+        Held-out trials by name, each with its predictions; None for one too short.
+    responses : mapping
+        Response to orders by thruster.
+    driven_by : str
+        ``revolutions`` or ``orders``.
+    """
+    predictions = [entry for entry in held.values() if entry is not None]
+    notices = list(dict.fromkeys((*doubts(card), *doubts(found))))
+    if open_thrust := [
+        name
+        for name, verdict in zip(fit.problem.free, fit.verdicts, strict=True)
+        if name.endswith((".ahead", ".astern")) and verdict is CoefficientVerdict.PRIOR
+    ]:
+        notices.append(f"{CHECK} the trials do not determine {', '.join(open_thrust)}: it is that of the card")
+    if held and not predictions:
+        least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
+        notices.append(f"no held-out trial is longer than {least:g} s: none is predicted")
+    if driven_by == "orders":
+        notices.append(
+            "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
+        )
+    notices += _dead_band_notices(card, responses, driven_by)
+    notices.append(
+        "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
+        "mass is one of all forces, in the same share"
+    )
+    return CraftIdentificationStudy(
+        ship=card.ship.name,
+        method=fit.estimate.method,
+        trials=tuple(run.name for run in fit.problem.runs),
+        coefficients=_coefficients(fit),
+        noise=dict(fit.estimate.measurement_noise),
+        determination=prediction_r_squared(predictions) if predictions else None,
+        driven_by=driven_by,
+        order_responses={name: _response(response) for name, response in responses.items()},
+        held_out=tuple(held),
+        next_trials=tuple(next_trials(card, fit)),
+        notices=tuple(notices),
+    )
+
+
+def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[str]:
+    if not responses:
+        words = "orders" if driven_by == "orders" else "revolutions"
+        other = "revolutions" if driven_by == "orders" else "orders"
+        return [f"dead bands are those of the card: the trials have {words}, and need {other} next to them"]
+    notices = []
+    for thruster in card.thrusters:
+        response = responses.get(thruster.name)
+        if response is None or response.dead_band is not None:
+            continue
+        least = from_si("n_rpm", response.turning_radps)
+        text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
+        if thruster.dead_band_radps >= response.turning_radps:
+            text = f"{CHECK} {text}, and one of {least:.3g} rpm, within it, turned it"
+        else:
+            text += f"; one of {least:.3g} rpm turned it"
+        notices.append(text)
+    return notices
+
+
+def _coefficients(fit: CraftFit) -> dict[str, CraftCoefficient]:
+    found = {}
+    for place, (name, verdict) in enumerate(zip(fit.problem.free, fit.verdicts, strict=True)):
+        known = verdict is not CoefficientVerdict.PRIOR
+        found[name.removeprefix("derivatives.").removeprefix("thrusters.")] = CraftCoefficient(
+            value=float(fit.estimate.values[place]),
+            standard_error=float(fit.estimate.standard_errors[place]),
+            before=float(fit.problem.prior_mean[place]),
+            prior_standard_error=float(fit.problem.prior_error[place]),
+            verdict=verdict,
+            by=fit.problem.runs[fit.best_run(place)].name if known else None,
+        )
+    return found
+
+
+def _response(response: OrderResponse) -> ThrusterResponse:
+    band, error = response.dead_band or (None, None)
+    return ThrusterResponse(
+        lag_s=response.lag_s,
+        lag_error_s=response.lag_error_s,
+        dead_band_rpm=None if band is None else float(from_si("n_rpm", band)),
+        dead_band_error_rpm=None if error is None else float(from_si("n_rpm", error)),
+        rest_rpm=float(from_si("n_rpm", response.rest_radps)),
+        turning_rpm=float(from_si("n_rpm", response.turning_radps)),
+    )
+
+
+def prediction_r_squared(predictions: Sequence[FreePrediction]) -> dict[str, float]:
+    """R^2 of u, v and r of all predictions, next to the smoothed motion."""
+    predicted = np.concatenate([entry.predicted for entry in predictions])
+    smoothed = np.concatenate([entry.smoothed for entry in predictions])
+    return dict(zip("uvr", map(float, determination(predicted, smoothed)), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CraftReplay:
+    """Free-running predictions of a trial.
+
+    Parameters
+    ----------
+    predictions : int
+        Number of predictions.
+    rms_u_mps, rms_v_mps, rms_r_degps : float
+        Root mean square errors of the motion.
+    end_distance_m, end_heading_deg : float or None
+        Root mean square errors of position and heading at the ends of predictions; None where nothing was measured.
+    """
+
+    predictions: int
+    rms_u_mps: Number
+    rms_v_mps: Number
+    rms_r_degps: Number
+    end_distance_m: float | None
+    end_heading_deg: float | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CraftValidationStudy:
+    """Free-running predictions of trials by a craft's card.
+
+    Parameters
+    ----------
+    ship : str
+    determination : dict
+        R^2 of u, v and r of all predictions, next to the motion smoothed with the card.
+    end_distance_m, end_heading_deg : float or None
+        As of :class:`CraftReplay`, for all trials.
+    trials : dict
+        Predictions by trial.
+    notices : tuple of str
+    """
+
+    ship: str
+    determination: dict[str, Number]
+    end_distance_m: float | None
+    end_heading_deg: float | None
+    trials: dict[str, CraftReplay]
+    notices: tuple[str, ...]
+
+
+def study_predictions(
+    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[str]
+) -> CraftValidationStudy:
+    """Study of predictions of trials by a card.
+
+    Parameters
+    ----------
+    card : CraftCard
+    files : sequence of str
+        Files of all trials.
+    predictions : sequence of FreePrediction
+        Those of trials that are long enough.
+    alike : sequence of str
+        Notices of trials that are alike.
+    """
+    known = {entry.run.file for entry in predictions}
+    short = [Path(file).name for file in files if file not in known]
+    least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
+    too_short = [f"not longer than {least:g} s, and not predicted: {', '.join(short)}"] if short else []
+    distance, heading = _at_ends(predictions)
+    return CraftValidationStudy(
+        ship=card.ship.name,
+        determination=prediction_r_squared(predictions),
+        end_distance_m=distance,
+        end_heading_deg=heading,
+        trials={entry.run.name: _replay(entry) for entry in predictions},
+        notices=(*doubts(card), *alike, *too_short, NOT_ITS_OWN),
+    )
+
+
+def _replay(prediction: FreePrediction) -> CraftReplay:
+    rms = np.sqrt(((prediction.predicted - prediction.smoothed) ** 2).mean(axis=0))
+    distance, heading = _at_ends([prediction])
+    return CraftReplay(
+        predictions=len(prediction.ends),
+        rms_u_mps=float(rms[0]),
+        rms_v_mps=float(rms[1]),
+        rms_r_degps=math.degrees(rms[2]),
+        end_distance_m=distance,
+        end_heading_deg=heading,
+    )
+
+
+def _at_ends(predictions: Sequence[FreePrediction]) -> tuple[float | None, float | None]:
+    """Rms distance (m) and heading error (deg) at the ends of predictions; None where nothing was measured there."""
+    ends = np.concatenate([entry.ends for entry in predictions])
+    turned = np.degrees((ends[:, 2] + np.pi) % (2 * np.pi) - np.pi)
+    return _rms(np.hypot(ends[:, 0], ends[:, 1])), _rms(turned)
+
+
+def _rms(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt((known**2).mean())) if len(known) else None

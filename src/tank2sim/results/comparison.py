@@ -1,0 +1,313 @@
+"""Result of ``compare``: cards of one ship compared by coefficients and by trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow, Difference
+from tank2sim.analysis.validation.comparison import CardComparison, CardSummary, ComparedFigure, TrialComparison
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.marks import assumed_words
+from tank2sim.results.comparison_charts import FigurePercent, errors_chart, percent_chart
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_MOST = 10
+"""Coefficients of each card on the screen; JSON and page have all. Project choice: they fit a screen."""
+
+_SHOWN = ("advance_m", "tactical_diameter_m", "overshoot_1_deg", "overshoot_2_deg", "track_reach_m")
+_SHOWN_OF_CRAFT = ("final_speed_mps", "steady_diameter_m", "steady_rate_degps", "final_rate_degps")
+"""Figures in the table of all trials."""
+
+_COEFFICIENTS = (
+    "Prime system, in the convention of the first card, the sign of its rudder included. A coefficient belongs to the "
+    "speed about which forces are expanded, to the speed that makes them non-dimensional, and to the inertial terms "
+    "that it includes. Where cards differ in these, the forces are expanded again to the third order, and the standard "
+    "errors with them. A difference is divided by the root of both variances: beyond 2 it is unlikely to be chance. "
+    "Coefficients identical to the reference are not compared."
+)
+_ASSUMED = "An asterisk marks a standard error that the card does not state: 2 % of the value."
+_TRIALS = (
+    "Simulated in calm water from the same approach speed, at the size of the first card's ship. In brackets: standard "
+    "deviation of each figure when the card's coefficients are drawn within their errors. z: difference over the root "
+    "of both variances."
+)
+_PERCENT = (
+    "Points: difference from the reference. Bars: plus and minus two standard deviations, by the errors of both cards."
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparisonResult(Result[CardComparison]):
+    """Cards of one ship compared; the first is the reference.
+
+    Parameters
+    ----------
+    study : CardComparison
+        In the convention and at the size of the reference.
+    ships : tuple of Ship
+        Empty if the result was read from its JSON.
+    """
+
+    study: CardComparison
+    ships: tuple[Any, ...] = ()
+    command: ClassVar[str] = "compare"
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the cards in the tables, the reference first."""
+        return tuple(card.label for card in self.study.cards)
+
+    @property
+    def summary(self) -> pd.DataFrame:
+        """By card but the reference (index): coefficients compared, the same number, beyond 2 standard errors, rms."""
+        import pandas as pd
+
+        return pd.DataFrame([asdict(summary) for summary in self.study.summary]).set_index("card")
+
+    @property
+    def coefficients(self) -> pd.DataFrame:
+        """A row each coefficient and card but the reference, in the reference's convention (prime; of effects SI).
+
+        Those of craft are in SI.
+
+        ``difference_percent`` is in per cent of the reference's size, ``standard_errors`` the difference over the root
+        of both variances; missing where they cannot be compared.
+        """
+        import pandas as pd
+
+        rows = [
+            (label, row.name, row.cards[0].value, row.cards[place].value, apart.percent, apart.standard_errors)
+            for place, label in self._others()
+            for row in self.study.rows
+            for apart in [row.differences[place - 1]]
+        ]
+        columns = ["card", "coefficient", "reference", "value", "difference_percent", "standard_errors"]
+        return pd.DataFrame(rows, columns=columns)
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures of the standard trials, a row each with its card: value, standard deviation, difference from the
+        reference, the same in standard errors; in the unit of the figure's name."""
+        import pandas as pd
+
+        rows = [
+            (trial.name, name, label, value, deviation, apart, errors)
+            for trial in self.study.trials
+            for name, row in trial.figures.items()
+            for label, value, deviation, apart, errors in zip(
+                self.labels,
+                row.values,
+                row.standard_deviations,
+                (None, *row.differences),
+                (None, *row.differences_standard_errors),
+                strict=True,
+            )
+        ]
+        columns = ["trial", "figure", "card", "value", "standard_deviation", "difference", "standard_errors"]
+        return pd.DataFrame(rows, columns=columns)
+
+    @property
+    def title(self) -> str:
+        """The ship of the reference."""
+        return self.study.cards[0].ship
+
+    @property
+    def subtitle(self) -> str:
+        """The cards."""
+        return f"Comparison of cards: {', '.join(self.labels)}"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Coefficients of each card that differ from the reference, and the figure that differs most."""
+        return (*map(self._compared_in_words, self.study.summary), *self._largest_in_words())
+
+    def _compared_in_words(self, summary: CardSummary) -> str:
+        rms = summary.rms_standard_errors
+        text = "" if rms is None else f", rms {rms:.3g} (1 by chance)"
+        text += f"; {summary.same_number} more are the reference's own numbers" if summary.same_number else ""
+        return (
+            f"{summary.card} against {self.labels[0]}: {summary.beyond_two_standard_errors} of {summary.compared} "
+            f"coefficients differ by more than {BEYOND_STANDARD_ERRORS:g} standard errors{text}."
+        )
+
+    def _largest_in_words(self) -> list[str]:
+        """The figure that differs most between the reference and another card."""
+        percents = self._percents()
+        if not percents:
+            return []
+        label, trial, figure, percent, _ = max(percents, key=lambda row: abs(row[3]))
+        text = f"{label} differs from {self.labels[0]} most in the {figure} of the {trial}: {percent:+.3g} %."
+        sure = [z for *_, z in percents if z is not None]
+        beyond = sum(abs(z) > BEYOND_STANDARD_ERRORS for z in sure)
+        many = f"{beyond} of {len(sure)} figures differ by more than {BEYOND_STANDARD_ERRORS:g} standard deviations."
+        return [f"{text} {many}" if sure else text]
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The figure of each card that differs most from the reference, and coefficients beyond two standard errors."""
+        percents, figures = self._percents(), []
+        for label in self.labels[1:]:
+            own = [row for row in percents if row[0] == label]
+            if own:
+                _, trial, figure, percent, _ = max(own, key=lambda row: abs(row[3]))
+                value = float(f"{percent:.3g}")
+                note = f"{trial}: {figure}"
+                figures.append(KeyFigure(label=f"{label}: largest difference", value=value, unit="%", note=note))
+        return [*figures, *map(_beyond, self.study.summary)]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Tracks, figures, coefficients and cards."""
+        rows = [[card.label, card.ship, card.source] for card in self.study.cards]
+        cards = table("Cards, the reference first", ("card", "ship", "source"), rows, on_screen=False)
+        return [*self._tracks(), *self._figures(), self._coefficients(), Section(heading="Cards", tables=[cards])]
+
+    def _others(self) -> list[tuple[int, str]]:
+        return list(enumerate(self.labels))[1:]
+
+    def _percents(self) -> list[FigurePercent]:
+        """Differences of the figures that both cards show."""
+        return [
+            (label, trial.name.replace(" deg to", ""), in_words(name)[0], 100 * apart / abs(first), z)
+            for trial in self.study.trials
+            for name, row in trial.figures.items()
+            for first in [row.values[0]]
+            for label, apart, z in zip(self.labels[1:], row.differences, row.differences_standard_errors, strict=True)
+            if apart is not None and first and not name.endswith("_lengths")
+        ]
+
+    def _tracks(self) -> list[Section]:
+        charts = []
+        for trial in self.study.trials:
+            tracks = [TrackData(label=one.card, x_m=one.x_m, y_m=one.y_m, time_s=one.t_s) for one in trial.tracks]
+            if tracks:
+                chart = track_chart(tracks, title=trial.name[:1].upper() + trial.name[1:], height_px=400)
+                charts.append(Illustration(chart=chart, half=True, name="tracks"))
+        return [Section(heading="Tracks", charts=charts)] if charts else []
+
+    def _figures(self) -> list[Section]:
+        """Differences of the figures from those of the reference, all manoeuvres in one chart."""
+        percents = self._percents()
+        if not percents:
+            return []
+        chart = percent_chart(percents, self.labels, assumed_words(self.notices))
+        drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
+        tables = [self._main_figures(), *map(self._trial_table, self.study.trials)]
+        return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
+
+    def _main_figures(self) -> Table:
+        shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
+        rows: list[list[Cell]] = [
+            [trial.name, " ".join(part for part in in_words(name) if part), *_with_deviations(row)]
+            for trial in self.study.trials
+            for name, row in trial.figures.items()
+            if name in shown
+        ]
+        return table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
+
+    def _trial_table(self, trial: TrialComparison) -> Table:
+        heads: list[str | Column] = ["figure", "unit", *self.labels]
+        for label in self.labels[1:]:
+            heads += [f"{label}: difference", Column(title="z", digits=3)]
+        rows: list[list[Cell]] = []
+        for name, row in trial.figures.items():
+            if name.endswith("_lengths"):  # the figure in m has the same differences
+                continue
+            cells: list[Cell] = [*in_words(name), *_with_deviations(row)]
+            for apart, z in zip(row.differences, row.differences_standard_errors, strict=True):
+                cells += [None if apart is None else format_number(apart, 3), z]
+            rows.append(cells)
+        return table(f"Figures of the {trial.name}", heads, rows, folded=True, on_screen=False)
+
+    def _coefficients(self) -> Section:
+        study = self.study
+        alike, alone, tables = 0, [], [self._farthest(place, label) for place, label in self._others()]
+        for caption, rows, factor in (
+            ("Coefficients that differ (values and errors times 1000)", study.coefficients, 1000.0),
+            ("Parameters of effects that differ, SI", study.effects, 1.0),
+        ):
+            shared = [row for row in rows if all(card.value is not None for card in row.cards)]
+            differing = [row for row in shared if any(apart.percent for apart in row.differences)]
+            alike += len(shared) - len(differing)
+            alone += [row.name for row in rows if any(card.value is None for card in row.cards)]
+            if differing:
+                tables.append(self._coefficient_table(caption, differing, factor))
+        texts = [_COEFFICIENTS, _ASSUMED]
+        texts += [f"{alike} numbers are the same on all cards."] if alike else []
+        texts += [f"Not on all cards: {', '.join(alone)}."] if alone else []
+        charts = []
+        if any(summary.compared for summary in study.summary):
+            caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
+            chart = errors_chart(study.rows, self.labels)
+            charts.append(Illustration(chart=chart, caption=caption, name="coefficients"))
+        return Section(heading="Coefficients", text="\n\n".join(texts), tables=tables, charts=charts)
+
+    def _farthest(self, place: int, label: str) -> Table:
+        every = [(row, row.differences[place - 1]) for row in self.study.rows]
+        known = [(abs(found.standard_errors), row, found) for row, found in every if found.standard_errors is not None]
+        # Without any standard error (two languages) by their share.
+        by_share = [(abs(found.percent), row, found) for row, found in every if found.percent]
+        farthest = sorted(known or by_share, key=lambda entry: -entry[0])[:_MOST]
+        rows: list[list[Cell]] = [
+            [row.name, row.cards[0].value, row.cards[place].value, found.percent, found.standard_errors]
+            for _, row, found in farthest
+        ]
+        heads = ("coefficient", self.labels[0], label, "difference (%)", "standard errors")
+        return table(f"Farthest apart: {label}", heads, rows)
+
+    def _coefficient_table(self, caption: str, rows: Sequence[CoefficientRow], factor: float) -> Table:
+        heads: list[str | Column] = ["coefficient"]
+        for label in self.labels:
+            heads += [Column(title=label, digits=6), Column(title="s.e.", digits=3)]
+        for label in self.labels[1:]:
+            heads += [Column(title=f"{label}: difference", unit="%", digits=3), Column(title="z", digits=3)]
+        return table(caption, [*heads, "remark"], [_coefficient_row(row, factor) for row in rows], on_screen=False)
+
+
+def _beyond(summary: CardSummary) -> KeyFigure:
+    compared, beyond = summary.compared, summary.beyond_two_standard_errors
+    rms = summary.rms_standard_errors
+    note = "no standard errors" if rms is None else f"rms {rms:.3g} standard errors"
+    note += f"; {summary.same_number} more taken over" if summary.same_number else ""
+    return KeyFigure(
+        label=f"{summary.card}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}",
+        value=f"{beyond} of {compared}",
+        # One in twenty differs by more by chance alone.
+        verdict=Verdict.PASSED if beyond <= 0.05 * compared + 1 else Verdict.CAUTION,
+        note=note,
+    )
+
+
+def _coefficient_row(row: CoefficientRow, factor: float) -> list[Cell]:
+    cells: list[Cell] = [row.name]
+    for card in row.cards:
+        error = None if card.standard_error is None else factor * card.standard_error
+        shown: Cell = error if card.stated or error is None else f"{error:.3g}*"
+        cells += [None if card.value is None else factor * card.value, shown]
+    for difference in row.differences:
+        cells += [difference.percent, difference.standard_errors]
+    return [*cells, _remarks(row.differences)]
+
+
+def _remarks(differences: Sequence[Difference]) -> str:
+    return "; ".join(dict.fromkeys(difference.why for difference in differences if difference.why))
+
+
+def _with_deviations(row: ComparedFigure) -> list[str | None]:
+    """The value of each card with its standard deviation in brackets."""
+    return [
+        None
+        if value is None
+        else format_number(value)
+        if deviation is None
+        else f"{format_number(value)} ({format_number(deviation, 2)})"
+        for value, deviation in zip(row.values, row.standard_deviations, strict=True)
+    ]

@@ -1,0 +1,367 @@
+"""Result of ``validate``: figures of trials next to simulated ones, with the validation uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, Verified
+from tank2sim.answer.charts.columns import motions
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.arrays import Columns, Number
+from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
+from tank2sim.results.imo import imo_section
+from tank2sim.results.validation_charts import COMPARISON_ERRORS, comparison_error_chart
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_METHOD = (
+    "E = S − D is the simulated less the measured figure. U_val = 2 √(u_num² + u_input² + u_D²) is the uncertainty by "
+    "numerics, coefficients and data, with 95 % probability (ASME V&V 20; ITTC 7.5-03-01-01). Where |E| ≤ U_val the "
+    "error of the model is hidden in U_val, and the figure is validated at that level; where |E| > U_val the model "
+    "errs by about E. A level above the required one is of little use: such a figure counts as too uncertain. A trial "
+    "that the card was identified from can refute it, and not validate it: its figures are only fitted."
+)
+_SOURCES_OF_U = (
+    "u_num comes from repeating the simulation with half the step (three times the change, Roache's factor for two "
+    "grids, at the first order); u_input from ships drawn within the standard errors of the card, with "
+    "their covariance where one is next to it; u_D from evaluating the trial again with its noise and "
+    "simulating it from there, from the errors of the measured point (1 % of the length), of the heading's zero "
+    "(0.25 deg) and of the times of the orders, and from repeats of one manoeuvre where there are any."
+)
+_CLOSED_LOOP = (
+    "Turns and zigzags are steered as the manoeuvre asks, from the measured state at the execute, with the rudder rate "
+    "and the delay of the record."
+)
+_REPLAY = (
+    "Each trial is simulated freely over its whole length with the recorded rudder and revolutions, from the initial "
+    "state that suits it best. Errors add up in position; no verdict is taken from these."
+)
+_NUMERICAL = (
+    "Classical Runge-Kutta of the fourth order with a fixed step. The change of each figure when the step is halved, "
+    "the numerical uncertainty from it, and the deviation by the errors of the coefficients."
+)
+_STANDARDS = "Figures of the model next to the standards; they hold as far as the figures above are validated."
+_CAUSES = (
+    "Forces that the structure lacks: higher orders, heel, flow memory, interaction of rudder and propeller.",
+    "Coefficients that no test of the source excites, or that are estimated (see the source and the comments).",
+    "Scale effects between model and ship, in resistance, wake and rudder flow.",
+    "Weather, current, depth and loading of the trials, as far as no effect of the card holds them.",
+    "Errors of the coefficients that go together, where no covariance is next to the card.",
+)
+_NO_PROPULSION = "Engine and propeller: the card has none, so loss of revolutions in a turn is in the coefficients."
+_SENSITIVITY = (
+    "Potential causes of an error E (7.5-02-06-03). The command influence gives the dependence of each figure on "
+    "each coefficient (sensitivity), the command gap looks for the missing effect."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CardValue:
+    """A derivative (prime) with its standard error; `stated` is false where the error is assumed."""
+
+    value: float
+    standard_error: float
+    stated: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalError:
+    """Root mean square error of a signal in `unit`, also in per cent of its range (None for a constant one), and the
+    noise of its measurement in `unit`."""
+
+    signal: str
+    unit: str
+    rms_error: Number
+    percent_of_range: float | None
+    noise: Number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialReplay:
+    """A trial as measured and as simulated, thinned to draw; columns as in a trial file."""
+
+    trial: str
+    errors: tuple[SignalError, ...]
+    measured: Columns
+    simulated: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ValidationStudy:
+    """Validation of a card.
+
+    Parameters
+    ----------
+    ship, source : str
+        Name of the ship, and source of its coefficients.
+    documentation : dict
+        Statements on the model by item.
+    coefficients : dict
+        Derivatives by name.
+    propulsion : bool
+        Whether the card has propulsion.
+    verdict : str
+    counts : dict
+        Number of figures by outcome.
+    figures : tuple of Validated
+    members : int
+        Size of the ensemble for u_input.
+    verification : tuple of Verified
+        Figures of standard trials.
+    imo : tuple of ImoCriterion
+    replays : tuple of TrialReplay
+    notices : tuple of str
+    kind : str
+        Always ``validate``.
+    """
+
+    ship: str
+    source: str
+    documentation: dict[str, str]
+    coefficients: dict[str, CardValue]
+    propulsion: bool
+    verdict: str
+    counts: dict[str, int]
+    figures: tuple[Validated, ...]
+    members: int
+    verification: tuple[Verified, ...]
+    imo: tuple[ImoCriterion, ...]
+    replays: tuple[TrialReplay, ...]
+    notices: tuple[str, ...]
+    kind: str = "validate"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ValidationResult(Result[ValidationStudy]):
+    """Figures of a ship's trials next to those simulated, with the validation uncertainty.
+
+    Parameters
+    ----------
+    study : ValidationStudy
+    card : ManoeuvringCard, optional
+        None if the result was read from its JSON; ``ship`` is its ship.
+    paths : tuple of Path
+        Files of the trials.
+    """
+
+    study: ValidationStudy
+    card: ManoeuvringCard | None = None
+    paths: tuple[Path, ...] = ()
+    command: ClassVar[str] = "validate"
+
+    @property
+    def verdict(self) -> str:
+        """How many figures are validated, too uncertain, only fitted, not validated or open."""
+        return self.study.verdict
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Compared figures, a row each, in the unit of the name: measured D, simulated S, E = S - D, U_val, outcome."""
+        import pandas as pd
+
+        names = ["trial", "manoeuvre", "name", "measured", "simulated", "error", "uncertainty", "outcome"]
+        rows = [[getattr(figure, name) for name in names] for figure in self.study.figures]
+        frame = pd.DataFrame(rows, columns=names).rename(columns={"name": "figure"})
+        return frame.assign(outcome=frame["outcome"].map(str))
+
+    @property
+    def verification(self) -> pd.DataFrame:
+        """Figures of standard trials, a row each: value, numerical uncertainty U_num, deviation by the inputs."""
+        import pandas as pd
+
+        rows = [(row.trial, row.name, row.value, row.U_num, row.deviation) for row in self.study.verification]
+        return pd.DataFrame(rows, columns=["trial", "figure", "value", "numerical", "deviation"])
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return f"{self.study.ship}: validation"
+
+    @property
+    def subtitle(self) -> str:
+        """The procedure."""
+        return "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The verdict, and the largest numerical uncertainty."""
+        verdict, shares = f"{self.study.ship}: {self.verdict}.", self._numerical_percent
+        if not shares:
+            return (verdict,)
+        return (
+            verdict,
+            f"Numerical uncertainty of {len(shares)} figures of standard trials: {max(shares):.2g} % at most.",
+        )
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Figures validated, median error and level, and the numerical uncertainty."""
+        figures, counts = self.study.figures, self.study.counts
+        if figures:
+            validated = counts[ComparisonOutcome.VALIDATED.value]
+            incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED.value] else Verdict.CAUTION
+            verdict = Verdict.PASSED if validated == len(figures) else incomplete
+            shown = [KeyFigure(label="Figures validated", value=f"{validated} of {len(figures)}", verdict=verdict)]
+        else:
+            note = "no trial to compare with"
+            shown = [KeyFigure(label="Validation", value="none", verdict=Verdict.CAUTION, note=note)]
+        errors = [100 * abs(one.error / one.measured) for one in figures if one.error is not None and one.measured]
+        levels = [one.level_percent for one in figures if one.level_percent is not None]
+        for label, values in (("Median error |E|", errors), ("Median level U_val", levels)):
+            if values:
+                shown.append(KeyFigure(label=label, value=float(np.median(values)), unit="% of D"))
+        if self._numerical_percent:
+            value = max(self._numerical_percent)
+            shown.append(KeyFigure(label="Largest numerical uncertainty", value=value, unit="%"))
+        return shown
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Figures, standards, replays, method, verification, documentation, coefficients, causes of errors."""
+        study = self.study
+        return [
+            self._comparison(),
+            *([self._standards()] if study.imo else []),
+            *([self._replays()] if study.replays else []),
+            *([_method(study.figures)] if study.figures else []),
+            self._verification(),
+            self._documentation(),
+            self._coefficients(),
+            self._causes(),
+        ]
+
+    @property
+    def _numerical_percent(self) -> list[float]:
+        """U_num of each figure in per cent of its value."""
+        return [100 * abs(row.U_num / row.value) for row in self.study.verification if row.U_num and row.value]
+
+    def _comparison(self) -> Section:
+        figures = self.study.figures
+        if not figures:
+            text = "No turning circle or zigzag was given: the model is documented and verified, and not validated."
+            return Section(heading="Validation", text=text)
+        manoeuvres = {figure.trial: figure.manoeuvre for figure in figures}
+        numbers = {trial: number for number, trial in enumerate(manoeuvres, start=1)}
+        rows: list[list[Cell]] = [
+            [
+                f"{numbers[one.trial]}: {_with_unit(one.name)}",
+                *map(_digits, (one.measured, one.simulated, one.error)),
+                *(_digits(value, 3) for value in (one.inputs, one.data, one.uncertainty)),
+                one.level_percent,
+                one.outcome.value,
+            ]
+            for one in figures
+        ]
+        heads = ("no.: figure", "D", "S", "E", "u_input", "u_D", "U_val", Column(title="level", unit="%", digits=3))
+        caption = "E = simulated S less measured D, and its uncertainty"
+        benchmark: list[list[Cell]] = [[numbers[trial], trial, what] for trial, what in manoeuvres.items()]
+        return Section(
+            heading="Validation",
+            tables=[
+                table("Trials", ("no.", "trial", "manoeuvre, as recognised"), benchmark, folded=False),
+                table(caption, [*heads, "verdict"], rows, folded=True),
+            ],
+            charts=[
+                Illustration(
+                    chart=comparison_error_chart(figures, numbers), caption=COMPARISON_ERRORS, name="validation"
+                )
+            ],
+        )
+
+    def _standards(self) -> Section:
+        section = imo_section(self.study.imo, heading="Standard manoeuvres", text=_STANDARDS)
+        charts = [replace(chart, name="standard_manoeuvres") for chart in section.charts]
+        return replace(section, tables=[replace(one, on_screen=False) for one in section.tables], charts=charts)
+
+    def _replays(self) -> Section:
+        rows: list[list[Cell]] = [
+            [replay.trial, one.signal, one.unit, one.rms_error, one.percent_of_range, one.noise]
+            for replay in self.study.replays
+            for one in replay.errors
+        ]
+        heads = ("trial", "signal", "unit", "rms error", "error over range (%)", "noise")
+        charts = [
+            replace(chart, name="replays")
+            for replay in self.study.replays
+            for chart in motions(
+                replay.trial, {"measured": replay.measured, "simulated": replay.simulated}, measured=["measured"]
+            )
+        ]
+        errors = table("Free-running replays with the recorded inputs", heads, rows, digits=3, on_screen=False)
+        return Section(heading="Replays", text=_REPLAY, tables=[errors], charts=charts)
+
+    def _verification(self) -> Section:
+        rows: list[list[Cell]] = [
+            [
+                row.trial,
+                _with_unit(row.name),
+                _digits(row.value),
+                *(_digits(value, 2) for value in (row.halving, row.U_num)),
+                _digits(row.deviation, 3),
+                None if row.deviation is None or not row.value else 100 * row.deviation / abs(row.value),
+            ]
+            for row in self.study.verification
+        ]
+        heads = ("trial", "figure", "value", "by half the step", "U_num", "u_input")
+        relative = Column(title="u_input", unit="%", digits=3)
+        caption = "Standard trials at the speed of expansion in calm water"
+        tables = [table(caption, [*heads, relative], rows, on_screen=False)]
+        return Section(heading="Verification and uncertainty of the simulation", text=_NUMERICAL, tables=tables)
+
+    def _documentation(self) -> Section:
+        rows = list(self.study.documentation.items())
+        caption = "Documentation asked for by ITTC 7.5-02-06-03"
+        tables = [table(caption, ("item", "statement"), rows, on_screen=False)]
+        return Section(heading="The simulation model", tables=tables)
+
+    def _coefficients(self) -> Section:
+        rows: list[list[Cell]] = [
+            [
+                name,
+                1000 * row.value,
+                1000 * row.standard_error,
+                100 * row.standard_error / abs(row.value),
+                "stated" if row.stated else "assumed",
+            ]
+            for name, row in self.study.coefficients.items()
+        ]
+        errors = [Column(title="standard error", digits=3), Column(title="error over value", unit="%", digits=3)]
+        caption = "Prime system, rudder positive to starboard, times 1000"
+        tables = [table(caption, ["coefficient", "value", *errors, "error"], rows, on_screen=False)]
+        text = f"Where the card states no standard error, {DEFAULT_RELATIVE_ERROR:.0%} of the value is assumed."
+        return Section(heading="Coefficients", text=text, tables=tables)
+
+    def _causes(self) -> Section:
+        causes = (*_CAUSES, *([] if self.study.propulsion else [_NO_PROPULSION]))
+        tables = [table("Potential causes of errors", ("cause",), [[cause] for cause in causes], on_screen=False)]
+        return Section(heading="Causes of error and sensitivity", text=_SENSITIVITY, tables=tables)
+
+
+def _method(figures: Sequence[Validated]) -> Section:
+    """How the verdicts come about."""
+    shares = (100 * figure.numerical / abs(figure.measured) for figure in figures if figure.measured)
+    numerical = f"u_num is {format_number(max(shares, default=0.0), 2)} % of D at most."
+    level = f"The level is U_val in per cent of D; required here: {figures[0].required_percent:g} %."
+    text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
+    return Section(heading="Method", text=text)
+
+
+def _digits(value: float | None, digits: int = 4) -> str | None:
+    """A number for a column of many units, whose numbers share no decimals."""
+    return None if value is None else format_number(value, digits)
+
+
+def _with_unit(name: str) -> str:
+    words, unit = in_words(name)
+    return f"{words} ({unit})" if unit else words
