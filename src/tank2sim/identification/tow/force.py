@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 
 
 def as_force(force: float | Polynomial) -> Polynomial:
@@ -27,7 +27,7 @@ def parse_force(text: str) -> Polynomial:
     except ValueError:
         coefficients = [np.nan]
     if not np.isfinite(coefficients).all():
-        raise InputError("--force-polynomial", "", f"{text!r} is not a polynomial", "give numbers: 11.6,0.02,-1e-4")
+        raise ArgumentError("force_N", "", f"{text!r} is not a polynomial", "give numbers: 11.6,0.02,-1e-4")
     return Polynomial(coefficients)
 
 
@@ -45,7 +45,7 @@ def checked_force(force: Polynomial, times_s: Array) -> Polynomial:
     if values.min() < 0 or values.max() == 0:
         at = times[values.argmin()]
         problem = f"is {values.min():.4g} N at {at:.4g} s, and must pull forward from 0 to {end:g} s"
-        raise InputError("--force-polynomial", "", problem, "check signs and order: c0,c1,... with T = c0 + c1 t + ...")
+        raise ArgumentError("force_N", "", problem, "check signs and order: c0,c1,... with T = c0 + c1 t + ...")
     return force
 
 
