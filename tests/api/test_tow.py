@@ -80,7 +80,7 @@ def test_it_fits_a_screen_and_shows_its_charts(found):
         ({"method": "magic"}, "--method"),
         ({"terms": ["B4"]}, "--terms"),
         ({"length_m": -3.0}, "--length-m"),
-        ({"force_N": [1.0, -1.0]}, "--force-polynomial"),
+        ({"force_N": [1.0, -1.0]}, "force_N"),
     ],
 )
 def test_bad_input_is_refused_with_place_and_remedy(path, options, source):

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
 from tank2sim.arguments import NumberArgument
-from tank2sim.errors import ArgumentError
 from tank2sim.files import CARD
 
 if TYPE_CHECKING:
@@ -16,11 +15,9 @@ if TYPE_CHECKING:
 
 
 def _parsed_force(text: str) -> float | list[float]:
-    try:
-        coefficients = [float(part) for part in text.split(",")]
-    except ValueError:
-        remedy = "give a force in N, or coefficients in rising powers of t with commas between: 11.6,-0.02"
-        raise ArgumentError("force_N", text, "is not a force", remedy) from None
+    from tank2sim.identification.tow.force import parse_force
+
+    coefficients: list[float] = parse_force(text).coef.tolist()
     return coefficients[0] if len(coefficients) == 1 else coefficients
 
 

@@ -134,15 +134,15 @@ def test_force_from_text():
 
 @pytest.mark.parametrize("text", ["", "fast", "1,,2", "inf"])
 def test_what_is_no_polynomial_is_refused(text):
-    with pytest.raises(InputError, match=r"--force-polynomial: .* is not a polynomial; give numbers"):
+    with pytest.raises(InputError, match=r"force_N: .* is not a polynomial; give numbers"):
         parse_force(text)
 
 
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"force": Polynomial([11.63, -1.0])}, r"--force-polynomial: is -38\.37 N at 50 s, and must pull forward"),
-        ({"force": Polynomial([0.0])}, "--force-polynomial: is 0 N"),
+        ({"force": Polynomial([11.63, -1.0])}, r"force_N: is -38\.37 N at 50 s, and must pull forward"),
+        ({"force": Polynomial([0.0])}, "force_N: is 0 N"),
         ({"terms": (), "options": TowOptions(total_mass_kg=2800.0)}, "--total-mass-kg: leaves nothing to estimate"),
         ({"options": TowOptions(total_mass_kg=-1.0)}, "--total-mass-kg: is -1; a positive number was expected"),
     ],
