@@ -21,9 +21,9 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"gap", "fmu"}),
     frozenset({"logs", "design"}),
     frozenset({"answer"}),
-    frozenset({"results"}),
     frozenset({"report"}),
     frozenset({"demo"}),
+    frozenset({"results"}),
     frozenset({"api"}),
     frozenset({"apps", "cli"}),
 )

@@ -3,8 +3,6 @@
 from .answer.parts import Table as Table
 from .answer.result import Result as Result
 from .api.audit import audit as audit
-from .api.bridge import PilotCardResult as PilotCardResult
-from .api.bridge import PosterResult as PosterResult
 from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import compare as compare
 from .api.convention import convention as convention
@@ -12,7 +10,6 @@ from .api.conversion import convert as convert
 from .api.craft_identification import (
     identify_craft as identify_craft,
 )
-from .api.demo import DemoResult as DemoResult
 from .api.demo import run_demo as run_demo
 from .api.design import (
     design_campaign as design_campaign,
@@ -39,7 +36,6 @@ from .api.signals import signals as signals
 from .api.steering_models import (
     steering_models as steering_models,
 )
-from .api.steering_page import SteeringPageResult as SteeringPageResult
 from .api.tow import tow as tow
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
@@ -50,6 +46,8 @@ from .errors import InputError as InputError
 from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult
 from .results.autopilot import CraftAutopilotResult as CraftAutopilotResult
+from .results.bridge import PilotCardResult as PilotCardResult
+from .results.bridge import PosterResult as PosterResult
 from .results.captive_run import CaptiveRunResult as CaptiveRunResult
 from .results.comparison import ComparisonResult as ComparisonResult
 from .results.convention import ConventionResult as ConventionResult
@@ -57,6 +55,7 @@ from .results.conversion import ConversionResult as ConversionResult
 from .results.craft_identification import (
     CraftIdentificationResult as CraftIdentificationResult,
 )
+from .results.demo import DemoResult as DemoResult
 from .results.design import CampaignDesignResult as CampaignDesignResult
 from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
@@ -73,6 +72,7 @@ from .results.ships import ShipsResult as ShipsResult
 from .results.signals import SignalsResult as SignalsResult
 from .results.stability import StabilityResult as StabilityResult
 from .results.steering_models import SteeringModelsResult as SteeringModelsResult
+from .results.steering_page import SteeringPageResult as SteeringPageResult
 from .results.tow import TowResult as TowResult
 from .results.turn_tuning import TurnTuningResult as TurnTuningResult
 from .results.validation import ValidationResult as ValidationResult

@@ -57,10 +57,10 @@ def test_a_pilot_card_is_written_with_the_speeds_of_its_orders(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("options", "source", "place"),
     [
-        ({"orders": {"Half ahead": -3.0}}, "--order", "Half ahead=-3"),
-        ({"orders": {"Full astern": 60.0}}, "--order", "Full astern=60"),
-        ({"orders": {"a": 60.0, "A": 50.0}}, "--order", "A=50"),
-        ({"orders": {f"order {number}": 50.0 for number in range(4)}}, "--order", "order 3=50"),
+        ({"orders": {"Half ahead": -3.0}}, "order", "Half ahead=-3"),
+        ({"orders": {"Full astern": 60.0}}, "order", "Full astern=60"),
+        ({"orders": {"a": 60.0, "A": 50.0}}, "order", "A=50"),
+        ({"orders": {f"order {number}": 50.0 for number in range(4)}}, "order", "order 3=50"),
         ({"ballast": "kvlcc2-captive"}, "kvlcc2-captive", "ship"),
         ({"ballast": "mariner"}, "mariner", "ship.draught_m"),
     ],

@@ -31,6 +31,8 @@ def study_values(study: object) -> dict[str, Any]:
 def study_schema(kind: type[object]) -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a study; no key is allowed but its fields."""
     schema = _adapter(kind).json_schema(mode="serialization")
+    if "$ref" in schema:  # a study that holds one of its own kind
+        schema = {**schema["$defs"][schema["$ref"].rpartition("/")[2]], "$defs": schema["$defs"]}
     for part in (schema, *schema.get("$defs", {}).values()):
         if "properties" in part:
             part["additionalProperties"] = False

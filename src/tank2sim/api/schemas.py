@@ -267,53 +267,9 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-class DemoKeys(_Keys):
-    """The demonstration: figures of its two halves, and the files that it wrote."""
-
-    towed_vehicle: dict[str, Any]
-    mariner: dict[str, Any]
-    files: list[str]
-
-
-class BridgeKeys(_Keys):
-    """Data of a wheelhouse poster or a pilot card."""
-
-    ship: str
-    source: str
-    rudder_deg: JsonNumber
-    turning_circles_deep: list[dict[str, Any]]
-    turning_circles_shallow: list[dict[str, Any]]
-    stops: list[dict[str, Any]]
-    zigzags: dict[str, Any]
-    telegraph: list[Any]
-    full_astern_from: list[Any]
-    hard_over_to_hard_over_s: JsonNumber
-    rudder_neutral_deg: JsonNumber
-    squat: list[dict[str, float]]
-    notices: list[str]
-    ballast: dict[str, Any] | None
-
-
-class SteerKeys(_Keys):
-    """A page on which the ship is steered."""
-
-    ship: str
-    ghost: str | None
-    steerable: bool
-    members: int
-    autopilot: str | None
-    scenario: str | None
-    page_kB: JsonNumber
-    notices: list[str]
-
-
 KEYS: dict[str, Any] = {
-    "demo": DemoKeys,
     "gap": GapKeys,
     "identify": IdentifyKeys | CraftIdentifyKeys,
-    "pilotcard": BridgeKeys,
-    "poster": BridgeKeys,
-    "steer": SteerKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 

@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tank2sim.answer.result import Result
-    from tank2sim.api.bridge import PilotCardResult, PosterResult
-    from tank2sim.api.steering_page import SteeringPageResult
     from tank2sim.dynamics.model import Model
+    from tank2sim.results.bridge import PilotCardResult, PosterResult
     from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
     from tank2sim.results.glide import GlideResult
     from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
     from tank2sim.results.stability import StabilityResult
+    from tank2sim.results.steering_page import SteeringPageResult
     from tank2sim.results.turn_tuning import TurnTuningResult
     from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
@@ -585,7 +585,7 @@ class Ship:
         self,
         path: str | Path | None = None,
         *,
-        ballast: Ship | Card | str | Path | None = None,
+        ballast: Any = None,
         orders: Mapping[str, float] | None = None,
     ) -> PosterResult:
         """The wheelhouse poster (IMO A.601(15), A3); what the card does not state stays blank.
@@ -605,16 +605,16 @@ class Ship:
             The ship does not manoeuvre, an order cannot be shown, the ballast card is of another ship, or the file
             cannot be written.
         """
-        from tank2sim.api.bridge import PosterResult, bridges_of
+        from tank2sim.api.bridge import make_poster
 
-        return self._written(PosterResult(*bridges_of(self, ballast, orders or {})), path)
+        return self._written(make_poster(self, ballast=ballast, order=orders), path)
 
     @checked
     def pilot_card(
         self,
         path: str | Path | None = None,
         *,
-        ballast: Ship | Card | str | Path | None = None,
+        ballast: Any = None,
         orders: Mapping[str, float] | None = None,
     ) -> PilotCardResult:
         """The pilot card (IMO A.601(15), A4). Raises as :meth:`poster`.
@@ -624,9 +624,9 @@ class Ship:
         path, ballast, orders
             As of :meth:`poster`.
         """
-        from tank2sim.api.bridge import PilotCardResult, bridges_of
+        from tank2sim.api.bridge import make_pilot_card
 
-        return self._written(PilotCardResult(*bridges_of(self, ballast, orders or {})), path)
+        return self._written(make_pilot_card(self, ballast=ballast, order=orders), path)
 
     @checked
     def steering_page(

@@ -1,115 +1,23 @@
-"""A page in which a ship is steered, as a result."""
+"""A page in which a ship is steered."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tank2sim.answer.parts import Table
-from tank2sim.api.result import OldResult
 from tank2sim.api.ship import Ship
 from tank2sim.cards import CraftCard, ManoeuvringCard
 from tank2sim.errors import InputError
+from tank2sim.results.steering_page import SteeringPageResult, SteeringStudy
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.model import Model
     from tank2sim.report.steering.ghost import Ghost
+    from tank2sim.report.steering.page import PageShip
     from tank2sim.report.steering.scenario import Scenario
 
 FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
-
-
-class SteeringPageResult(OldResult):
-    """A page in which a ship is steered; it needs no network.
-
-    Parameters
-    ----------
-    ship : Ship
-    model : Model
-        What the page holds: with a measured rudder angle, one that can follow it.
-    library : str
-        The model as WebAssembly, base64.
-    ghost : Ghost, optional
-        A measured trial next to the ship.
-    notices : tuple of str
-    members : tuple of mapping
-        Parameters of ships that the measurements cannot exclude, which are steered together with the card's.
-    autopilot : str
-        How the autopilot of the page was designed; empty without one.
-    scenario : Scenario, optional
-        Waters to steer in.
-    view_3d : bool
-        Whether the page has the view from the bridge.
-    """
-
-    command = "steer"
-
-    def __init__(
-        self,
-        ship: Ship,
-        model: Model,
-        library: str,
-        ghost: Ghost | None,
-        notices: tuple[str, ...],
-        members: Sequence[Mapping[str, float]] = (),
-        autopilot: str = "",
-        scenario: Scenario | None = None,
-        view_3d: bool = False,
-    ) -> None:
-        self.ship, self.model, self.library, self.ghost = ship, model, library, ghost
-        self.members, self.autopilot, self.scenario = tuple(members), autopilot, scenario
-        self.view_3d = view_3d
-        self.notices = tuple(dict.fromkeys(notices))
-
-    def content(self) -> Mapping[str, object]:
-        """As :meth:`.OldResult.content`."""
-        return {
-            "ship": self.ship.name,
-            "ghost": self.ghost.label if self.ghost else None,
-            "steerable": True,
-            "members": len(self.members),
-            "autopilot": self.autopilot or None,
-            "scenario": self.scenario.name if self.scenario else None,
-            "page_kB": self._size_kB,
-            "notices": self.notices,
-        }
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """Name of the ship, size of the page, and the ships that are steered together with it."""
-        from tank2sim.report.steering.members import NO_COVARIANCE
-
-        size = f"{self.ship.name}: a page of {self._size_kB:.0f} kB"
-        return (size, f"{len(self.members)} ships from the covariance of the card" if self.members else NO_COVARIANCE)
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """None."""
-        return ()
-
-    def page(self) -> str:
-        """The page: self-contained HTML."""
-        return self._html
-
-    @cached_property
-    def _html(self) -> str:
-        from tank2sim.report.steering.page import PageShip, steering_page
-
-        ship = PageShip(
-            model=self.model,
-            library=self.library,
-            members=self.members,
-            autopilot=self.autopilot,
-            beam_m=self.ship.card.ship.beam_m,
-            draught_m=self.ship.card.ship.draught_m,
-        )
-        return steering_page(ship, self.ghost, self.notices, self.scenario, self.view_3d)
-
-    @property
-    def _size_kB(self) -> float:
-        return len(self._html.encode()) / 1e3
 
 
 def make_steering_page(
@@ -145,16 +53,9 @@ def make_steering_page(
             raise InputError(
                 "--ghost", "", "is a trial with a rudder, and a craft with thrusters has none", "leave it out"
             )
-        library = _compiled(model, report)
-        return SteeringPageResult(
-            ship,
-            model,
-            library,
-            None,
-            model.notices,
-            scenario=read_scenario(scenario) if scenario else None,
-            view_3d=view_3d,
-        )
+        waters = read_scenario(scenario) if scenario else None
+        in_page = _page_ship(card, model, _compiled(model, report))
+        return _result(in_page, None, model.notices, waters, view_3d)
     if not isinstance(card, ManoeuvringCard):
         raise InputError(
             card.source,
@@ -173,7 +74,35 @@ def make_steering_page(
     library = _compiled(model, report)
     notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
     members = members_of(card, model)
-    return SteeringPageResult(ship, model, library, shown, notices, members, autopilot, waters, view_3d)
+    in_page = _page_ship(card, model, library, members=tuple(members), autopilot=autopilot)
+    return _result(in_page, shown, notices, waters, view_3d)
+
+
+def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, library: str, **more: Any) -> PageShip:
+    from tank2sim.report.steering.page import PageShip
+
+    known = {"members": (), "autopilot": ""} | more
+    return PageShip(model=model, library=library, beam_m=card.ship.beam_m, draught_m=card.ship.draught_m, **known)
+
+
+def _result(
+    ship: PageShip, ghost: Ghost | None, notices: Sequence[str], scenario: Scenario | None, view_3d: bool
+) -> SteeringPageResult:
+    from tank2sim.report.steering.page import steering_page
+
+    said = tuple(dict.fromkeys(notices))
+    html = steering_page(ship, ghost, said, scenario, view_3d)
+    study = SteeringStudy(
+        ship=ship.model.name,
+        ghost=ghost.label if ghost else None,
+        steerable=True,
+        members=len(ship.members),
+        autopilot=ship.autopilot or None,
+        scenario=scenario.name if scenario else None,
+        page_kB=len(html.encode()) / 1e3,
+        notices=said,
+    )
+    return SteeringPageResult(study, html)
 
 
 def _compiled(model: Model, report: Callable[[str], None]) -> str:

@@ -81,6 +81,8 @@ VERBS = {
     "design": "api.design:design_campaign",
     "export": "api.fmu:make_fmu_file",
     "guess": "api.guess:guess",
+    "pilotcard": "api.bridge:make_pilot_card",
+    "poster": "api.bridge:make_poster",
     "ships": "api.bundled_ships:list_ships",
     "tow": "api.tow:tow",
 }

@@ -305,7 +305,7 @@ def _values_for(
             from tank2sim.api.ship import load
             from tank2sim.cli.overrides import parse_changes
 
-            value = load(value, parse_changes(changes))
+            value = load(value, parse_changes(changes if one.default is inspect.Parameter.empty else ()))
             inputs.append(Path(value.card.source))
         elif one.name in texts:
             value = texts[one.name](value)

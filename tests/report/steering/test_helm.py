@@ -86,7 +86,7 @@ def test_members_have_the_spread_of_the_covariance():
 def test_a_card_without_covariance_has_no_members_and_says_so():
     with without_wasm():  # half a minute, which has no part in it
         result = make_steering_page(t2s.load("mariner"))
-    assert result.members == ()
+    assert result.study.members == 0
     assert "has no covariance" in result.headline[1]
 
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
-from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, circle_track, stop_track
+from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, TrackStudy, circle_track, stop_track
 from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
@@ -128,23 +128,57 @@ class Bridge:
     squat: tuple[Squat, ...] = ()
     notices: tuple[str, ...] = ()
 
-    def as_json(self) -> dict[str, object]:
-        """All values, tracks thinned to 200 points."""
-        return {
-            "ship": self.card.ship.name,
-            "source": self.card.ship.source,
-            "rudder_deg": self.rudder_deg,
-            "turning_circles_deep": [row.as_json() for row in self.deep],
-            "turning_circles_shallow": [row.as_json() for row in self.shallow],
-            "stops": [stop.as_json() for stop in self.stops],
-            "zigzags": {name: {"figures": zigzag.figures, **zigzag.as_json()} for name, zigzag in self.zigzags.items()},
-            "telegraph": [vars(row) for row in self.telegraph],
-            "full_astern_from": [vars(row) for row in self.stops_from],
-            "hard_over_to_hard_over_s": self.hard_over_s,
-            "rudder_neutral_deg": self.neutral_deg,
-            "squat": [vars(row) for row in self.squat],
-            "notices": list(self.notices),
-        }
+    @property
+    def study(self) -> BridgeStudy:
+        """All values as numbers."""
+        return BridgeStudy(
+            ship=self.card.ship.name,
+            source=self.card.ship.source,
+            rudder_deg=self.rudder_deg,
+            turning_circles_deep=tuple(track.study for track in self.deep),
+            turning_circles_shallow=tuple(track.study for track in self.shallow),
+            stops=tuple(stop.study for stop in self.stops),
+            zigzags={
+                name: ZigzagStudy(one.figures, one.exit_s, one.how, one.outside_names)
+                for name, one in self.zigzags.items()
+            },
+            telegraph=self.telegraph,
+            full_astern_from=self.stops_from,
+            hard_over_to_hard_over_s=self.hard_over_s,
+            rudder_neutral_deg=self.neutral_deg,
+            squat=self.squat,
+            notices=self.notices,
+        )
+
+
+@dataclass(frozen=True)
+class ZigzagStudy:
+    """Figures of a zigzag, the end of the card's range, and the figures outside it."""
+
+    figures: dict[str, float]
+    left_card_range_s: float | None
+    left_card_range_by: str
+    outside_card_range: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BridgeStudy:
+    """Data of a bridge as numbers; fields are those of :class:`Bridge`, `ballast` is the other condition."""
+
+    ship: str
+    source: str
+    rudder_deg: float
+    turning_circles_deep: tuple[TrackStudy, ...]
+    turning_circles_shallow: tuple[TrackStudy, ...]
+    stops: tuple[TrackStudy, ...]
+    zigzags: dict[str, ZigzagStudy]
+    telegraph: tuple[Telegraph, ...]
+    full_astern_from: tuple[StopFrom, ...]
+    hard_over_to_hard_over_s: float | None
+    rudder_neutral_deg: float | None
+    squat: tuple[Squat, ...]
+    notices: tuple[str, ...]
+    ballast: BridgeStudy | None = None
 
 
 def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) -> Bridge:

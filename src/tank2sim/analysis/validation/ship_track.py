@@ -58,18 +58,36 @@ class ShipTrack:
         """True if a mark is outside the card's range."""
         return self.range_exit is not None and mark.time_s >= self.range_exit.time_s
 
-    def as_json(self) -> dict[str, object]:
+    @property
+    def study(self) -> TrackStudy:
         """All values, the track thinned to 200 points."""
         every = max(1, len(self.ahead_m) // 200)
-        return {
-            "name": self.name,
-            "figures": self.figures,
-            **self.reading.as_json(),
-            "left_card_range_at": vars(self.range_exit) if self.range_exit else None,
-            "marks": [vars(mark) for mark in self.marks],
-            "ahead_m": self.ahead_m[::every],
-            "starboard_m": self.starboard_m[::every],
-        }
+        return TrackStudy(
+            name=self.name,
+            figures=self.figures,
+            left_card_range_s=self.reading.exit_s,
+            left_card_range_by=self.reading.how,
+            outside_card_range=self.reading.outside_names,
+            left_card_range_at=self.range_exit,
+            marks=self.marks,
+            ahead_m=self.ahead_m[::every],
+            starboard_m=self.starboard_m[::every],
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackStudy:
+    """A track as numbers: figures, the end of the card's range (None within it), marks, and the track to draw."""
+
+    name: str
+    figures: dict[str, float]
+    left_card_range_s: float | None
+    left_card_range_by: str
+    outside_card_range: tuple[str, ...]
+    left_card_range_at: TrackMark | None
+    marks: tuple[TrackMark, ...]
+    ahead_m: Array
+    starboard_m: Array
 
 
 def circle_track(side: str, run: Run) -> ShipTrack:

@@ -48,9 +48,6 @@ RESULT_TYPES = (
     ),
     ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
-    ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
-    ResultType("Bridge", "poster pilotcard", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
-    ResultType("Ship to steer", "steer", ("ship", "steerable"), ("steerable",)),
 )
 """The results that are known, those with more particular keys first."""
 

@@ -11,7 +11,6 @@ from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.json_values import Json
-from tank2sim.report.results.motions import from_the_bridge
 
 
 @dataclass(frozen=True)
@@ -34,13 +33,7 @@ class _Page:
 
 _WAY = ("ahead_m", "starboard_m")
 
-_SECTIONS: Mapping[str, _Sections] = {
-    "Bridge": _Sections(
-        from_the_bridge,
-        {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
-        tuple(f"{key}.*.{way}" for key in ("turning_circles_deep", "turning_circles_shallow", "stops") for way in _WAY),
-    ),
-}
+_SECTIONS: Mapping[str, _Sections] = {}
 
 _PAGES: Mapping[str, _Page] = {
     "Coefficients from trials": _Page(
