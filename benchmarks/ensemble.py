@@ -281,7 +281,7 @@ def bands_of_readme(card: ManoeuvringCard) -> None:
     turn, asked = Turn(float(RUDDER)), EnsembleRequest(100, 3)
     run = simulate(build(card), turn)
     bands = manoeuvre_bands(card, turn, (None, float(run.trajectory.t[-1])), asked).figures
-    told = [f"{name} {bands[name].low:.0f} to {bands[name].high:.0f}" for name in ("advance_m", "tactical_diameter_m")]
+    told = [f"{name} {bands[name].p5:.0f} to {bands[name].p95:.0f}" for name in ("advance_m", "tactical_diameter_m")]
     print(f"{asked.members} ships, seed {asked.seed}, 5 and 95 %: {', '.join(told)}")
 
 

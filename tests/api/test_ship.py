@@ -63,7 +63,7 @@ def test_orders_at_fault_are_refused_by_place(ship, columns, place) -> None:
 
 
 def test_a_manoeuvre_as_an_object_has_the_words_of_the_command_line(ship) -> None:
-    assert ship.simulate(Turn(math.radians(35)), duration_s=5.0).content()["manoeuvre"] == "turn:35"
+    assert ship.simulate(Turn(math.radians(35)), duration_s=5.0).study.manoeuvre == "turn:35"
     assert Zigzag(math.radians(-10), math.radians(10)).words == "zigzag:-10/10"
     assert Orders(np.zeros(1), {}, "o.csv").words == "file:o.csv"
 
@@ -113,7 +113,7 @@ def test_a_card_is_saved_and_read_again(ship, tmp_path) -> None:
 def test_state_space_has_the_eigenvalues_of_the_stability_study(ship) -> None:
     found = ship.stability(spirals=False)
     poles = np.linalg.eigvals(ship.state_space(states=["motion.u", "motion.v", "motion.r"]).A)
-    np.testing.assert_allclose(sorted(poles.real), sorted(found.tables[0].df["real (1/s)"]), rtol=1e-3)
+    np.testing.assert_allclose(sorted(poles.real), sorted(np.real(found.study.eigenvalues)), rtol=1e-3)
 
 
 def test_states_that_are_left_out_follow_the_others_at_once(ship) -> None:
