@@ -170,10 +170,9 @@ class IdentificationResult(Result[IdentificationStudy]):
         if not np.isfinite(after):
             return []
         better = "better than" if after < before else "no better than"
-        text = (
-            f"The card found follows the yaw rate of the trials {word} within {after:.3g} % (rms), {better} the card "
-        )
-        text += f"before ({before:.3g} %)." if np.isfinite(before) else "before."
+        given = f"before ({before:.3g} %)" if np.isfinite(before) else "before"
+        followed = f"The card found follows the yaw rate of the trials {word} within {after:.3g} % (rms)"
+        text = f"{followed}, {better} the card {given}."
         return [text if word == HELD_OUT else f"{text} None was held out, so this card is untested."]
 
     @property

@@ -9,7 +9,7 @@ import altair as alt
 from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
-from tank2sim.identification.trials.study import EstimatedParameter, IdentifiabilityStudy, PosteriorStudy
+from tank2sim.identification.trials.study import IdentifiabilityStudy, ParameterEstimate, PosteriorStudy
 
 _NORMAL = 1.959964
 
@@ -19,7 +19,7 @@ def value_with_error(value: float, error: float) -> str:
     return f"{value:.5g} ± {error:.2g}"
 
 
-def parameter_chart(parameters: Mapping[str, EstimatedParameter], *, title: str = "") -> alt.HConcatChart:
+def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> alt.HConcatChart:
     """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
     rows = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
     farthest = max((abs(row[key] or 0.0) for row in rows for key in ("low", "high")), default=1.0)
@@ -56,7 +56,7 @@ def parameter_chart(parameters: Mapping[str, EstimatedParameter], *, title: str 
     )
 
 
-def _parameter_row(name: str, parameter: EstimatedParameter) -> ChartRecord:
+def _parameter_row(name: str, parameter: ParameterEstimate) -> ChartRecord:
     unit, share = parameter.prior_standard_error, 100 * parameter.share_from_trials
     value = (parameter.value - parameter.before) / unit
     error = _NORMAL * parameter.standard_error / unit
@@ -79,7 +79,7 @@ def _symmetric_ticks(farthest: float) -> list[float]:
 
 
 def posterior_chart(
-    parameters: Mapping[str, EstimatedParameter], posterior: PosteriorStudy, *, title: str = ""
+    parameters: Mapping[str, ParameterEstimate], posterior: PosteriorStudy, *, title: str = ""
 ) -> alt.LayerChart:
     """Median and intervals of 50 and 95 % of each sampled parameter, in its standard deviations from its mean.
 

@@ -164,9 +164,7 @@ def window_chart(sets: Mapping[str, Sequence[TrialErrors]], *, title: str = "") 
     title : str
         Of the chart.
     """
-    every = [
-        _errors_of(trial, label) for trials in sets.values() for trial in trials for label in MODEL_SERIES.values()
-    ]
+    every = [errors for trials in sets.values() for trial in trials for errors in (trial.before, trial.found)]
     signals = [symbol for name, symbol in SYMBOLS.items() if any(name in errors for errors in every)]
     rows = []
     for word, trials in sets.items():

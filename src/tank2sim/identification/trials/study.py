@@ -58,7 +58,7 @@ _SAMPLES = 240
 
 
 @dataclass(frozen=True, kw_only=True)
-class EstimatedParameter:
+class ParameterEstimate:
     """A parameter identified from trials: prime or SI, rudder positive to starboard.
 
     Parameters
@@ -335,8 +335,8 @@ class IdentificationStudy:
     structure: str
     forced: tuple[str, ...]
     manoeuvres: dict[str, str]
-    derivatives: dict[str, EstimatedParameter]
-    effects: dict[str, EstimatedParameter]
+    derivatives: dict[str, ParameterEstimate]
+    effects: dict[str, ParameterEstimate]
     effects_of_card: tuple[str, ...]
     misfit: IdentificationMisfit
     yaw_rate_error_over_windows: dict[str, dict[str, Number] | None]
@@ -356,7 +356,7 @@ class IdentificationStudy:
     replays: tuple[CardReplay, ...]
 
     @property
-    def parameters(self) -> dict[str, EstimatedParameter]:
+    def parameters(self) -> dict[str, ParameterEstimate]:
         """Derivatives and parameters of effects by name, in the order of the estimate."""
         every = {**self.derivatives, **self.effects}
         return {name: every[name] for name in self.identifiability.parameters}
@@ -437,7 +437,7 @@ def _current(current: WaterCurrent) -> EstimatedCurrent:
     )
 
 
-def _parameters(result: Identification) -> dict[str, EstimatedParameter]:
+def _parameters(result: Identification) -> dict[str, ParameterEstimate]:
     columns = np.stack(
         [
             result.estimate.values,
@@ -450,7 +450,7 @@ def _parameters(result: Identification) -> dict[str, EstimatedParameter]:
         axis=1,
     ).tolist()
     return {
-        name: EstimatedParameter(
+        name: ParameterEstimate(
             value=value,
             standard_error=error,
             before=before,
