@@ -62,9 +62,9 @@ from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
+from .results.identification import IdentificationResult as IdentificationResult
 from .results.influence import InfluenceResult as InfluenceResult
 from .results.influence import TuningResult as TuningResult
-from .results.identification import IdentificationResult as IdentificationResult
 from .results.log import LogResult as LogResult
 from .results.manoeuvre import ManoeuvreResult as ManoeuvreResult
 from .results.mmg_reduction import MmgReductionResult as MmgReductionResult

@@ -36,8 +36,6 @@ class _Keys(_Part):
     schema: str
 
 
-
-
 class GapReplayKeys(_Part):
     """A trial as measured and as simulated by the card given and by the card found, thinned to draw."""
 
