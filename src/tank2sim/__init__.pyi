@@ -21,7 +21,6 @@ from .api.fmu import check_fmu as check_fmu
 from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
 from .api.guess import guess as guess
-from .api.identification import IdentificationResult as IdentificationResult
 from .api.identification import identify as identify
 from .api.log import log as log
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
@@ -62,6 +61,7 @@ from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
+from .results.identification import IdentificationResult as IdentificationResult
 from .results.influence import InfluenceResult as InfluenceResult
 from .results.influence import TuningResult as TuningResult
 from .results.log import LogResult as LogResult

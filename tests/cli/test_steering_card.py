@@ -26,7 +26,12 @@ def test_a_steering_card_gives_the_tables_of_paper_4(tmp_path: Path) -> None:
     assert set(reported["missing"]) == {"inoue-hirano", "base", "base-restored", "pavlenko", "sobolev"}
     assert set(reported["manoeuvres"]) == {"inoue-hirano", "curve-3", "base-restored"}
     page = (tmp_path / "out.html").read_text(encoding="utf-8")
-    for words in ("Steering diagrams", "Influence of each coefficient", "Turning circles", "Influence over the draught"):
+    for words in (
+        "Steering diagrams",
+        "Influence of each coefficient",
+        "Turning circles",
+        "Influence over the draught",
+    ):
         assert words in page
 
 

@@ -28,6 +28,10 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
         "results.turn_tuning:TurnTuningResult",
     ),
     "guess": ("results.guess:GuessResult",),
+    "identify": (
+        "results.identification:IdentificationResult",
+        "results.craft_identification:CraftIdentificationResult",
+    ),
     "log": ("results.log:LogResult",),
     "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),

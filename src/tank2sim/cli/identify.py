@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from tank2sim.api.bounds import Count, DrawsOfChain, SmallEnsemble
 from tank2sim.api.craft_identification import craft_trial_files, identify_craft
 from tank2sim.api.identification import identify
 from tank2sim.api.ship import Ship, load
 from tank2sim.api.trial import trial_files
+from tank2sim.arguments import Count, DrawsOfChain, SmallEnsemble
 from tank2sim.cards import CraftCard
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, executor_option, number, page_option, plot_folder_option
@@ -184,10 +184,10 @@ def command(
             workers=workers,
             progress=progress,
         )
-    files = result.card.files(output) if output else {}
+    files = result.card.files(output) if output and result.card else {}
     inputs = [Path(ship.card.source), *trial_files(trials), *trial_files(holdout), *([campaign] if campaign else [])]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)
     if output:
-        count = len(result.identification.estimate.free)
+        count = len(result.study.parameters)
         screen.print(f"{output}: {count} coefficients", soft_wrap=True, markup=False)

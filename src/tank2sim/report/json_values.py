@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, TypeGuard
@@ -66,6 +67,11 @@ def titled(key: str) -> str:
 def is_number_value(value: Json) -> TypeGuard[float]:
     """Whether this is a number, and not a truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def as_number(value: float | None) -> float:
+    """A number of the JSON; infinity for null."""
+    return math.inf if value is None else value
 
 
 def is_scalar(value: Json) -> bool:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.identification.trials.as_json import identification_as_json
 from tank2sim.identification.trials.assessment.method_choice import choose_method, signal_residuals
 from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.study import study_identification
 
 from .made_up_ship import CARD, SPEED, gusts, problem, trial, turn, zigzag
 
@@ -45,6 +45,9 @@ def card() -> ManoeuvringCard:
     return read
 
 
+NONE = Measured((), "angle", ())
+
+
 def chosen(card: ManoeuvringCard, group, **options):
     given = Measured(tuple(group), "angle", ())
     return identify_trials(card, given, options=IdentificationOptions(members=0, structure="card", **options))
@@ -56,8 +59,8 @@ def test_trials_of_a_basin_stay_with_output_error_and_the_result_says_why(card) 
     assert result.estimate.method == "output_error" and result.current is None
     assert result.choice is not None and "at sea" in result.choice.reason
     assert any(notice.startswith("method: output error") for notice in result.notices)
-    said = identification_as_json(result)
-    assert said["method_reason"] == result.choice.reason and said["current"] is None
+    study = study_identification(card, result, NONE, NONE)
+    assert study.method_reason == result.choice.reason and study.current is None
 
 
 @pytest.mark.slow
@@ -72,6 +75,6 @@ def test_gusty_trials_at_sea_are_filtered_and_a_stated_method_is_kept(card) -> N
     assert chosen(card, sea, piece_s=60.0).estimate.method == "output_error"
     calm = [replace(one, origin_deg=(54.0, 10.0)) for one in trials(gusty=False)]
     assert chosen(card, calm).estimate.method == "output_error"
-    water = identification_as_json(result)["current"]
-    assert isinstance(water, dict) and water["determined"] and water["speed_mps"] == result.current.speed_mps
+    water = study_identification(card, result, NONE, NONE).current
+    assert water is not None and water.determined and water.speed_mps == result.current.speed_mps
     assert np.isfinite(result.estimate.standard_errors).all()

@@ -104,13 +104,6 @@ def test_the_tiles_of_a_gap_name_the_effect_with_its_parameters_and_judge_by_the
     ]
 
 
-@pytest.mark.parametrize(("found", "verdict", "reported"), [(0.5, "", "better"), (110.0, "caution", "worse")])
-def test_the_tiles_of_coefficients_say_whether_the_trials_held_out_are_followed_better(found, verdict, reported):
-    misfit = {"fit": 1.0, "holdout": found, "before": {"fit": 2.0, "holdout": 0.997}}
-    tile = result_page({"method": "output_error", "derivatives": {}, "misfit": misfit}, "r.json").figures[0]
-    assert (tile.value, tile.verdict) == (f"0.997 → {found:g}", verdict) and tile.note.startswith(reported)
-
-
 def test_few_rows_of_many_columns_are_turned_and_what_nobody_knows_is_left_out():
     keys = [f"length_{place}_m" for place in range(12)]
     one = dict.fromkeys(keys, 1.5) | {"nowhere": None, "empty": []}

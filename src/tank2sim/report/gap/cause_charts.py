@@ -24,10 +24,9 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
 from tank2sim.gap.outcome.export import joined
 from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
-from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.charts import SETS, small
 from tank2sim.report.gap.text import as_percent, or_nan, trial_name
-from tank2sim.report.json_values import Json
+from tank2sim.report.json_values import Json, as_number
 from tank2sim.units import in_words
 
 MOST_RIVALS = 12

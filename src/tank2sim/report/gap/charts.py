@@ -22,12 +22,13 @@ from tank2sim.answer.charts.parts import (
     with_unit,
 )
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.as_json import as_number
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.identification.trials.study import TrialMotions
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_points
 from tank2sim.report.gap.text import or_nan, trial_name
-from tank2sim.report.identification.charts import (
+from tank2sim.report.json_values import Json, as_number
+from tank2sim.results.trial_charts import (
     AFTER,
     BEFORE,
     MEASURED,
@@ -37,7 +38,6 @@ from tank2sim.report.identification.charts import (
     history_grid,
     track_grid,
 )
-from tank2sim.report.json_values import Json
 from tank2sim.units import to_si
 
 MOST_TRIALS_DRAWN = 12
@@ -114,14 +114,21 @@ def gap_histories(found: Json, *, held_out: bool, title: str = "") -> list[alt.C
     return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
 
 
-def _worst(found: Json, chosen: Callable[[Json], bool], most: int = MOST_TRIALS_DRAWN) -> list[Json]:
+def _worst(found: Json, chosen: Callable[[Json], bool], most: int = MOST_TRIALS_DRAWN) -> list[TrialMotions]:
     """Replays of the chosen trials, of many those whose misfit before was largest, by the names of the trials."""
     misfits = {
         place: as_number(trial["misfit"].get("before")) for place, trial in enumerate(found["trials"]) if chosen(trial)
     }
     worst = sorted(misfits, key=lambda place: -misfits[place])[:most]
-    replays = [found["replays"][place] for place in sorted(worst)]
-    return [{**replay, "trial": trial_name(replay["trial"])} for replay in replays]
+    return [_motions(found["replays"][place]) for place in sorted(worst)]
+
+
+def _motions(replay: Json) -> TrialMotions:
+    """A replay of the JSON."""
+    series = {
+        key: {name: np.array(values, dtype=float) for name, values in replay[key].items()} for key in SERIES.values()
+    }
+    return TrialMotions(trial=trial_name(replay["trial"]), **series)
 
 
 def shown_places(found: Json) -> list[Json]:

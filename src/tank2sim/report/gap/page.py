@@ -14,7 +14,6 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE, replaces
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
-from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.report.gap.charts import (
     MOST_TRIALS_DRAWN,
@@ -46,7 +45,7 @@ from tank2sim.report.gap.text import (
     verdict_in_words,
     with_error,
 )
-from tank2sim.report.json_values import Json
+from tank2sim.report.json_values import Json, as_number
 from tank2sim.units import in_words
 
 _SURE = 0.9

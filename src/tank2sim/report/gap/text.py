@@ -13,8 +13,7 @@ from tank2sim.answer.parts import Cell
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.cross_check import MUCH
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
-from tank2sim.identification.trials.as_json import as_number
-from tank2sim.report.json_values import Json
+from tank2sim.report.json_values import Json, as_number
 from tank2sim.units import in_words, to_si
 
 GOOD = 1.5

@@ -68,12 +68,6 @@ def _gap(result: Mapping[str, Json]) -> list[KeyFigure]:
     return [*figures[: _MOST_FIGURES - 1], *_misfit(misfit.get("before") or {}, misfit.get("after") or {})]
 
 
-def _identified(result: Mapping[str, Json]) -> list[KeyFigure]:
-    """How the card found follows the trials held out, next to the card given."""
-    misfit = result.get("misfit") or {}
-    return _misfit(misfit.get("before") or {}, misfit)
-
-
 def _misfit(before: Mapping[str, Json], after: Mapping[str, Json]) -> list[KeyFigure]:
     trials = "holdout" if is_number_value(after.get("holdout")) else "fit"
     old, new = before.get(trials), after.get(trials)
@@ -88,5 +82,4 @@ def _misfit(before: Mapping[str, Json], after: Mapping[str, Json]) -> list[KeyFi
 
 _TILES: Mapping[str, Callable[[Mapping[str, Json]], list[KeyFigure]]] = {
     "The missing effect": _gap,
-    "Coefficients from trials": _identified,
 }

@@ -43,10 +43,6 @@ _GAP_NOTE = (
 
 RESULT_TYPES = (
     ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
-    ResultType(
-        "Craft with thrusters, from trials", "identify", ("coefficients", "next_trials", "held_out"), ("method",)
-    ),
-    ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
     ResultType("Fleet", "gap", ("fleet", "ships"), ()),
 )
 """The results that are known, those with more particular keys first."""

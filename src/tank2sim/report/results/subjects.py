@@ -9,7 +9,6 @@ from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.gap.page import gap_page
-from tank2sim.report.identification.page import identification_page
 from tank2sim.report.json_values import Json
 
 
@@ -36,11 +35,6 @@ _WAY = ("ahead_m", "starboard_m")
 _SECTIONS: Mapping[str, _Sections] = {}
 
 _PAGES: Mapping[str, _Page] = {
-    "Coefficients from trials": _Page(
-        identification_page,
-        {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}
-        | {"prior_scale": dict, "identifiability": dict, "notices": list, "replays": list},
-    ),
     "The missing effect": _Page(
         gap_page,
         {"ship": str, "verdict": str, "effects": list, "alternatives": list, "where": list, "acting": list}

@@ -63,6 +63,10 @@ LEAST_LIKELY = 1e8
 """Sum of squares in place of one that is infinite, which ends a Hamiltonian trajectory (project choice)."""
 
 
+NOT_CONVERGED = "NOT CONVERGED"
+"""Mark of chains that disagree or are too short."""
+
+
 @dataclass(frozen=True, eq=False)
 class PosteriorSamples:
     """Samples of the posterior.
@@ -120,7 +124,7 @@ class PosteriorSamples:
         if self.converged:
             return [words]
         wanted = f"below {LARGEST_R_HAT} and {FEWEST_EFFECTIVE} or more are wanted: give more --draws"
-        return [f"NOT CONVERGED: {words}; {wanted}"]
+        return [f"{NOT_CONVERGED}: {words}; {wanted}"]
 
 
 def check_sampler(name: str) -> None:

@@ -1,4 +1,4 @@
-"""Charts of an identification from trials: tracks and histories next to simulations, errors, parameters, figures."""
+"""Charts of trials next to simulations by two cards: tracks, histories, errors over windows, figures."""
 
 from __future__ import annotations
 
@@ -25,9 +25,8 @@ from tank2sim.answer.charts.parts import (
     with_unit,
 )
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.as_json import as_number, relative_error
+from tank2sim.identification.trials.study import PredictedFigure, TrialErrors, TrialMotions, WindowError
 from tank2sim.records.thinning import Indices, thin_points
-from tank2sim.report.json_values import Json
 from tank2sim.units import in_words
 
 MEASURED, BEFORE, AFTER = "measured", "card before", "card found"
@@ -42,7 +41,7 @@ MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
 """Samples of a line, and points of a series, in a small panel (about 200 px wide)."""
 
 SERIES = {MEASURED: "measured", BEFORE: "before", AFTER: "found"}
-"""Series to its key in a trial of ``replays`` in the JSON."""
+"""Series to its name in :class:`.TrialMotions` and :class:`.TrialErrors`."""
 
 _SIGNALS = {
     "delta_deg": "rudder",
@@ -73,11 +72,11 @@ _LINE_LOOK = {"color": _LOOK.colour.to_dict(), "strokeDash": _LOOK.dash.to_dict(
 _SHARED = {"color": "shared", "strokeDash": "shared", "shape": "shared"}
 
 
-def track_grid(trials: Sequence[Json], *, title: str = "") -> alt.ConcatChart | None:
+def track_grid(trials: Sequence[TrialMotions], *, title: str = "") -> alt.ConcatChart | None:
     """Tracks, a panel a trial, x north up and y east to the right in one scale; measured as points, models as lines.
 
-    `trials` are those of ``replays`` in the JSON. The scale is that of what was measured and of the card found: the
-    card before may leave the panel. None where no trial has a track.
+    The scale fits the measurement and the card found: the card before may leave the panel. None where no trial has a
+    track.
     """
     panels, rows_of = [], {}
     for trial in trials:
@@ -98,7 +97,7 @@ def track_grid(trials: Sequence[Json], *, title: str = "") -> alt.ConcatChart | 
             alt.Tooltip("x:Q", title="north (m)", format=NUMBER),
             alt.Tooltip("y:Q", title="east (m)", format=NUMBER),
         ]
-        name = trial["trial"]
+        name = trial.trial
         rows_of[name] = rows
         layers = alt.layer(*_marks(position, tooltip), data=alt.NamedData(name))
         panels.append(layers.properties(title=_small(name), width=frame.width_px, height=frame.height_px))
@@ -110,15 +109,17 @@ def track_grid(trials: Sequence[Json], *, title: str = "") -> alt.ConcatChart | 
     return _with_rows(chart, rows_of)
 
 
-def history_grid(trials: Sequence[Json], *, signals: Mapping[str, str] = _SIGNALS, title: str = "") -> alt.ConcatChart:
-    """Signals over time, a column of panels a trial; `trials` as for :func:`track_grid`, `signals`: column to words."""
-    made = {trial["trial"]: _histories(trial, signals) for trial in trials}
+def history_grid(
+    trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = _SIGNALS, title: str = ""
+) -> alt.ConcatChart:
+    """Signals over time, a column of panels a trial; `signals`: column to words."""
+    made = {trial.trial: _histories(trial, signals) for trial in trials}
     text = f"Time histories of {', '.join(made)}, measured and simulated."
     chart = _grid([panels for panels, _ in made.values()], title, text)
     return _with_rows(chart, {name: rows for name, (_, rows) in made.items()})
 
 
-def _histories(trial: Json, signals: Mapping[str, str]) -> tuple[alt.VConcatChart, list[ChartRecord]]:
+def _histories(trial: TrialMotions, signals: Mapping[str, str]) -> tuple[alt.VConcatChart, list[ChartRecord]]:
     series = _series(trial, tuple(signals))
     names = [name for name in signals if any(name in columns for columns in series.values())]
     fields = {name: f"s{place}" for place, name in enumerate(signals)}
@@ -143,8 +144,8 @@ def _histories(trial: Json, signals: Mapping[str, str]) -> tuple[alt.VConcatChar
             alt.Tooltip(f"{fields[name]}:Q", title=up, format=NUMBER),
         ]
         panels.append(alt.layer(*_marks(position, tooltip)).properties(width=200, height=66))
-    chart = alt.vconcat(*panels, data=alt.NamedData(trial["trial"]), spacing=12).resolve_scale(x="shared", **_SHARED)
-    return chart.properties(title=_small(trial["trial"])), rows
+    chart = alt.vconcat(*panels, data=alt.NamedData(trial.trial), spacing=12).resolve_scale(x="shared", **_SHARED)
+    return chart.properties(title=_small(trial.trial)), rows
 
 
 def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
@@ -153,17 +154,17 @@ def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
     return alt.Scale(domain=list(extent(values)), nice=True, zero=False)
 
 
-def window_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.VConcatChart:
+def window_chart(sets: Mapping[str, Sequence[TrialErrors]], *, title: str = "") -> alt.VConcatChart:
     """Error over windows of each signal in each trial, as a share of the signal, as a heat map.
 
     Parameters
     ----------
     sets : mapping
-        ``fitted`` and ``held out`` to their trials in ``errors_over_windows`` of the JSON.
+        ``fitted`` and ``held out`` to their trials.
     title : str
         Of the chart.
     """
-    every = [trial[SERIES[label]] for trials in sets.values() for trial in trials for label in MODEL_SERIES.values()]
+    every = [errors for trials in sets.values() for trial in trials for errors in (trial.before, trial.found)]
     signals = [symbol for name, symbol in SYMBOLS.items() if any(name in errors for errors in every)]
     rows = []
     for word, trials in sets.items():
@@ -179,19 +180,23 @@ def window_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.
     )
 
 
+def _errors_of(trial: TrialErrors, label: str) -> dict[str, WindowError]:
+    return trial.before if label == BEFORE else trial.found
+
+
 def _window_map(
-    trials: Sequence[Json], label: str, signals: Sequence[str], title: str, *, named: bool
+    trials: Sequence[TrialErrors], label: str, signals: Sequence[str], title: str, *, named: bool
 ) -> alt.LayerChart:
     rows = []
     for trial in trials:
-        for name, errors in trial[SERIES[label]].items():
-            share, error = 100 * relative_error(errors), as_number(errors["rms_error"])
+        for name, errors in _errors_of(trial, label).items():
+            share, error = 100 * errors.relative, errors.rms_error
             rows.append(
-                {"trial": trial["trial"], "signal": SYMBOLS.get(name, name), "share": plain(share)}
+                {"trial": trial.trial, "signal": SYMBOLS.get(name, name), "share": plain(share)}
                 | {"text": _in_three(share), "error": f"{error:.3g} {in_words(name)[1]}".strip()}
             )
     side = alt.Axis(title=None, labelLimit=230) if named else alt.Axis(title=None, labels=False, ticks=False)
-    y = alt.Y("trial:N", sort=[trial["trial"] for trial in trials], axis=side)
+    y = alt.Y("trial:N", sort=[trial.trial for trial in trials], axis=side)
     x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
     x = x.axis(title="signal", orient="bottom", labelAngle=0)
     colours = alt.Scale(type="log", domain=[1, 100], scheme="blues", clamp=True)
@@ -210,13 +215,13 @@ def _window_map(
     return alt.layer(cells, numbers).properties(title=_small(title), **size)
 
 
-def figure_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.VConcatChart | None:
+def figure_chart(sets: Mapping[str, Sequence[PredictedFigure]], *, title: str = "") -> alt.VConcatChart | None:
     """Figures of turns and zigzags, predicted against measured, and their errors; None without a figure.
 
     Parameters
     ----------
     sets : mapping
-        ``fitted`` and ``held out`` to their ``figures`` in the JSON.
+        ``fitted`` and ``held out`` to their figures.
     title : str
         Of the chart.
     """
@@ -234,26 +239,28 @@ def figure_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.
     )
 
 
-def _figure_rows(sets: Mapping[str, Sequence[Json]], ending: str) -> Iterable[ChartRecord]:
+def _figure_rows(sets: Mapping[str, Sequence[PredictedFigure]], ending: str) -> Iterable[ChartRecord]:
     for word, figures in sets.items():
-        for label, key, interval in ((BEFORE, "before", None), (AFTER, "predicted", "interval_95")):
-            for figure in figures:
-                if figure["figure"].endswith(ending):
-                    ends = figure[interval] if interval else None
-                    yield {"run": label, "set": word} | _figure_row(figure, ending, figure[key], ends)
+        shown = [figure for figure in figures if figure.figure.endswith(ending)]
+        for figure in shown:
+            yield {"run": BEFORE, "set": word} | _figure_row(figure, ending, figure.before, None)
+        for figure in shown:
+            yield {"run": AFTER, "set": word} | _figure_row(figure, ending, figure.predicted, figure.interval_95)
 
 
-def _figure_row(figure: Json, ending: str, value: float | None, interval: Sequence[float | None] | None) -> ChartRecord:
+def _figure_row(
+    figure: PredictedFigure, ending: str, value: float | None, interval: tuple[float, float] | None
+) -> ChartRecord:
     predicted = math.nan if value is None else value
-    low, high = (as_number(end) for end in interval or (predicted, predicted))
-    measured = figure["measured"]
+    low, high = interval or (predicted, predicted)
+    measured = figure.measured
 
     def error(value: float) -> float | None:
         difference = value - measured
         return plain(100 * difference / measured if ending == "_m" else difference)
 
     return {
-        "name": f"{figure['trial']} · {figure['figure'].removesuffix(ending).replace('_', ' ')}",
+        "name": f"{figure.trial} · {figure.figure.removesuffix(ending).replace('_', ' ')}",
         "measured": plain(measured),
         "predicted": plain(predicted),
         "low": plain(low),
@@ -308,15 +315,15 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
     ).resolve_scale(**_SHARED)
 
 
-def _series(trial: Json, names: Sequence[str]) -> dict[str, dict[str, Array]]:
+def _series(trial: TrialMotions, names: Sequence[str]) -> dict[str, dict[str, Array]]:
     """Label to time and those of the columns that it has; what ran away is left out.
 
     Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
     """
     series = {
-        label: {name: np.array(trial[key][name], dtype=float) for name in ("t_s", *names) if name in trial[key]}
-        for label, key in SERIES.items()
-        if not set(names).isdisjoint(trial[key])
+        label: {name: columns[name] for name in ("t_s", *names) if name in columns}
+        for label, columns in ((label, getattr(trial, name)) for label, name in SERIES.items())
+        if not set(names).isdisjoint(columns)
     }
     times = [columns["t_s"] for label, columns in series.items() if label != MEASURED]
     if times and MEASURED in series:

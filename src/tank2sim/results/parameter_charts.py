@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import altair as alt
 
 from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
-from tank2sim.identification.trials.as_json import as_number, value_with_error
+from tank2sim.arrays import Array
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
-from tank2sim.report.json_values import Json
+from tank2sim.identification.trials.study import IdentifiabilityStudy, ParameterEstimate, PosteriorStudy
 
 _NORMAL = 1.959964
 
 
-def parameter_chart(parameters: Mapping[str, Json], *, title: str = "") -> alt.HConcatChart:
-    """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to.
+def value_with_error(value: float, error: float) -> str:
+    """Value and standard error in words: ``-0.0035 ± 0.00012``."""
+    return f"{value:.5g} ± {error:.2g}"
 
-    `parameters` are entries of ``derivatives`` and ``effects`` in the JSON.
-    """
+
+def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> alt.HConcatChart:
+    """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
     rows = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
     farthest = max((abs(row[key] or 0.0) for row in rows for key in ("low", "high")), default=1.0)
     # A few derivatives may move by dozens of standard errors, where the others move by one.
@@ -54,18 +56,18 @@ def parameter_chart(parameters: Mapping[str, Json], *, title: str = "") -> alt.H
     )
 
 
-def _parameter_row(name: str, parameter: Json) -> ChartRecord:
-    unit, share = parameter["prior_standard_error"], 100 * as_number(parameter["share_from_trials"])
-    value = (parameter["value"] - parameter["before"]) / unit
-    error = _NORMAL * as_number(parameter["standard_error"]) / unit
+def _parameter_row(name: str, parameter: ParameterEstimate) -> ChartRecord:
+    unit, share = parameter.prior_standard_error, 100 * parameter.share_from_trials
+    value = (parameter.value - parameter.before) / unit
+    error = _NORMAL * parameter.standard_error / unit
     return {
         "name": name,
         "v": plain(value),
         "low": plain(value - error),
         "high": plain(value + error),
         "share": plain(share),
-        "own": value_with_error(parameter["value"], parameter["standard_error"]),
-        "known": value_with_error(parameter["before"], unit),
+        "own": value_with_error(parameter.value, parameter.standard_error),
+        "known": value_with_error(parameter.before, unit),
         "share_text": f"{share:.0f} %",
     }
 
@@ -76,16 +78,17 @@ def _symmetric_ticks(farthest: float) -> list[float]:
     return [-step for step in reversed(positive)] + [0.0, *positive]
 
 
-def posterior_chart(parameters: Mapping[str, Json], posterior: Json, *, title: str = "") -> alt.LayerChart:
+def posterior_chart(
+    parameters: Mapping[str, ParameterEstimate], posterior: PosteriorStudy, *, title: str = ""
+) -> alt.LayerChart:
     """Median and intervals of 50 and 95 % of each sampled parameter, in its standard deviations from its mean.
 
-    The grey band is the 95 % interval of a normal distribution. `parameters` are entries of ``derivatives`` and
-    ``effects`` of the JSON, `posterior` is its entry of that name.
+    The grey band is the 95 % interval of a normal distribution.
     """
     rows: list[ChartRecord] = []
-    for name, entry in posterior["parameters"].items():
-        mean, deviation = parameters[name]["value"], as_number(parameters[name]["standard_error"])
-        low, quarter, middle, three, high = entry["quantiles"]
+    for name, entry in posterior.parameters.items():
+        mean, deviation = parameters[name].value, parameters[name].standard_error
+        low, quarter, middle, three, high = entry.quantiles
         scaled = {"low": low, "quarter": quarter, "v": middle, "three": three, "high": high}
         shown = {key: plain((value - mean) / deviation) for key, value in scaled.items()}
         rows.append(
@@ -111,16 +114,13 @@ def posterior_chart(parameters: Mapping[str, Json], posterior: Json, *, title: s
     return alt.layer(*layers).properties(width=560, height=19 * len(rows), title=title, description=description)
 
 
-def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
-    """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`.
-
-    `known` is ``identifiability`` of the JSON.
-    """
-    names = known["parameters"]
+def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> alt.LayerChart:
+    """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`."""
+    names = list(known.parameters)
     step = max(8, min(24, 560 // len(names)))
     rows: list[ChartRecord] = [
-        {"one": name, "other": column_name, "c": plain(as_number(value))}
-        for name, row in zip(names, known["correlation"], strict=True)
+        {"one": name, "other": column_name, "c": plain(float(value))}
+        for name, row in zip(names, known.correlation, strict=True)
         for column_name, value in zip(names, row, strict=True)
     ]
     axis = alt.Axis(title=None, labelLimit=200, ticks=False)
@@ -134,7 +134,7 @@ def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
     close = [row for row in rows if row["one"] != row["other"] and abs(row["c"] or 0.0) > CLOSE_CORRELATION]
     frames = Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
     layers = [cells, *([frames.encode(x=x, y=y, tooltip=tooltip)] if close else [])]
-    pairs = len(known["correlated_pairs"])
+    pairs = len(known.correlated_pairs)
     text = f"Framed: {pairs} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
     size = {"width": step * len(names), "height": step * len(names)}
     return alt.layer(*layers).properties(
@@ -144,9 +144,9 @@ def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
     )
 
 
-def singular_value_chart(values: Sequence[float], *, title: str = "") -> alt.LayerChart:
+def singular_value_chart(values: Array, *, title: str = "") -> alt.LayerChart:
     """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
-    rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values, start=1) if value > 0]
+    rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values.tolist(), start=1) if value > 0]
     x = alt.X(
         "order:Q", title="direction, by the information of the trials (-)", scale=alt.Scale(nice=False, padding=10)
     )

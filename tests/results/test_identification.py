@@ -1,8 +1,7 @@
-"""The page of an identification shows what was measured, what the cards make of it, and what was estimated."""
+"""The result of an identification shows the record, the motions by both cards, and the estimates."""
 
 from __future__ import annotations
 
-import copy
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -12,24 +11,27 @@ import pytest
 from click.testing import CliRunner
 
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.answer.page import render_page
 from tank2sim.answer.parts import Verdict
-from tank2sim.api.identification import IdentificationResult
 from tank2sim.cards import parse_card
 from tank2sim.cli.identify import command
-from tank2sim.files import plain_json
-from tank2sim.identification.trials.as_json import replays_as_json
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
 from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
+from tank2sim.identification.trials.study import (
+    CardReplay,
+    PredictedFigure,
+    TrialErrors,
+    WindowError,
+    card_replay,
+    study_identification,
+)
 from tank2sim.records.trials import Trial
-from tank2sim.report.identification import page as identification_page_module
-from tank2sim.report.identification.charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
-from tank2sim.report.identification.page import MOST_TRIALS, identification_charts, identification_page
-from tank2sim.report.results.page import result_page
+from tank2sim.results import identification as identification_module
+from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
+from tank2sim.results.trial_charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
 from tests.identification.trials import made_up_ship
 
 OFF = {"Nd": 1.25, "Nr": 0.8, "Yv": 1.2, "Xu": 0.8}
@@ -61,17 +63,17 @@ def trials():
 
 @pytest.fixture(scope="module")
 def found(trials):
-    """The identification, its JSON and its charts."""
+    """The identification, its result and its charts."""
     known = parse_card(text_of(OFF), "off.toml")
     fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
     held = Measured((trials["turn"],), "angle", ())
     result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error", members=20))
-    found = IdentificationResult(known, result, fitted, held)
-    return result, found.to_dict(), found.charts()
+    found = IdentificationResult(study_identification(known, result, fitted, held), None, result)
+    return result, found, found.charts()
 
 
-def held_out(found):
-    return [trial for trial in found[1]["replays"] if trial["held_out"]]
+def held_out(found) -> list[CardReplay]:
+    return [trial for trial in found[1].study.replays if trial.held_out]
 
 
 def over_ground(trial: Trial) -> Trial:
@@ -140,7 +142,7 @@ def test_without_positions_the_cards_alone_have_tracks(trials) -> None:
     seen = {name: values for name, values in trials["turn"].signals.items() if name not in ("x_m", "y_m")}
     blind = (replace(trials["turn"], signals=seen),)
     (passage,) = comparison_windows(problem_from_card(truth, blind, "angle"), truth, blind, {})
-    chart = track_grid(plain_json(replays_as_json([(passage, passage)], held_out=True)))
+    chart = track_grid([card_replay(passage, passage, held_out=True)])
     assert rows_of(chart, AFTER) and not rows_of(chart, MEASURED)
 
 
@@ -175,14 +177,24 @@ def test_maps_next_to_each_other_share_one_legend(found) -> None:
 
 @pytest.mark.slow
 def test_overshoots_keep_the_digits_that_their_errors_need(found) -> None:
-    keys = ("trial", "figure", "measured", "before", "predicted", "interval_95")
     rows = [
         ("zigzag", "overshoot_1_deg", 7.7, 7.81, 7.72, None),
-        ("turn", "advance_m", 1234.5, 1300.0, 1235.5, [1200.0, 1300.0]),
+        ("turn", "advance_m", 1234.5, 1300.0, 1235.5, (1200.0, 1300.0)),
     ]
-    figures = [dict(zip(keys, row, strict=True)) for row in rows]
-    html = render_page(identification_page(found[1] | {"figures": {"fit": [], "holdout": figures}}))
-    shown = ("7.7", "7.81", "7.72", "+0.02", "1234", "1300", "+0.1 %", "1200 to 1300")
+    figures = tuple(
+        PredictedFigure(
+            trial=trial,
+            figure=figure,
+            measured=measured,
+            before=before,
+            predicted=predicted,
+            error=predicted - measured,
+            interval_95=interval,
+        )
+        for trial, figure, measured, before, predicted, interval in rows
+    )
+    html = replace(found[1], study=replace(found[1].study, figures={"fit": (), "holdout": figures})).page()
+    shown = ("7.7", "7.81", "7.72", "+0.02 deg", "1234", "1300", "+0.1 %", "1200 to 1300")
     assert all(f">{text}<" in html for text in shown)
 
 
@@ -218,65 +230,69 @@ def test_figures_stand_with_their_errors_in_percent(found) -> None:
     assert abs(shown["error"]) > 1
 
 
-def test_the_page_tells_the_errors_of_what_was_held_out(found) -> None:
-    result, content, charts = found
-    page = identification_page(content)
-    figures = {figure.label: figure for figure in page.figures}
+def test_the_key_figures_tell_the_errors_of_the_trials_held_out(found) -> None:
+    result, shown, charts = found
+    figures = {figure.label: figure for figure in shown.key_figures}
     assert figures["Trials held out"].value == 1 and figures["Trials held out"].note == "1 were fitted"
     assert figures["Numbers fitted"].value == len(OFF)
     (turn,), (before,) = result.holdout.following, result.before_holdout.following
-    shown = figures["Yaw-rate error, held out"]
-    assert shown.value == pytest.approx(100 * turn.relative("motion.r"), 1e-2) and shown.unit == "%"
-    assert f"{100 * before.relative('motion.r'):.3g} %" in shown.note and shown.verdict is Verdict.NONE
+    error = figures["Yaw-rate error, held out"]
+    assert error.value == pytest.approx(100 * turn.relative("motion.r"), 1e-2) and error.unit == "%"
+    assert f"{100 * before.relative('motion.r'):.3g} %" in error.note and error.verdict is Verdict.NONE
     assert "Advance error, held out" in figures
-    assert sum(len(section.charts) for section in page.sections) == len(charts)
-    assert page.sections[-1].tables[0].rows == [["mended"], *([notice] for notice in result.notices[1:])]
-    tracks = chart_specification(charts["tracks_held_out"])
-    (section,) = (section for section in page.sections if section.heading == "Trials held out")
-    assert chart_specification(section.charts[0].chart) == tracks
+    assert list(charts)[:2] == ["tracks_held_out", "histories_held_out"] and "singular_values" in charts
+    assert "mended" in shown.notices and shown.study.warnings[-1] in shown.notices
+
+
+def test_the_estimates_are_a_table_and_a_data_frame(found) -> None:
+    result, shown, _ = found
+    assert shown.estimates["value"].to_numpy() == pytest.approx(result.estimate.values)
+    assert list(shown.estimates.index) == list(result.estimate.free)
+    (parameters,) = (table.df for table in shown.tables if "one standard error" in table.caption)
+    assert parameters["coefficient"].to_list() == [name.partition(".")[2] for name in result.estimate.free]
 
 
 @pytest.mark.slow
 def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
-    monkeypatch.setattr(identification_page_module, "MOST_TRIALS", 2)
-    monkeypatch.setattr(identification_page_module, "_PER_SHEET", 1)
-    content = copy.deepcopy(found[1])
+    monkeypatch.setattr(identification_module, "MOST_TRIALS", 2)
+    monkeypatch.setattr(identification_module, "_PER_SHEET", 1)
     errors = {"b": 0.2, "c": 0.1, "a": 0.3}
-    content["replays"] = [trial | {"trial": name} for name in errors for trial in held_out(found)]
-    content["errors_over_windows"]["holdout"] = [
-        {"trial": name} | {key: {"r_degps": {"rms_error": error, "rms_signal": 1.0}} for key in ("before", "found")}
-        for name, error in errors.items()
-    ]
-    shown = identification_charts(content)
-    sheets = [chart_specification(shown[stem])["concat"] for stem in ("histories_held_out", "histories_held_out_2")]
+    windows = {name: {"r_degps": WindowError(rms_error=error, rms_signal=1.0)} for name, error in errors.items()}
+    trials = tuple(TrialErrors(trial=name, before=error, found=error) for name, error in windows.items())
+    study = replace(
+        found[1].study,
+        replays=tuple(replace(trial, trial=name) for name in errors for trial in held_out(found)),
+        errors_over_windows={"fit": (), "holdout": trials},
+    )
+    shown = replace(found[1], study=study)
+    charts = shown.charts()
+    sheets = [chart_specification(charts[stem])["concat"] for stem in ("histories_held_out", "histories_held_out_2")]
     assert [[panel["title"]["text"] for panel in sheet] for sheet in sheets] == [["b"], ["a"]]
-    notes = [section.text for section in identification_page(content).sections if section.heading == "Trials held out"]
+    notes = [section.text for section in shown.sections if section.heading == "Trials held out"]
     assert notes == ["The 2 of 3 trials with the largest error of yaw rate."]
 
 
 def test_of_a_record_that_goes_on_after_the_manoeuvre_the_simulated_part_is_shown(found) -> None:
-    (turn,) = copy.deepcopy(held_out(found))
-    whole = turn["measured"]
-    turn["before"] = {}
-    turn["found"] = {name: values[: len(values) // 2] for name, values in turn["found"].items()}
+    (turn,) = held_out(found)
+    half = {name: values[: len(values) // 2] for name, values in turn.found.items()}
+    turn = replace(turn, before={}, found=half)
     times = [row["t"] for row in rows_of(history_grid([turn]), MEASURED)]
-    model = turn["found"]["t_s"]
-    assert model[0] <= min(times) and max(times) <= model[-1] < whole["t_s"][-1]
-    assert not rows_of(history_grid([turn]), BEFORE), "what ran away is left out"
+    model = half["t_s"]
+    assert model[0] <= min(times) and max(times) <= model[-1] < turn.measured["t_s"][-1]
+    assert not rows_of(history_grid([turn]), BEFORE), "a motion that left all bounds is left out"
 
 
-def test_a_json_of_an_older_version_has_the_page_of_any_result(found) -> None:
-    older = {key: value for key, value in found[1].items() if key not in ("errors_over_windows", "ship")}
-    page = result_page(older, "identify.json")
-    assert page.title == "Coefficients from trials" and any(section.charts for section in page.sections)
+def test_a_result_read_from_its_json_has_the_same_page(found) -> None:
+    again = IdentificationResult.read(found[1].to_dict(), "i.json")
+    assert again.page() == found[1].page() and again.to_dict() == found[1].to_dict()
 
 
 def test_a_forced_result_is_marked_on_its_page(trials, found) -> None:
     none = Measured((), "angle", ())
     forced = replace(found[0], forced=("the rudder's moment differs",))
     held = Measured((trials["by_the_clock"],), "angle", ())
-    made = IdentificationResult(parse_card(text_of(OFF), "off.toml"), forced, held, none)
-    assert any("FORCED: the rudder's moment differs" in notice for notice in made.to_dict()["notices"])
+    made = IdentificationResult(study_identification(parse_card(text_of(OFF), "off.toml"), forced, held, none))
+    assert any("FORCED: the rudder's moment differs" in notice for notice in made.study.notices)
     assert "FORCED" in made.page()
 
 

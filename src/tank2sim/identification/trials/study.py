@@ -1,0 +1,616 @@
+"""Study of an identification from trials, and the text of the card found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from tank2sim.arrays import Array, Columns, Number, Unbounded
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.reading import changed_text
+from tank2sim.escaping import one_line
+from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.identification.trials.assessment.evaluation import (
+    Comparison,
+    Following,
+    Passage,
+    comparison_windows,
+    misfit,
+    pooled,
+)
+from tank2sim.identification.trials.assessment.notices import remarks
+from tank2sim.identification.trials.identify import Identification
+from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.methods.posterior_sampling import PosteriorSamples
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.identification.trials.problem.water_current import WaterCurrent, card_in
+from tank2sim.marks import FORCED
+from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.thinning import drawn_columns
+from tank2sim.units import from_si
+
+SET_KEYS = {"fitted": "fit", "held out": "holdout"}
+"""Words for a set of trials to its key in the JSON."""
+
+POSTERIOR_LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
+"""Levels of the quantiles of a posterior: its median, and the intervals that hold half and 95 % of it."""
+
+FIGURES_ARE = "simulated in closed loop with the card found, from each trial's measured start, rudder rate and lag"
+"""Origin of the figures: ``simulate`` uses the card's approach speed and steering gear instead."""
+
+_OBSERVED = {variable: SignalName(signal).file for signal, variable in OBSERVED_SIGNALS.items()}
+"""Variable of a model to the column of a trial file that measures it."""
+
+_COLUMNS = {
+    "rudder": "delta_deg",
+    "motion.psi": "psi_deg",
+    "motion.r": "r_degps",
+    "motion.speed": "speed_mps",
+    "motion.beta": "beta_deg",
+    "motion.x": "x_m",
+    "motion.y": "y_m",
+}
+_SAMPLES = 240
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterEstimate:
+    """A parameter identified from trials: prime or SI, rudder positive to starboard.
+
+    Parameters
+    ----------
+    value, standard_error : float
+    before, before_standard_error : float
+        Those of the card given.
+    prior_standard_error : float
+        As the fit took it: widened where the trials demanded it.
+    share_from_trials : float
+        Share of the information from the trials: 1 - (variance after / variance before).
+    """
+
+    value: Number
+    standard_error: Unbounded
+    before: Number
+    before_standard_error: Unbounded
+    prior_standard_error: Unbounded
+    share_from_trials: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimatedCurrent:
+    """The current of trials at sea, estimated with the coefficients.
+
+    Parameters
+    ----------
+    speed_mps, direction_deg : float
+        Towards the direction.
+    speed_standard_error_mps, direction_standard_error_deg : float
+    largest_standard_error_mps : float
+        In the direction in which it is known worst.
+    determined : bool
+        Whether the trials determine it.
+    """
+
+    speed_mps: Number
+    direction_deg: Number
+    speed_standard_error_mps: Unbounded
+    direction_standard_error_deg: Unbounded
+    largest_standard_error_mps: Unbounded
+    determined: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class SetMisfit:
+    """Misfit of the fitted trials, and of those held out (None without any): 1 is noise."""
+
+    fit: Number
+    holdout: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentificationMisfit(SetMisfit):
+    """Misfit of the card found, and `before` of the card given; noise by signal of the model, SI."""
+
+    noise: dict[str, Number]
+    before: SetMisfit
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowError:
+    """Root mean square of an error over windows, and of the measured signal, in the unit of the column."""
+
+    rms_error: Unbounded
+    rms_signal: Number
+
+    @property
+    def relative(self) -> float:
+        """The error as a share of the signal; infinite for a signal that is zero."""
+        return self.rms_error / self.rms_signal if self.rms_signal else np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialErrors:
+    """Errors over windows of a trial by column, of the card given and of the card found."""
+
+    trial: str
+    before: dict[str, WindowError]
+    found: dict[str, WindowError]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictedFigure:
+    """A figure of a trial.
+
+    Parameters
+    ----------
+    trial, figure : str
+        The figure with its unit.
+    measured : float
+    before, predicted : float or None
+        By the card given and by the card found; None where the simulation did not reach it.
+    error : float or None
+        Predicted less measured.
+    interval_95 : (float, float) or None
+        Expected interval of the figure, for held-out trials.
+    """
+
+    trial: str
+    figure: str
+    measured: float
+    before: float | None
+    predicted: float | None
+    error: float | None
+    interval_95: tuple[Unbounded, Unbounded] | None
+
+    def share_or_error(self, value: float | None) -> float:
+        """A predicted value less the measured one; for distances as a share of it; NaN where not reached."""
+        if value is None:
+            return np.nan
+        difference = value - self.measured
+        return difference / self.measured if self.figure.endswith("_m") else difference
+
+
+@dataclass(frozen=True, kw_only=True)
+class StructureErrors:
+    """Cross-validation of a structure.
+
+    Parameters
+    ----------
+    errors : tuple of float
+        Yaw-rate error of each trial held out as a share, then of those of largest amplitude held out together.
+    left_out : tuple of tuple of str
+        Trials held out for each error.
+    weight : float or None
+        Weight in the intervals; None unless structures are averaged.
+    """
+
+    errors: tuple[Unbounded, ...]
+    left_out: tuple[tuple[str, ...], ...]
+    weight: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledParameter:
+    """A sampled parameter: R-hat, effective sample size, and its values at the levels of the quantiles."""
+
+    r_hat: Unbounded
+    effective_sample_size: Unbounded
+    quantiles: tuple[Number, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PosteriorStudy:
+    """Samples of the posterior.
+
+    Parameters
+    ----------
+    sampler : str
+    chains, draws, simulations : int
+        Draws of all chains together.
+    converged : bool
+    quantile_levels : tuple of float
+    parameters : dict
+        By name.
+    """
+
+    sampler: str
+    chains: int
+    draws: int
+    simulations: int
+    converged: bool
+    quantile_levels: tuple[float, ...]
+    parameters: dict[str, SampledParameter]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BootstrapStudy:
+    """Standard deviation of the estimates over sets of trials simulated again, by parameter."""
+
+    members: int
+    standard_errors: dict[str, Number]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentifiabilityStudy:
+    """How well the trials determine the parameters (k), in units of the prior's standard errors.
+
+    Parameters
+    ----------
+    parameters : tuple of str
+    condition : float
+        Largest over smallest singular value.
+    singular_values : array (k,)
+        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
+    correlation : array (k, k)
+        By the trials alone.
+    correlated_pairs : tuple of (str, str, float)
+        The closest first.
+    unseen : tuple of tuple of str
+        Combinations of parameters that the trials do not determine.
+    notices : tuple of str
+    """
+
+    parameters: tuple[str, ...]
+    condition: Unbounded
+    singular_values: Array
+    correlation: Array
+    correlated_pairs: tuple[tuple[str, str, float], ...]
+    unseen: tuple[tuple[str, ...], ...]
+    notices: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialMotions:
+    """Columns of a trial as measured, and as simulated by the card given (`before`) and by the card found.
+
+    Each has its own ``t_s``, thinned to draw; empty where a motion left all bounds.
+    """
+
+    trial: str
+    measured: Columns
+    before: Columns
+    found: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CardReplay(TrialMotions):
+    """Motions of a fitted or held-out trial; `closed_loop`: steered as the manoeuvre asks, not by the record."""
+
+    held_out: bool
+    closed_loop: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentificationStudy:
+    """Coefficients identified from free-running trials.
+
+    Parameters
+    ----------
+    ship, method, structure : str
+    method_reason : str or None
+        None where the options name the method.
+    current : EstimatedCurrent or None
+        None where the card or a sensor states it, and in a basin.
+    forced : tuple of str
+        Evidence that the trials are not of the card's ship, where the fit was forced.
+    manoeuvres : dict
+        Trial to its recognised manoeuvre in words.
+    derivatives, effects : dict
+        Estimates by name; parameters of effects with that of their effect.
+    effects_of_card : tuple of str
+    misfit : IdentificationMisfit
+    yaw_rate_error_over_windows : dict
+        ``fit`` and ``holdout`` (None without any) to the share by trial, and of ``all``.
+    errors_over_windows : dict
+        ``fit`` and ``holdout`` to the trials.
+    figures_are : str
+        Origin of the figures.
+    figures : dict
+        ``fit`` and ``holdout`` to figures of turns and zigzags.
+    structures : dict
+        Cross-validation by structure; empty unless asked for.
+    criteria : dict or None
+        Information criteria ``aic`` and ``bic``, and the ``samples`` and ``parameters`` behind them.
+    posterior : PosteriorStudy or None
+    bootstrap : BootstrapStudy or None
+    residual_noise : dict
+        Standard deviation of the residuals by signal of the model, SI.
+    prior_scale : dict
+        Factor on the standard errors of the card by group of parameters.
+    cost : tuple of float
+    identifiability : IdentifiabilityStudy
+    notices, warnings : tuple of str
+        Changes to the data and marks; all that limits the result.
+    replays : tuple of CardReplay
+    """
+
+    ship: str
+    method: str
+    method_reason: str | None
+    current: EstimatedCurrent | None
+    structure: str
+    forced: tuple[str, ...]
+    manoeuvres: dict[str, str]
+    derivatives: dict[str, ParameterEstimate]
+    effects: dict[str, ParameterEstimate]
+    effects_of_card: tuple[str, ...]
+    misfit: IdentificationMisfit
+    yaw_rate_error_over_windows: dict[str, dict[str, Number] | None]
+    errors_over_windows: dict[str, tuple[TrialErrors, ...]]
+    figures_are: str
+    figures: dict[str, tuple[PredictedFigure, ...]]
+    structures: dict[str, StructureErrors]
+    criteria: dict[str, Number] | None
+    posterior: PosteriorStudy | None
+    bootstrap: BootstrapStudy | None
+    residual_noise: dict[str, Number]
+    prior_scale: dict[str, Number]
+    cost: tuple[Number, ...]
+    identifiability: IdentifiabilityStudy
+    notices: tuple[str, ...]
+    warnings: tuple[str, ...]
+    replays: tuple[CardReplay, ...]
+
+    @property
+    def parameters(self) -> dict[str, ParameterEstimate]:
+        """Derivatives and parameters of effects by name, in the order of the estimate."""
+        every = {**self.derivatives, **self.effects}
+        return {name: every[name] for name in self.identifiability.parameters}
+
+
+def study_identification(
+    before: ManoeuvringCard, result: Identification, fitted: Measured, held: Measured
+) -> IdentificationStudy:
+    """Study of an identification.
+
+    Parameters
+    ----------
+    before : ManoeuvringCard
+        The card given.
+    result : Identification
+    fitted, held : Measured
+        Trials that were fitted and held out; they are replayed by both cards.
+    """
+    estimate, known = result.estimate, result.identifiability
+    parameters = _parameters(result)
+    forced = [f"{FORCED}: {'; '.join(result.forced)}"] if result.forced else []
+    unfinished = [] if result.posterior is None or result.posterior.converged else result.posterior.notices
+    comparisons = {SET_KEYS[word]: (given, found) for word, given, found in result.comparisons}
+    return IdentificationStudy(
+        ship=result.card.ship.name,
+        method=estimate.method,
+        method_reason=None if result.choice is None else result.choice.reason,
+        current=None if result.current is None else _current(result.current),
+        structure=result.structure,
+        forced=result.forced,
+        manoeuvres=dict(result.manoeuvres),
+        derivatives={
+            name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
+        },
+        effects={name: entry for name, entry in parameters.items() if not name.startswith("derivatives.")},
+        effects_of_card=tuple(effect.name for effect in result.card.effects),
+        misfit=_misfit(result),
+        yaw_rate_error_over_windows={
+            "fit": _yaw_rate_errors(result.fit),
+            "holdout": _yaw_rate_errors(result.holdout) if result.holdout else None,
+        },
+        errors_over_windows={
+            key: _errors_over_windows(*comparisons[key]) if key in comparisons else () for key in SET_KEYS.values()
+        },
+        figures_are=FIGURES_ARE,
+        figures={key: _figures(*comparisons[key]) if key in comparisons else () for key in SET_KEYS.values()},
+        structures=_structures(result),
+        criteria=None if result.criteria is None else asdict(result.criteria),
+        posterior=None if result.posterior is None else _posterior(result.posterior),
+        bootstrap=_bootstrap(result),
+        residual_noise=dict(estimate.noise),
+        prior_scale=dict(estimate.prior_scale),
+        cost=tuple(map(float, estimate.cost)),
+        identifiability=IdentifiabilityStudy(
+            parameters=tuple(name.removeprefix("derivatives.") for name in known.free),
+            condition=float(known.condition),
+            singular_values=known.singular_values,
+            correlation=np.round(known.correlation, 7),
+            correlated_pairs=tuple((first, second, float(value)) for first, second, value in known.pairs),
+            unseen=tuple(map(tuple, known.unseen)),
+            notices=tuple(known.notices),
+        ),
+        notices=(*unfinished, *forced, *result.notices),
+        warnings=(*unfinished, *result.notices, *known.notices, *remarks(result)),
+        replays=_replays(before, result, fitted, held),
+    )
+
+
+def _current(current: WaterCurrent) -> EstimatedCurrent:
+    speed_error, direction_error = current.errors
+    return EstimatedCurrent(
+        speed_mps=current.speed_mps,
+        direction_deg=float(np.degrees(current.direction_rad)),
+        speed_standard_error_mps=float(speed_error),
+        direction_standard_error_deg=float(np.degrees(direction_error)),
+        largest_standard_error_mps=current.standard_error_mps,
+        determined=bool(current.determined),
+    )
+
+
+def _parameters(result: Identification) -> dict[str, ParameterEstimate]:
+    columns = np.stack(
+        [
+            result.estimate.values,
+            result.estimate.standard_errors,
+            result.problem.prior_mean,
+            result.problem.prior_error,
+            scaled_prior(result.problem, result.estimate.prior_scale),
+            result.identifiability.share,
+        ],
+        axis=1,
+    ).tolist()
+    return {
+        name: ParameterEstimate(
+            value=value,
+            standard_error=error,
+            before=before,
+            before_standard_error=before_error,
+            prior_standard_error=prior_error,
+            share_from_trials=share,
+        )
+        for name, (value, error, before, before_error, prior_error, share) in zip(
+            result.estimate.free, columns, strict=True
+        )
+    }
+
+
+def _misfit(result: Identification) -> IdentificationMisfit:
+    def held_out(comparison: Comparison | None) -> float | None:
+        return misfit(comparison, result.noise) if comparison else None
+
+    return IdentificationMisfit(
+        fit=misfit(result.fit, result.noise),
+        holdout=held_out(result.holdout),
+        noise=dict(result.noise),
+        before=SetMisfit(fit=misfit(result.before, result.noise), holdout=held_out(result.before_holdout)),
+    )
+
+
+def _yaw_rate_errors(comparison: Comparison) -> dict[str, Number]:
+    runs = {run.name: run.relative("motion.r") for run in comparison.following if "motion.r" in run.windows}
+    return {**runs, "all": pooled(comparison.following, "motion.r")}
+
+
+def _errors_over_windows(before: Comparison, found: Comparison) -> tuple[TrialErrors, ...]:
+    return tuple(
+        TrialErrors(trial=new.name, before=_window_errors(old), found=_window_errors(new))
+        for old, new in zip(before.following, found.following, strict=True)
+    )
+
+
+def _window_errors(following: Following) -> dict[str, WindowError]:
+    return {
+        column: WindowError(rms_error=float(from_si(column, error)), rms_signal=float(from_si(column, size)))
+        for column, (error, size) in ((_OBSERVED[name], errors) for name, errors in following.windows.items())
+    }
+
+
+def _figures(before: Comparison, found: Comparison) -> tuple[PredictedFigure, ...]:
+    given = {(figure.trial, figure.name): figure.predicted for figure in before.figures}
+    return tuple(
+        PredictedFigure(
+            trial=figure.trial,
+            figure=figure.name,
+            measured=figure.measured,
+            before=given.get((figure.trial, figure.name)),
+            predicted=figure.predicted,
+            error=None if figure.predicted is None else figure.predicted - figure.measured,
+            interval_95=None if figure.interval is None else (float(figure.interval[0]), float(figure.interval[1])),
+        )
+        for figure in found.figures
+    )
+
+
+def _structures(result: Identification) -> dict[str, StructureErrors]:
+    return {
+        name: StructureErrors(
+            errors=tuple(structure.errors.tolist()),
+            left_out=tuple(tuple(fold.held_out) for fold in (*structure.single, structure.extrapolation)),
+            weight=result.weights.get(name, 0.0) if result.weights else None,
+        )
+        for name, structure in result.structures.items()
+    }
+
+
+def _posterior(samples: PosteriorSamples) -> PosteriorStudy:
+    quantiles = np.quantile(samples.flat, POSTERIOR_LEVELS, axis=0).T
+    return PosteriorStudy(
+        sampler=samples.sampler,
+        chains=len(samples.values),
+        draws=len(samples.flat),
+        simulations=int(samples.simulations),
+        converged=samples.converged,
+        quantile_levels=POSTERIOR_LEVELS,
+        parameters={
+            name.removeprefix("derivatives."): SampledParameter(
+                r_hat=float(r_hat), effective_sample_size=float(effective), quantiles=tuple(values.tolist())
+            )
+            for name, r_hat, effective, values in zip(
+                samples.free, samples.r_hat, samples.effective, quantiles, strict=True
+            )
+        },
+    )
+
+
+def _bootstrap(result: Identification) -> BootstrapStudy | None:
+    if result.bootstrap is None:
+        return None
+    errors = np.std(result.bootstrap, axis=0, ddof=1).tolist()
+    return BootstrapStudy(
+        members=len(result.bootstrap), standard_errors=dict(zip(result.estimate.free, errors, strict=True))
+    )
+
+
+def _replays(
+    before: ManoeuvringCard, result: Identification, fitted: Measured, held: Measured
+) -> tuple[CardReplay, ...]:
+    """Every trial, whole, next to both cards in the same current."""
+    given = before if result.current is None else card_in(before, result.current)
+    found: list[CardReplay] = []
+    for held_out, group in ((False, fitted), (True, held)):
+        if group.trials:
+            passages = []
+            for card in (given, result.card):
+                problem = problem_from_card(card, group.trials, group.driven_by, whole=True)
+                passages.append(comparison_windows(problem, card, group.trials, result.estimate.noise))
+            found += (card_replay(*pair, held_out=held_out) for pair in zip(*passages, strict=True))
+    return tuple(found)
+
+
+def card_replay(before: Passage, found: Passage, *, held_out: bool) -> CardReplay:
+    """Columns of a measurement and of its simulations by two cards, each over its own time, thinned for a chart."""
+    return CardReplay(
+        trial=found.name,
+        measured=_columns(found.time_s, found.measured),
+        before=_columns(before.model_time_s, before.simulated),
+        found=_columns(found.model_time_s, found.simulated),
+        held_out=held_out,
+        closed_loop=bool(found.closed_loop),
+    )
+
+
+def _columns(time_s: Array, signals: Mapping[str, Array]) -> Columns:
+    if not len(time_s):
+        return {}
+    columns = {_COLUMNS[name]: from_si(_COLUMNS[name], 1.0) * values for name, values in signals.items()}
+    return drawn_columns({"t_s": time_s, **columns}, _SAMPLES)
+
+
+def pooled_error(trials: Sequence[TrialErrors], card: str) -> float:
+    """Error of the yaw rate over windows of all trials together, as a share of it; NaN if no ship yaws.
+
+    Parameters
+    ----------
+    trials : sequence of TrialErrors
+    card : str
+        ``before`` or ``found``.
+    """
+    every = (getattr(trial, card) for trial in trials)
+    errors = [errors["r_degps"] for errors in every if "r_degps" in errors]
+    return pooled([Following("", {"r": (error.rms_error, error.rms_signal)}, {}) for error in errors], "r")
+
+
+def identified_card_text(result: Identification, trials: list[str]) -> str:
+    """Text of the card found, with the names of the trials in its source."""
+    card = result.card
+    origin = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
+    if result.forced:
+        origin = f"{FORCED}, although not of this ship by the rudder's moment: {origin}"
+    changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {origin}"}
+    if card.ship.notes:
+        changes["ship.notes"] = f"Before it was {origin}: {card.ship.notes}"
+    head = f"# {one_line(origin[0].upper() + origin[1:])}.\n"
+    head += "# Comments below are of the card before, except keys marked as identified.\n"
+    text = changed_text(card.text, card.source, changes)
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
+    return mark + head + text.removeprefix(mark)

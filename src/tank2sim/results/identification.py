@@ -1,0 +1,407 @@
+"""Result of ``identify`` for a ship: coefficients from trials, and how well held-out trials are predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+import numpy as np
+
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.cards import Card
+from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
+from tank2sim.identification.trials.identify import Identification
+from tank2sim.identification.trials.methods.posterior_sampling import NOT_CONVERGED
+from tank2sim.identification.trials.study import (
+    SET_KEYS,
+    BootstrapStudy,
+    CardReplay,
+    IdentificationStudy,
+    PosteriorStudy,
+    PredictedFigure,
+    TrialErrors,
+    WindowError,
+    pooled_error,
+)
+from tank2sim.results.parameter_charts import (
+    correlation_chart,
+    parameter_chart,
+    posterior_chart,
+    singular_value_chart,
+    value_with_error,
+)
+from tank2sim.results.trial_charts import figure_chart, history_grid, track_grid, window_chart
+from tank2sim.units import from_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_T = TypeVar("_T")
+
+FITTED, HELD_OUT = "fitted", "held out"
+
+MOST_TRIALS = 12
+"""Trials of which tracks and histories are shown: those with the largest error of yaw rate. More are hard to look at,
+and make the page slow (project choice)."""
+
+_PER_SHEET = 6
+"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
+
+NO_YAW = 3.0
+"""A run whose yaw rate stays below this many times its noise is straight."""
+
+_FOLLOWED = (
+    "The model is given the recorded rudder over windows of five ship lengths, each begun from the state that suits "
+    "the record best. The error is a root mean square, as a share of the signal's."
+)
+_FIGURES = (
+    "Turns and zigzags are simulated in closed loop from the measured state at the execute: the rudder of a zigzag is "
+    "reversed by the simulated heading, with the rudder rate and the lag of the trial."
+)
+_FIGURE_CHART = (
+    "Grey: as measured. Bars: interval in which the figure is expected with 95 % probability. Figures that a "
+    "simulation did not reach are not drawn."
+)
+_TRACKS = (
+    "Turns and zigzags in closed loop, others with the recorded rudder. The scale fits the record and the card found: "
+    "the card before may leave the panel."
+)
+_HISTORIES = (
+    "Turns and zigzags in closed loop, others with the recorded rudder. Drift angle positive when the water comes from "
+    "port."
+)
+_PARAMETERS = (
+    "Estimates are in the units of the card (prime system for derivatives). Their intervals hold for the residuals as "
+    "they are, coloured and with the effects that the model lacks."
+)
+_SINGULAR = (
+    "Sensitivities of all measurements, in units of the prior. Below the red line the prior determines more than the "
+    "trials."
+)
+_POSTERIOR = (
+    "{draws} draws in {chains} chains by the sampler {sampler}, {simulations} simulations of all trials. R-hat "
+    "compares the chains: converged ones have less than 1.01. The effective size is the number of independent draws "
+    "that are worth as much."
+)
+_CHAINS_APART = " THESE CHAINS HAVE NOT CONVERGED: their intervals are not to be relied upon."
+_POSTERIOR_CHART = (
+    "Lines: intervals that hold 95 % (thin) and half (thick) of the draws, point: their median. Grey: 95 % of a "
+    "normal distribution."
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdentificationResult(Result[IdentificationStudy]):
+    """Coefficients identified from trials, and how well the new card follows trials.
+
+    Parameters
+    ----------
+    study : IdentificationStudy
+    card : Card, optional
+        The card found, with the covariance of its estimates; ``card.save("better.toml")`` writes it, and ``ship`` is
+        its ship. None if the result was read from its JSON.
+    identification : Identification, optional
+        SI and radians; None if the result was read from its JSON.
+    """
+
+    study: IdentificationStudy
+    card: Card | None = None
+    identification: Identification | None = None
+    command: ClassVar[str] = "identify"
+
+    @property
+    def estimates(self) -> pd.DataFrame:
+        """Estimates by name: value and standard error, prime or SI, rudder positive to starboard."""
+        import pandas as pd
+
+        study = self.study
+        names = [f"derivatives.{name}" if name in study.derivatives else name for name in study.parameters]
+        rows = [(entry.value, entry.standard_error) for entry in study.parameters.values()]
+        return pd.DataFrame(rows, columns=["value", "standard_error"], index=pd.Index(names, name="name"))
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures of each trial, units in their names: measured, by the card before and now, and the 95 % interval.
+
+        A figure of a held-out trial was expected in the interval (``low_95``, ``high_95``).
+        """
+        import pandas as pd
+
+        rows = [
+            (one.trial, word, one.figure, one.measured, one.before, one.predicted, *(one.interval_95 or (None, None)))
+            for word, key in SET_KEYS.items()
+            for one in self.study.figures[key]
+        ]
+        columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
+        return pd.DataFrame(rows, columns=columns)
+
+    @property
+    def samples(self) -> pd.DataFrame | None:
+        """Draws of the posterior, a column for each parameter in the units of `estimates`; None without sampling."""
+        import pandas as pd
+
+        samples = self.identification.posterior if self.identification else None
+        return None if samples is None else pd.DataFrame(samples.flat, columns=list(samples.free))
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return f"{self.study.ship}: coefficients from trials"
+
+    @property
+    def subtitle(self) -> str:
+        """The method."""
+        return f"Coefficients from free-running trials by {self.study.method.replace('_', ' ')}"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Whether the posterior has not converged, and how well the card found follows trials."""
+        return (*self._not_converged, *self._followed())
+
+    @property
+    def _not_converged(self) -> list[str]:
+        return [notice for notice in self.study.notices if notice.startswith(NOT_CONVERGED)]
+
+    def _followed(self) -> list[str]:
+        word, trials = self._judged
+        before, after = (100 * pooled_error(trials, key) for key in ("before", "found"))
+        if not np.isfinite(after):
+            return []
+        better = "better than" if after < before else "no better than"
+        given = f"before ({before:.3g} %)" if np.isfinite(before) else "before"
+        followed = f"The card found follows the yaw rate of the trials {word} within {after:.3g} % (rms)"
+        text = f"{followed}, {better} the card {given}."
+        return [text if word == HELD_OUT else f"{text} None was held out, so this card is untested."]
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Changes to the data, and limits of the result; without those of the headline."""
+        every = dict.fromkeys((*self.study.notices, *self.study.warnings))
+        return tuple(notice for notice in every if notice not in self._not_converged)
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Errors of yaw rate, overshoots and advance, and how many trials and numbers there are."""
+        study = self.study
+        word, trials = self._judged
+        errors = [100 * pooled_error(trials, key) for key in ("before", "found")]
+        figures = [_compared("Yaw-rate error", word, "%", *errors)]
+        for label, unit, names in (
+            ("Overshoot error", "deg", ("overshoot_1_deg", "overshoot_2_deg")),
+            ("Advance error", "%", TURN_FIGURE_NAMES[:1]),
+        ):
+            named = [figure for figure in study.figures[SET_KEYS[word]] if figure.figure in names]
+            old, new = (_rms(named, key, 100 if unit == "%" else 1) for key in ("before", "predicted"))
+            if not np.isnan(new):
+                figures.append(_compared(label, word, unit, old, new))
+        held_out, fitted = (len(study.errors_over_windows[SET_KEYS[word]]) for word in (HELD_OUT, FITTED))
+        effects = f"{len(study.effects_of_card)} effects"
+        return [
+            *figures,
+            KeyFigure(
+                label="Trials held out",
+                value=held_out,
+                verdict=Verdict.NONE if held_out else Verdict.CAUTION,
+                note=f"{fitted} were fitted",
+            ),
+            KeyFigure(label="Numbers fitted", value=len(study.parameters), note=effects),
+        ]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Trials, parameters, posterior, errors of signals, structures and figures."""
+        study = self.study
+        trials = [section for word in (HELD_OUT, FITTED) if (section := self._trials(word)).charts]
+        return [
+            *(replace(section, folded=place > 0) for place, section in enumerate(trials)),
+            self._parameters(),
+            *([self._posterior(study.posterior)] if study.posterior else []),
+            self._signals(),
+            *([self._structures()] if study.structures else []),
+            *self._figures(),
+        ]
+
+    @property
+    def _judged(self) -> tuple[str, tuple[TrialErrors, ...]]:
+        """The trials that judge the card: those held out, where there are any."""
+        windows = self.study.errors_over_windows
+        word = HELD_OUT if windows[SET_KEYS[HELD_OUT]] else FITTED
+        return word, windows[SET_KEYS[word]]
+
+    def _trials(self, word: str) -> Section:
+        windows = self.study.errors_over_windows[SET_KEYS[word]]
+        trials = [trial for trial in self.study.replays if trial.held_out == (word == HELD_OUT)]
+        shown, stem, charts = _worst(trials, windows), word.replace(" ", "_"), []
+        if tracks := track_grid(shown, title=f"Tracks of trials {word}"):
+            charts.append(Illustration(chart=tracks, caption=_TRACKS, name=f"tracks_{stem}"))
+        for first in range(0, len(shown), _PER_SHEET):
+            sheet = history_grid(shown[first : first + _PER_SHEET], title=f"Motions of trials {word}")
+            charts.append(Illustration(chart=sheet, caption=_HISTORIES, name=f"histories_{stem}"))
+        many = f"The {MOST_TRIALS} of {len(windows)} trials with the largest error of yaw rate."
+        text = many if len(windows) > MOST_TRIALS else ""
+        return Section(heading=f"Trials {word}", text=text, charts=charts)
+
+    def _parameters(self) -> Section:
+        study, known = self.study, self.study.identifiability
+        count = len(study.errors_over_windows[SET_KEYS[FITTED]])
+        rows: list[list[Cell]] = [
+            [
+                name,
+                value_with_error(entry.value, entry.standard_error),
+                value_with_error(entry.before, entry.before_standard_error),
+                f"{100 * entry.share_from_trials:.0f} %",
+            ]
+            for name, entry in study.parameters.items()
+        ]
+        caption = f"{study.ship}: {len(rows)} coefficients from {count} trial{'s' * (count > 1)}, ± one standard error"
+        tables = [table(caption, ("coefficient", "found", "before", "from trials"), rows)]
+        if study.bootstrap:
+            tables.append(self._bootstrap(study.bootstrap))
+        title = "Parameters: estimate and prior with 95 % intervals"
+        in_errors = "In standard errors of the prior, as the fit took it."
+        correlation = correlation_chart(known, title="Correlation of the parameters, by the trials alone")
+        information = "Information of the trials: singular values"
+        singular = singular_value_chart(known.singular_values, title=information)
+        return Section(
+            heading="Parameters",
+            text=_PARAMETERS + _widened(study.prior_scale),
+            tables=tables,
+            charts=[
+                Illustration(
+                    chart=parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"
+                ),
+                Illustration(chart=correlation, name="correlation"),
+                Illustration(chart=singular, caption=_SINGULAR, name="singular_values"),
+            ],
+        )
+
+    def _bootstrap(self, found: BootstrapStudy) -> Table:
+        errors = self.estimates["standard_error"].to_dict()
+        rows: list[list[Cell]] = [
+            [name, float(errors[name]), scatter] for name, scatter in found.standard_errors.items()
+        ]
+        caption = f"Standard errors, and scatter over {found.members} sets of trials simulated again"
+        return table(caption, ("parameter", "standard error", "bootstrap"), rows)
+
+    def _posterior(self, posterior: PosteriorStudy) -> Section:
+        rows: list[list[Cell]] = [
+            [
+                name,
+                f"{entry.quantiles[0]:.5g} to {entry.quantiles[-1]:.5g}",
+                f"{entry.r_hat:.4f}",
+                f"{entry.effective_sample_size:.0f}",
+            ]
+            for name, entry in posterior.parameters.items()
+        ]
+        title = "Samples of the posterior, next to a normal distribution"
+        chart = posterior_chart(self.study.parameters, posterior, title=title)
+        text = _POSTERIOR.format(
+            draws=posterior.draws,
+            chains=posterior.chains,
+            sampler=posterior.sampler,
+            simulations=posterior.simulations,
+        )
+        caption = f"Posterior, {posterior.draws} draws"
+        return Section(
+            heading="Posterior",
+            text=text + ("" if posterior.converged else _CHAINS_APART),
+            tables=[table(caption, ("parameter", "95 %", "R-hat", "effective size"), rows)],
+            charts=[Illustration(chart=chart, caption=_POSTERIOR_CHART, name="posterior")],
+        )
+
+    def _signals(self) -> Section:
+        noise = from_si("r_degps", self.study.misfit.noise.get("motion.r") or 0.0)
+        rows: list[list[Cell]] = [
+            [trial.trial, word, _yaw_error(trial.before, noise), _yaw_error(trial.found, noise)]
+            for word, key in SET_KEYS.items()
+            for trial in self.study.errors_over_windows[key]
+        ]
+        caption = "Yaw rate: error over windows of 5 ship lengths, of its root mean square"
+        title = "Error over windows of five ship lengths, of each signal"
+        chart = window_chart(self._sets(self.study.errors_over_windows), title=title)
+        return Section(
+            heading="Error of each signal",
+            text=_FOLLOWED,
+            tables=[table(caption, ("trial", "set", "before", "now"), rows)],
+            charts=[Illustration(chart=chart, name="windows")],
+        )
+
+    def _structures(self) -> Section:
+        rows: list[list[Cell]] = []
+        for name, structure in self.study.structures.items():
+            *single, largest = (100 * error for error in structure.errors)
+            rows.append([name, float(np.mean(single)), largest])
+        heads = ("structure", "one at a time, mean (%)", "those of largest amplitude (%)")
+        caption = "Yaw-rate error of trials left out of the fit"
+        return Section(heading="Structure, by cross-validation", tables=[table(caption, heads, rows)])
+
+    def _figures(self) -> list[Section]:
+        """Figures by unit: in one column the digits of distances would hide the errors of angles."""
+        tables = []
+        for ending, caption, unit in (("_deg", "Overshoots", "deg"), ("_m", "Distances", "m")):
+            rows = [
+                _figure_row(figure, word, ending)
+                for word in (HELD_OUT, FITTED)
+                for figure in self.study.figures[SET_KEYS[word]]
+                if figure.figure.endswith(ending)
+            ]
+            if rows:
+                heads = [f"{name} ({unit})" for name in ("measured", "before", "now")]
+                tables.append(table(caption, ["trial", "set", "figure", *heads, "error", f"95 % ({unit})"], rows))
+        chart = figure_chart(self._sets(self.study.figures), title="Figures of turns and zigzags, in closed loop")
+        charts = [Illustration(chart=chart, caption=_FIGURE_CHART, name="figures")] if chart else []
+        return [Section(heading="Figures of manoeuvres", text=_FIGURES, tables=tables, charts=charts)] if tables else []
+
+    def _sets(self, entries: Mapping[str, tuple[_T, ...]]) -> dict[str, tuple[_T, ...]]:
+        """Words for a set of trials to its entries, without a set that has no trial."""
+        windows = self.study.errors_over_windows
+        return {word: entries[key] for word, key in SET_KEYS.items() if windows[key]}
+
+
+def _worst(trials: Sequence[CardReplay], windows: Sequence[TrialErrors]) -> list[CardReplay]:
+    """The trials with the largest error of yaw rate, in their own order, where there are too many for a picture."""
+    errors = {trial.trial: trial.found["r_degps"].relative for trial in windows if "r_degps" in trial.found}
+    worst = sorted(trials, key=lambda trial: -errors.get(trial.trial, 0.0))[:MOST_TRIALS]
+    kept = {trial.trial for trial in worst}
+    return [trial for trial in trials if trial.trial in kept]
+
+
+def _compared(label: str, word: str, unit: str, before: float, after: float) -> KeyFigure:
+    worse = Verdict.CAUTION if after > before else Verdict.NONE
+    note = f"rms; before {before:.3g} {unit}" if np.isfinite(before) else "rms; before: not reached"
+    return KeyFigure(label=f"{label}, {word}", value=float(f"{after:.3g}"), unit=unit, verdict=worse, note=note)
+
+
+def _rms(figures: Sequence[PredictedFigure], key: str, factor: float) -> float:
+    """Root mean square error of figures by a card (``before`` or ``predicted``); NaN without any that is reached."""
+    errors = [factor * figure.share_or_error(getattr(figure, key)) for figure in figures]
+    reached = [error for error in errors if not np.isnan(error)]
+    return float(np.sqrt(np.mean(np.square(reached)))) if reached else np.nan
+
+
+def _widened(scale: Mapping[str, float]) -> str:
+    wide = {group: factor for group, factor in scale.items() if factor > 1}
+    if not wide:
+        return ""
+    text = ", ".join(f"{group} {factor:.3g} times" for group, factor in sorted(wide.items()))
+    return f" The card's standard errors were widened as the trials demanded: {text}."
+
+
+def _yaw_error(windows: Mapping[str, WindowError], noise: float) -> str:
+    """Error of the yaw rate over windows, %; a phrase where such a share has no meaning."""
+    if "r_degps" not in windows:
+        return "no yaw rate measured"
+    if windows["r_degps"].rms_signal < NO_YAW * noise:
+        return "no yaw"
+    return f"{100 * windows['r_degps'].relative:.3g} %"
+
+
+def _figure_row(figure: PredictedFigure, word: str, ending: str) -> list[Cell]:
+    error, interval = figure.share_or_error(figure.predicted), figure.interval_95
+    text = f"{100 * error:+.1f} %" if ending == "_m" else f"{error:+.2f} deg"
+    name = figure.figure.removesuffix(ending).replace("_", " ")
+    expected = f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else None
+    numbers = [figure.measured, figure.before, figure.predicted]
+    return [figure.trial, word, name, *numbers, None if np.isnan(error) else text, expected]
