@@ -17,7 +17,7 @@ def main() -> None:
     folder = Path("damping")
     make_trials.write(folder, "damping")
     tank2sim("audit", folder / "zigzag.csv", folder / "turn.csv")
-    tank2sim("signals", folder / "zigzag.csv", "--column", "r_degps")
+    tank2sim("signals", folder / "zigzag.csv", "--columns", "r_degps")
 
     fitted = [folder / "zigzag.csv", folder / "turn.csv"]
     fit = t2s.identify("mariner", fitted, holdout=[folder / "held_out.csv"], hold=["Xuuu"], members=0)

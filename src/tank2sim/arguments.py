@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import functools
 import inspect
 import math
@@ -104,6 +105,10 @@ ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 EnsembleSize = Annotated[int, ENSEMBLE]
 SmallEnsemble = Annotated[int, ArgumentBounds(0, 100_000, whole=True)]
 """Ships that are each simulated on trials. Project choice: a day of computing."""
+VALIDATION_MEMBERS = 40
+"""Ships of an ensemble for deviations of figures: their deviation has an uncertainty of about 15 %. Project choice."""
+REQUIRED_PERCENT = 20.0
+"""Default U_reqd in per cent of the measured figure: project choice."""
 DEFAULT_MEMBERS = 2000
 """Size of an ensemble where none is given: the share below a quantile of 5 % is known to 0.5 %. Project choice."""
 GuessedShips = Annotated[int, ArgumentBounds(100, 1_000_000, whole=True)]
@@ -135,7 +140,7 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
     @functools.cache
     def kinds() -> dict[str, Any]:
-        return {name: _kind(one.annotation, function.__globals__) for name, one in signature.parameters.items()}
+        return {name: annotated_kind(one.annotation, function) for name, one in signature.parameters.items()}
 
     @functools.wraps(function)
     def call(*args: _P.args, **options: _P.kwargs) -> _T:
@@ -147,14 +152,35 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     return call
 
 
-def _kind(annotation: object, names: dict[str, Any]) -> Any:
-    """The type that an annotation names; Any where that is not known while the program runs."""
+class UnknownType(type):
+    """A type that only type checkers know, with whatever members it has."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return UnknownType(name, (), {})
+
+    def __getitem__(cls, parts: Any) -> Any:
+        return cls
+
+
+class _Names(dict[str, Any]):
+    def __missing__(self, name: str) -> Any:
+        return UnknownType(name, (), {})
+
+
+def annotated_kind(annotation: object, function: Callable[..., Any]) -> Any:
+    """The type that an annotation of a function names; what only type checkers know is an :class:`UnknownType`.
+
+    Parameters
+    ----------
+    annotation : object
+    function : callable
+    """
     if not isinstance(annotation, str):
-        return Any
-    try:
-        return eval(annotation, {**globals(), **names})
-    except (NameError, AttributeError, TypeError):
-        return Any
+        return Any if annotation is inspect.Parameter.empty else annotation
+    names = vars(builtins) | globals() | inspect.unwrap(function).__globals__
+    return eval(annotation, {}, _Names(names))
 
 
 def _as_kind(name: str, value: Any, kind: Any) -> Any:
@@ -169,6 +195,8 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
         raise next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
     if (bounds := bounds_of(kind)) is not None and get_origin(kind) is Annotated:
         return bounds.checked(name, value)
+    if get_origin(kind) is Annotated:
+        return _as_kind(name, value, get_args(kind)[0])
     origin, parts = get_origin(kind) or kind, get_args(kind)
     if origin is Literal:
         if not isinstance(value, str | int) or value not in parts:
@@ -194,6 +222,8 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
 
 def _is_a(value: Any, kind: Any) -> bool:
     """Whether a value is of a kind; of one that cannot be asked for, everything is."""
+    if isinstance(kind, UnknownType):
+        return not isinstance(value, int | float | str | bytes | list | tuple | dict | None)
     if kind is Path:
         return isinstance(value, os.PathLike)
     if kind is Sequence:  # arrays, series, views and sets do as well

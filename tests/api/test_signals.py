@@ -72,9 +72,9 @@ def test_it_fits_a_screen_and_shows_its_charts(path):
     ("options", "source"),
     [
         ({"columns": ["phi_deg"]}, "sine.csv"),
-        ({"filter": "lowpass:0.1"}, "--filter"),
-        ({"columns": ["r"], "filter": "nothing:1"}, "--filter"),
-        ({"columns": ["r"], "filter": "decimate:2"}, "--column"),
+        ({"filter": "lowpass:0.1"}, "filter"),
+        ({"columns": ["r"], "filter": "nothing:1"}, "filter"),
+        ({"columns": ["r"], "filter": "decimate:2"}, "columns"),
     ],
 )
 def test_bad_input_is_refused_with_place_and_remedy(path, options, source):

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tank2sim.cli.audit import command
+from tank2sim.api.audit import audit
+from tank2sim.cli.derived import command_of
 from tank2sim.errors import InputError
 from tests.records.motions import motion, trial
 
+COMMAND = command_of("audit", audit.verb)
+
 
 def run(*arguments):
-    result = CliRunner().invoke(command, [str(argument) for argument in arguments])
+    result = CliRunner().invoke(COMMAND, [str(argument) for argument in arguments])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

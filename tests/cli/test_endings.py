@@ -71,7 +71,7 @@ def test_no_file_has_the_ending_of_another_kind(ending: str, tmp_path: Path) -> 
         "reduce captive.toml --plot x.svg",
         "reduce captive.toml --budget x.toml",
         "run zigzag.csv --cycle x.json",
-        "signals zigzag.csv --out x.toml",
+        "signals zigzag.csv -o x.toml",
         "tow tows.csv -o x.csv",
         "yaw water.csv -o x.json",
         "design mariner -o x.toml",

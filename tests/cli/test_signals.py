@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tank2sim.cli.signals import command
+from tank2sim.api.signals import signals
+from tank2sim.cli.derived import command_of
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
+
+COMMAND = command_of("signals", signals.verb)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +34,7 @@ def path(tmp_path_factory):
 
 
 def run(*arguments):
-    result = CliRunner(env={"COLUMNS": "160"}).invoke(command, [str(argument) for argument in arguments])
+    result = CliRunner(env={"COLUMNS": "160"}).invoke(COMMAND, [str(argument) for argument in arguments])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
@@ -61,19 +64,19 @@ def test_table_and_json_have_each_column_in_the_units_of_the_file(path, tmp_path
 
 @pytest.mark.parametrize("name", ["r_degps", "r_radps", "r"])
 def test_one_column_by_any_of_its_names(path, name):
-    shown = run(path, "--column", name).output
+    shown = run(path, "--columns", name).output
     assert "r_degps" in shown
     assert "psi_deg" not in shown
 
 
 def test_a_column_that_is_not_there_is_refused(path):
-    with pytest.raises(InputError, match=r"column phi_deg: is not in the trial; give --column one of delta_deg"):
-        run(path, "--column", "phi_deg")
+    with pytest.raises(InputError, match=r"column phi_deg: is not in the trial; give one of delta_deg"):
+        run(path, "--columns", "phi_deg")
 
 
 def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
     out = tmp_path / "filtered.csv"
-    shown = run(path, "--column", "r", "--filter", "lowpass:0.3,causal", "--out", out)
+    shown = run(path, "--columns", "r", "--filter", "lowpass:0.3,causal", "-o", out)
     assert "delays 0.15 Hz by" in shown.output
     before, after = read_trial_file(path), read_trial_file(out)
     assert "r_degps filtered by lowpass:0.3,causal: delays 0.15 Hz" in out.read_text().splitlines()[1]
@@ -87,13 +90,13 @@ def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
 
 def test_detrending_and_smoothing_write_trials_too(path, tmp_path):
     for text in ("detrend:1", "savgol:11,3", "spline:0.5", "bandpass:0.01,0.5"):
-        assert "no phase shift" in run(path, "--column", "r", "--filter", text, "--out", tmp_path / "o.csv").output
+        assert "no phase shift" in run(path, "--columns", "r", "--filter", text, "-o", tmp_path / "o.csv").output
         assert read_trial_file(tmp_path / "o.csv").signals["r_radps"].shape == (3000,)
 
 
 def test_decimation_thins_the_whole_trial(path, tmp_path):
     out = tmp_path / "thin.csv"
-    run(path, "--filter", "decimate:5", "--out", out)
+    run(path, "--filter", "decimate:5", "-o", out)
     before, after = read_trial_file(path), read_trial_file(out)
     assert np.allclose(after.time_s, before.time_s[::5])
     # What is left of the noise, 0.05 deg/s times the root of 0.8/5, makes up this difference.
@@ -104,19 +107,20 @@ def test_decimation_thins_the_whole_trial(path, tmp_path):
 
 def test_the_measured_trial_is_never_overwritten(path, tmp_path):
     text = path.read_text()
-    for options, match in ((["--out", path], "would be overwritten"), (["--json", path], "ends in .csv")):
+    for options, match in ((["-o", path], "would be overwritten"), (["--json", path], "ends in .csv")):
         with pytest.raises(InputError, match=match):
-            run(path, "--column", "r", "--filter", "lowpass:0.3", *options)
+            run(path, "--columns", "r", "--filter", "lowpass:0.3", *options)
     with pytest.raises(InputError, match="two outputs"):
-        run(path, "--column", "r", "--filter", "lowpass:0.3", "--out", tmp_path / "a", "--json", tmp_path / "a")
+        run(path, "--columns", "r", "--filter", "lowpass:0.3", "-o", tmp_path / "a", "--json", tmp_path / "a")
     assert path.read_text() == text
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [(["--out", "x.csv"], "needs a filter"), (["--filter", "lowpass:0.3"], "named by --column"),
-     (["--column", "r", "--filter", "lowpass:77"], "not between"), (["--column", "r", "--filter", "x"], "not a filter"),
-     (["--column", "r", "--filter", "decimate:2"], "leave --column out"), (["--segment", "900"], "not a length")],
+    [(["-o", "x.csv"], "needs a filter"), (["--filter", "lowpass:0.3"], "must be named"),
+     (["--columns", "r", "--filter", "lowpass:77"], "not between"),
+     (["--columns", "r", "--filter", "x"], "not a filter"),
+     (["--columns", "r", "--filter", "decimate:2"], "leave the column out"), (["--segment", "900"], "not a length")],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_in_one_line(path, options, words):
     with pytest.raises(InputError, match=words):
@@ -130,14 +134,14 @@ def test_a_column_with_a_long_gap_is_left_out_with_a_notice_or_refused_by_name(p
     gappy.write_text("\n".join(cut) + "\n")
     assert "psi_deg is left out: it has no value from" in run(gappy).output
     with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it with --max-gap"):
-        run(gappy, "--column", "psi")
-    assert "interpolated by straight lines" in run(gappy, "--column", "psi", "--max-gap", "12").output
+        run(gappy, "--columns", "psi")
+    assert "interpolated by straight lines" in run(gappy, "--columns", "psi", "--max-gap", "12").output
 
 
 @pytest.mark.slow
 def test_charts_and_a_page_that_fetches_nothing(path, tmp_path):
     plots = tmp_path / "plots"
-    run(path, "--column", "r", "--plot", plots)
+    run(path, "--columns", "r", "--plot", plots)
     pictures = {picture.name for picture in plots.glob("*.png")}
     of_r = {f"steps_r_{name}.png" for name in ("density", "autocorrelation", "spectrum")}
     assert pictures == {*of_r, "steps_histories.png"}
@@ -154,5 +158,5 @@ def test_measured_trials_of_every_kind(data, tmp_path):
     ]
     if not all(file.exists() for file in files):
         pytest.skip("the measured trials are missing")
-    shown = run(*files, "--column", "r", "--column", "delta").output
+    shown = run(*files, "--columns", "r", "--columns", "delta").output
     assert shown.count("rudder angle to yaw rate: correlation") == 2

@@ -59,8 +59,8 @@ RECIPES: dict[str, list[Recipe]] = {
              ["card.toml", "zigzag.csv", "zigzag.csv"])],
     "signals": [
         (["zigzag.csv", "--json", "out.json"], ["zigzag.csv"]),
-        (["noise.csv", "--column", "r_degps"], ["noise.csv"]),
-        (["zigzag.csv", "--column", "r_degps", "--filter", "lowpass:0.2", "--out", "out.csv"], ["zigzag.csv"]),
+        (["noise.csv", "--columns", "r_degps"], ["noise.csv"]),
+        (["zigzag.csv", "--columns", "r_degps", "--filter", "lowpass:0.2", "-o", "out.csv"], ["zigzag.csv"]),
     ],
     "log": [
         (["voyage.csv", "-o", "voyage", "--json", "out.json"], ["voyage.csv"]),

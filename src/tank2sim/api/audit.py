@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
-from tank2sim.arguments import checked
-from tank2sim.records.audit.study import study_audit
-from tank2sim.results.audit import AuditResult
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.api.verbs import verb
+
+if TYPE_CHECKING:
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.results.audit import AuditResult
 
 
-@checked
-def audit(trials: TrialPaths) -> AuditResult:
+@verb("faults in the data of trials")
+def audit(trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord]) -> AuditResult:
     """Judge the columns of trials by their consistency alone: signs, units, frames, clocks, failed sensors.
 
     Parameters
@@ -31,5 +36,9 @@ def audit(trials: TrialPaths) -> AuditResult:
     >>> t2s.audit(file).passed
     True
     """
+    from tank2sim.api.trial import TrialRecord, trials_of
+    from tank2sim.records.audit.study import study_audit
+    from tank2sim.results.audit import AuditResult
+
     records = trials_of(trials, rising=False)
     return AuditResult(study_audit(records), tuple(map(TrialRecord, records)))

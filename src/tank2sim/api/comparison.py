@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tank2sim.analysis.validation.comparison import compare_cards
-from tank2sim.analysis.validation.standard_trials import MEMBERS
-from tank2sim.api.ship import Ship, as_ship
-from tank2sim.arguments import SmallEnsemble, checked
-from tank2sim.cards import Card
-from tank2sim.results.comparison import ComparisonResult
+from tank2sim.api.verbs import verb
+from tank2sim.arguments import VALIDATION_MEMBERS, SmallEnsemble
+
+if TYPE_CHECKING:
+    from tank2sim.api.ship import Ship
+    from tank2sim.cards import Card
+    from tank2sim.results.comparison import ComparisonResult
 
 
-@checked
-def compare(cards: Sequence[Ship | Card | str | Path], *, members: SmallEnsemble = MEMBERS) -> ComparisonResult:
+@verb("cards of one ship side by side")
+def compare(
+    cards: Sequence[Ship | Card | str | Path], *, members: SmallEnsemble = VALIDATION_MEMBERS
+) -> ComparisonResult:
     """Compare cards of one ship, or of ships and models of one form; the first is the reference, whose size is taken.
 
     Cards of a craft with thrusters are compared at its own size, by a straight run, turns by difference and a spin.
@@ -40,5 +44,9 @@ def compare(cards: Sequence[Ship | Card | str | Path], *, members: SmallEnsemble
     >>> list(changed.index)
     ['Yv']
     """
+    from tank2sim.analysis.validation.comparison import compare_cards
+    from tank2sim.api.ship import as_ship
+    from tank2sim.results.comparison import ComparisonResult
+
     ships = [as_ship(card) for card in ([cards] if isinstance(cards, str | Path) else cards)]
     return ComparisonResult(compare_cards([ship.steered() for ship in ships], members), tuple(ships))

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.api.craft_identification import CraftTrialPaths, craft_trial_files
-from tank2sim.api.ship import Ship
+from tank2sim.api.craft_identification import craft_trial_files
 from tank2sim.cards import CraftCard
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import PREDICTION_LEAD_S, SHORTEST_PREDICTION_S, predict_by_card
 from tank2sim.identification.craft.problem import craft_problem
-from tank2sim.identification.craft.study import study_predictions
+from tank2sim.identification.craft.study import CraftValidationStudy, study_predictions
 from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.same_record import refuse_copies
-from tank2sim.results.craft_validation import CraftValidationResult
 
 
-def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult:
+def validate_craft(
+    card: CraftCard, trials: str | Path | Sequence[str | Path]
+) -> tuple[CraftValidationStudy, CraftCard, tuple[Path, ...]]:
     """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
     Parameters
     ----------
-    ship : Ship
-        Of a card of kind ``small_craft``.
+    card : CraftCard
     trials : path or sequence of paths
         As those of :func:`tank2sim.identify_craft`.
 
@@ -32,8 +34,6 @@ def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult
     InputError
         There is no trial, a file is at fault, none is long enough, or the card does not move as the trials do.
     """
-    card = ship.card
-    assert isinstance(card, CraftCard)
     paths = craft_trial_files(trials)
     if not paths:
         remedy = "give trials that tank2sim log cut and identify did not fit"
@@ -50,4 +50,4 @@ def validate_craft(ship: Ship, trials: CraftTrialPaths) -> CraftValidationResult
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         raise InputError("trials", "", f"none is longer than {least:g} s", "give longer ones")
     study = study_predictions(card, [str(path) for path in paths], predictions, alike)
-    return CraftValidationResult(study, card, tuple(paths))
+    return study, card, tuple(paths)

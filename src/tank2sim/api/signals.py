@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tank2sim.api.trial import TrialPaths, TrialRecord, trials_of
-from tank2sim.arguments import PositiveArgument, checked
-from tank2sim.errors import InputError
-from tank2sim.records.signals.analysis import FilterStudy, SignalSettings, SignalsStudy, analyse, filtered
-from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, find_signal
-from tank2sim.records.signals.requests import FilterRequest, parse_filter
-from tank2sim.records.signals.sampling import even_series
-from tank2sim.records.signals.writing import thinned, with_filtered
-from tank2sim.records.trials import Trial
-from tank2sim.results.signals import SignalsResult
+from tank2sim.api.verbs import Output, verb
+from tank2sim.arguments import PositiveArgument
+from tank2sim.errors import ArgumentError
+from tank2sim.files import TABLE
+
+if TYPE_CHECKING:
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.records.signals.analysis import FilterStudy, SignalSettings
+    from tank2sim.records.signals.requests import FilterRequest
+    from tank2sim.records.trials import Trial
+    from tank2sim.results.signals import SignalsResult
 
 
-@checked
+def _written(result: SignalsResult, path: Path) -> dict[Path, str | bytes]:
+    if result.filtered is None:
+        raise ArgumentError("output", "", "needs a filter", "say which with filter, such as lowpass:0.5")
+    return {path: result.filtered.to_csv()}
+
+
+@verb(
+    "statistics, spectra and filters of a record",
+    Output("-o", TABLE, "Write the trial with the filtered column.", _written, "FILTERED.csv"),
+)
 def signals(
-    trials: TrialPaths,
+    trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord],
     columns: str | Sequence[str] = (),
     *,
     max_gap_s: PositiveArgument | None = None,
@@ -32,14 +44,14 @@ def signals(
     trials : path, TrialRecord, or sequence of them
         A folder means the trials in it.
     columns : sequence of str
-        Only these (``"r_degps"``); by default all.
+        Columns to analyse (``"r_degps"``); by default all.
     max_gap_s : float, optional
         Longest gap to bridge by straight lines, s; by default five steps.
     segment_s : float, optional
         Length of the spectral segments, s; by default eight segments, longer ones of slow signals.
     filter : str, optional
-        A filter for the only column of the only trial, as on the command line: ``"lowpass:0.5"`` (Hz),
-        ``"savgol:11,3"``; ``"decimate:5"`` thins the whole trial.
+        Filter of the only column of the only trial: lowpass:HZ, highpass:HZ, bandpass:HZ,HZ (each also with ,causal),
+        savgol:SAMPLES,DEGREE, spline:HZ, detrend:DEGREE, or decimate:FACTOR, which thins the whole trial.
 
     Raises
     ------
@@ -58,6 +70,11 @@ def signals(
     >>> "r_degps" in found.filtered.df
     True
     """
+    from tank2sim.api.trial import TrialRecord, trials_of
+    from tank2sim.records.signals.analysis import SignalSettings, SignalsStudy, analyse
+    from tank2sim.records.signals.requests import parse_filter
+    from tank2sim.results.signals import SignalsResult
+
     settings = SignalSettings(tuple([columns] if isinstance(columns, str) else columns), max_gap_s, segment_s)
     request = parse_filter(filter) if filter else None
     read = trials_of(trials)
@@ -68,15 +85,20 @@ def signals(
 
 def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSettings) -> tuple[FilterStudy, Trial]:
     """Study of a filter, and the trial with the filtered signals."""
+    from tank2sim.records.signals.analysis import filtered
+    from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, find_signal
+    from tank2sim.records.signals.sampling import even_series
+    from tank2sim.records.signals.writing import thinned, with_filtered
+
     if len(trials) != 1:
-        raise InputError("--filter", "", f"filters one trial, and {len(trials)} are given", "filter them one by one")
+        raise ArgumentError("filter", "", f"filters one trial, and {len(trials)} are given", "filter them one by one")
     trial = trials[0]
     if len(settings.columns) != 1 and not (request.thins and not settings.columns):
-        remedy = "filter each column in a separate run; decimate takes no --column, for it thins the whole trial"
-        raise InputError("--filter", "", "filters the one column named by --column", remedy)
+        remedy = "filter each column in a separate run; decimate takes no column: it thins the whole trial"
+        raise ArgumentError("filter", "", "filters one column, which must be named", remedy)
     if request.thins:
         if settings.columns:
-            raise InputError("--column", "", f"{request.text} thins the whole trial", "leave --column out")
+            raise ArgumentError("columns", "", f"{request.text} thins the whole trial", "leave the column out")
         names = [name for name in trial.signals if name not in HELD_COLUMNS]
     else:
         names = [find_signal(settings.columns[0], trial)]

@@ -2,49 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+from tank2sim.api.verbs import verb
+from tank2sim.arguments import REQUIRED_PERCENT, VALIDATION_MEMBERS, PositiveArgument, SmallEnsemble
 
-from tank2sim.analysis.stability.imo import imo_criteria
-from tank2sim.analysis.validation.documentation import model_documentation
-from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
-from tank2sim.analysis.validation.study import REQUIRED, Validation, verify
-from tank2sim.analysis.validation.study import validate_card as validate_figures
-from tank2sim.api.craft_validation import validate_craft
-from tank2sim.api.ship import Ship, as_ship
-from tank2sim.api.trial import TrialPaths, trial_files, trials_of
-from tank2sim.arguments import PositiveArgument, SmallEnsemble, checked
-from tank2sim.arrays import Array, Columns
-from tank2sim.cards import Card, CraftCard, ManoeuvringCard
-from tank2sim.dynamics.abkowitz import ALL_TERMS
-from tank2sim.errors import InputError
-from tank2sim.gap.outcome.export import signal_display_name
-from tank2sim.gap.proof.replay import replay_by_card
-from tank2sim.gap.result import Passed
-from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
-from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
-from tank2sim.marks import CHECK
-from tank2sim.records.thinning import drawn_columns
-from tank2sim.results.craft_validation import CraftValidationResult
-from tank2sim.results.validation import CardValue, SignalError, TrialReplay, ValidationResult, ValidationStudy
-from tank2sim.simulation.integrator import NO_COMPILER
-
-REPLAY_SAMPLES = 240
-"""Samples of each trial in the JSON, for charts. Project choice: a chart is a few hundred pixels wide, and the record
-itself is the file."""
+if TYPE_CHECKING:
+    from tank2sim.api.ship import Ship
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.results.craft_validation import CraftValidationResult
+    from tank2sim.results.validation import ValidationResult
 
 
-@checked
+@verb("a validation report after ITTC 7.5-02-06-03")
 def validate(
-    card: Ship | Card | str | Path,
-    trials: TrialPaths = (),
+    ship: Ship,
+    trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),
     *,
-    members: SmallEnsemble = MEMBERS,
-    required_percent: PositiveArgument = REQUIRED,
+    members: SmallEnsemble = VALIDATION_MEMBERS,
+    required_percent: PositiveArgument = REQUIRED_PERCENT,
 ) -> ValidationResult | CraftValidationResult:
     """Validate a ship in the manner of ITTC 7.5-02-06-03 by trials that did not make its card, figure by figure.
 
@@ -53,108 +31,27 @@ def validate(
 
     Parameters
     ----------
-    card : Ship, Card, str or path
+    ship : Ship, Card, str or path
     trials : path, TrialRecord, or sequence of them
         Turning circles and zigzags; a folder means the trials in it. Without any, the model is documented and
         verified.
     members : int
-        Ships drawn within the errors of the card for u_input; 0 for none: no figure can then be judged.
+        Ships drawn within the errors of the card for u_input; with 0 no figure can be judged.
     required_percent : float
-        U_reqd in per cent of each measured figure.
+        Required level of validation, U_reqd, in per cent of each measured figure.
 
     Raises
     ------
     InputError
         The card is not one of a ship that manoeuvres, or a file is at fault.
     """
-    if isinstance(as_ship(card).card, CraftCard):
-        return validate_craft(as_ship(card), trial_files(trials))
-    ship = as_ship(card).manoeuvring()
-    records = trials_of(trials)
-    given = measured(records, ship) if records else Measured((), "angle", ())
-    found = validate_figures(ship, given.trials, members, required_percent)
-    if records and (evidence := evidence_of_other_ship(ship, given)):
-        notice = f"{CHECK} these look like trials of another ship: {'; '.join(evidence)}"
-        found = replace(found, notices=(notice, *found.notices))
-    return ValidationResult(_study(ship_of(ship), given, found), ship, tuple(trial.path for trial in given.trials))
+    from tank2sim.api.craft_validation import validate_craft
+    from tank2sim.api.trial import trial_files, trials_of
+    from tank2sim.api.validation_study import validate_ship
+    from tank2sim.cards import CraftCard
+    from tank2sim.results.craft_validation import CraftValidationResult
+    from tank2sim.results.validation import ValidationResult
 
-
-def _study(ready: TrialShip, given: Measured, found: Validation) -> ValidationStudy:
-    """Document and verify a ship, replay its trials, and join what was validated."""
-    card, model = ready.manoeuvring, ready.model
-    verified, troubles = verify(ready, found.members)
-    replays, not_replayed = _replays(card, given)
-    compiler = () if ready.integrator.compiled else (NO_COMPILER,)
-    return ValidationStudy(
-        ship=card.ship.name,
-        source=card.ship.source,
-        documentation=model_documentation(card, model),
-        coefficients=_coefficients(card),
-        propulsion=card.propulsion is not None,
-        verdict=found.verdict,
-        counts=found.counts,
-        figures=found.figures,
-        members=found.members,
-        verification=verified,
-        imo=tuple(imo_criteria(model)),
-        replays=replays,
-        notices=(*model.notices, *given.notices, *found.notices, *troubles, *not_replayed, *compiler),
-    )
-
-
-def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[TrialReplay, ...], list[str]]:
-    """Replay each trial by itself, so that a trial that cannot be replayed spoils no other; and notices on these."""
-    found: list[TrialReplay] = []
-    notices: list[str] = []
-    for trial in given.trials:
-        try:
-            found += map(_replay, replay_by_card(card, Measured((trial,), given.driven_by, ())))
-        except InputError as error:
-            notices.append(f"{trial.name}: not replayed: {error.problem}")
-    return tuple(found), notices
-
-
-def _replay(replay: Passed) -> TrialReplay:
-    names = {name: signal_display_name(name) for name in replay.measured if name in replay.before}
-
-    def columns(values: Mapping[str, Array]) -> Columns:
-        in_file = {column.file: column.factor * values[name] for name, column in names.items()}
-        return drawn_columns({"t_s": replay.time_s, **in_file}, REPLAY_SAMPLES)
-
-    return TrialReplay(
-        trial=replay.name,
-        errors=tuple(_replay_error(replay, name) for name in replay.noise),
-        measured=columns(replay.measured),
-        simulated=columns(replay.before),
-    )
-
-
-_ANGLES = ("motion.r", "motion.psi", "motion.cog", "motion.phi")
-_UNITS = {"motion.r": "deg/s", "motion.psi": "deg", "motion.cog": "deg", "motion.phi": "deg"}
-_UNITS |= dict.fromkeys(("motion.x", "motion.y"), "m")
-
-
-def _replay_error(replay: Passed, name: str) -> SignalError:
-    """Root mean square error of a signal, also in per cent of its range, and the noise of its measurement."""
-    factor = math.degrees(1.0) if name in _ANGLES else 1.0
-    known = np.isfinite(replay.measured[name])
-    measured, simulated = replay.measured[name][known], replay.before[name][known]
-    error, spread = float(np.sqrt(np.mean((simulated - measured) ** 2))), float(np.ptp(measured))
-    return SignalError(
-        signal=name.removeprefix("motion."),
-        unit=_UNITS.get(name, "m/s"),
-        rms_error=factor * error,
-        percent_of_range=100 * error / spread if spread > 0 else None,
-        noise=factor * replay.noise[name],
-    )
-
-
-def _coefficients(card: ManoeuvringCard) -> dict[str, CardValue]:
-    """The derivatives of a card with their standard errors, prime."""
-    return {
-        name: CardValue(
-            value=card.derivatives[name], standard_error=card.standard_error(name), stated=name in card.uncertainty
-        )
-        for name in (*ALL_TERMS, *(name for name in card.derivatives if name not in ALL_TERMS))
-        if card.derivatives.get(name)
-    }
+    if isinstance(ship.card, CraftCard):
+        return CraftValidationResult(*validate_craft(ship.card, trial_files(trials)))
+    return ValidationResult(*validate_ship(ship.manoeuvring(), trials_of(trials), members, required_percent))

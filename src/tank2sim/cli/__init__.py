@@ -74,6 +74,10 @@ COMMANDS = {name: words for group in GROUPS.values() for name, words in group.it
 
 
 VERBS = {
+    "audit": "api.audit:audit",
+    "compare": "api.comparison:compare",
+    "signals": "api.signals:signals",
+    "validate": "api.validation:validate",
     "autopilot": "api.autopilot:autopilot",
     "check": "api.fmu:check_fmu",
     "convention": "api.convention:convention",

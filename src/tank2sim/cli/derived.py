@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import inspect
 import re
 import types
@@ -22,25 +21,6 @@ from tank2sim.cli.options import OutputFile
 from tank2sim.errors import InputError
 from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled
 from tank2sim.units import in_words
-
-
-class _Unknown(type):
-    """A type that only type checkers know, with whatever members it has."""
-
-    def __getattr__(cls, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return _Unknown(name, (), {})
-
-    def __getitem__(cls, parts: Any) -> Any:
-        return cls
-
-
-class _Names(dict[str, Any]):
-    """Names that annotations use."""
-
-    def __missing__(self, name: str) -> Any:
-        return _Unknown(name, (), {})
 
 
 class VerbCommand(click.Command):
@@ -133,11 +113,9 @@ def _documented(function: Callable[..., Any]) -> tuple[Docstring, dict[str, str]
 
 def _arguments(function: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Any]]:
     """Parameters of a function with their types, None left out; progress reports are given by the command line."""
-    names = _Names(vars(builtins) | vars(arguments) | inspect.unwrap(function).__globals__)
     for one in inspect.signature(function).parameters.values():
-        kind = eval(one.annotation, {}, names) if isinstance(one.annotation, str) else one.annotation
         if one.annotation != "Progress":
-            yield one, kind
+            yield one, arguments.annotated_kind(one.annotation, function)
 
 
 def _parts(kind: Any) -> list[Any]:
@@ -152,6 +130,16 @@ def _several(kind: Any) -> Any:
     words = any(one in parts for one in (str, Path, float, int))
     sequences = [part for part in parts if get_origin(part) is Sequence]
     return next((one for one in sequences if not words or {str, Path} & set(_parts(get_args(one)[0]))), None)
+
+
+def _first_list(function: Callable[..., Any]) -> str:
+    """The first positional argument of a function that takes several words; empty without one."""
+    lists = (
+        one.name
+        for one, kind in _arguments(function)
+        if one.kind is not one.KEYWORD_ONLY and _several(kind) is not None
+    )
+    return next(lists, "")
 
 
 def _is_of(name: str, kind: Any) -> bool:
@@ -173,9 +161,9 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         required = one.default is inspect.Parameter.empty
         return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
                         required=required)]  # fmt: skip
-    if one.kind is not inspect.Parameter.KEYWORD_ONLY and one.default is inspect.Parameter.empty:
-        nargs = -1 if several else 1
-        return [click.Argument([one.name], nargs=nargs, required=True, type=_type(kind, several))]
+    required = one.default is inspect.Parameter.empty
+    if one.kind is not inspect.Parameter.KEYWORD_ONLY and (required or one.name == _first_list(verb.function)):
+        return [click.Argument([one.name], nargs=-1 if several else 1, required=required, type=_type(kind, several))]
     default = None if one.default in (inspect.Parameter.empty, None) else one.default
     if several and isinstance(default, str):
         default = (default,)

@@ -18,7 +18,6 @@ from tank2sim.analysis.validation.coefficients import (
     compare_effects,
 )
 from tank2sim.analysis.validation.standard_trials import (
-    MEMBERS,
     TrialShip,
     figure_numbers,
     member_spread,
@@ -26,6 +25,7 @@ from tank2sim.analysis.validation.standard_trials import (
     ship_of,
     standard_trials,
 )
+from tank2sim.arguments import VALIDATION_MEMBERS
 from tank2sim.arrays import Array
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, SteeredCard
 from tank2sim.cards.examination import doubts
@@ -157,7 +157,7 @@ class CardComparison:
         return (*self.coefficients, *self.effects)
 
 
-def compare_cards(cards: Sequence[SteeredCard], count: int = MEMBERS) -> CardComparison:
+def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS) -> CardComparison:
     """Compare cards of a ship, or of ships and models of the same form, at the size of the first, the reference.
 
     Parameters

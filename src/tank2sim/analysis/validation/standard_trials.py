@@ -26,9 +26,6 @@ from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun, ThrusterManoeuvre
 from tank2sim.units import from_si, to_si
 
-MEMBERS = 40
-"""Members of an ensemble: their deviation has an uncertainty of about 15 %. Project choice."""
-
 SEED = 601
 """Seed of the members' random numbers; any number is valid."""
 

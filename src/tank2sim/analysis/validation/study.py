@@ -29,7 +29,6 @@ from enum import StrEnum
 import numpy as np
 
 from tank2sim.analysis.validation.standard_trials import (
-    MEMBERS,
     SEED,
     TrialShip,
     figure_numbers,
@@ -37,6 +36,7 @@ from tank2sim.analysis.validation.standard_trials import (
     members,
     standard_trials,
 )
+from tank2sim.arguments import REQUIRED_PERCENT, VALIDATION_MEMBERS
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
@@ -56,9 +56,6 @@ COVERAGE = 2.0
 
 SAFETY = 3.0
 """Factor of safety of a convergence index from two grids (Roache 1998)."""
-
-REQUIRED = 20.0
-"""Default U_reqd in per cent of the measured figure: project choice."""
 
 READINGS = 12
 """Number of evaluations of a trial's figures with added noise: enough to show its effect. Project choice."""
@@ -120,7 +117,7 @@ class Validated:
     numerical: float = 0.0
     inputs: float | None = 0.0
     data: float = 0.0
-    required_percent: float = REQUIRED
+    required_percent: float = REQUIRED_PERCENT
     made_card: bool = False
     error: float | None = None
     uncertainty: float | None = None
@@ -202,7 +199,10 @@ class Validation:
 
 
 def validate_card(
-    card: ManoeuvringCard, trials: Sequence[Trial], count: int = MEMBERS, required_percent: float = REQUIRED
+    card: ManoeuvringCard,
+    trials: Sequence[Trial],
+    count: int = VALIDATION_MEMBERS,
+    required_percent: float = REQUIRED_PERCENT,
 ) -> Validation:
     """Simulate the turns and zigzags among trials in closed loop from their measured starts, and compare figures.
 
@@ -265,7 +265,7 @@ def made_card(card: ManoeuvringCard, trial: str) -> bool:
     return re.search(rf"(?<![\w-]){re.escape(trial)}(?![\w-])", looked) is not None
 
 
-def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:
+def verify(ship: TrialShip, count: int = VALIDATION_MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:
     """The standard trials with the model's step, with half of it, and by an ensemble; and notices on failed ones."""
     model = replace(ship.model, step_s=ship.model.step_s / 2)
     finer = TrialShip(ship.card, model, Integrator(model))

@@ -103,4 +103,4 @@ def find_signal(asked: str, trial: Trial) -> str:
         if name in (signal, SignalName(signal).stem) or asked == trial.heading(signal):
             return signal
     columns = ", ".join(SignalName(signal).file for signal in trial.signals)
-    raise InputError(trial.path, f"column {asked}", "is not in the trial", f"give --column one of {columns}")
+    raise InputError(trial.path, f"column {asked}", "is not in the trial", f"give one of {columns}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.filtering import (
     FilterType,
@@ -74,4 +74,4 @@ def parse_filter(text: str) -> FilterRequest:
 
 
 def _refusal(text: str) -> InputError:
-    return InputError("--filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
+    return ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
