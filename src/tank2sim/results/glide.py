@@ -37,7 +37,7 @@ _ROUNDING_N = 1e-9
 
 _STATE = {
     "path_angle_deg": "path angle",
-    "incidence_deg": "",
+    "incidence_deg": "α",
     "pitch_deg": "",
     "speed_mps": "",
     "lift_coefficient": "C_L",
@@ -45,7 +45,7 @@ _STATE = {
 }
 """Columns of steady glides, with their words."""
 
-_SIGNS = "Angles + up, incidence + when the flow comes from below"
+_SIGNS = "Angles + up, incidence α + when the flow comes from below"
 _TURNS = (
     ", roll + starboard side down: it turns a dive to starboard and a climb to port. The turning radius neglects the "
     "added mass, as published; the radius with added mass is that of the transient model"

@@ -14,6 +14,7 @@ from tank2sim.cards.covariance import Covariance
 from tank2sim.cards.plausibility import unusual_signs, yaw_damping
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.study import PrimeValue
 from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
@@ -39,7 +40,7 @@ _UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "T_left": "N", "
 
 
 @dataclass(frozen=True, kw_only=True)
-class MmgCoefficient:
+class MmgCoefficient(PrimeValue):
     """One coefficient of the method.
 
     Parameters
@@ -54,19 +55,9 @@ class MmgCoefficient:
         Key of ``[uncertainty]`` to the standard error by it.
     """
 
-    value: float
-    standard_error: float
     origin: str
     type_a: float
     type_b: dict[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class YawArm:
-    """x_R' + a_H x_H', which tests show better than x_H' itself."""
-
-    value: float
-    standard_error: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +88,8 @@ class MmgStudy:
         File of the campaign, and name of the model.
     coefficients : dict
         By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot.
-    yaw_arm : YawArm
+    yaw_arm : PrimeValue
+        x_R' + a_H x_H', which tests show better than x_H' itself.
     rudder_angle_of_no_force_deg : float, optional
         Positive to starboard, straight ahead; None if the tests do not show it.
     channels : dict
@@ -115,7 +107,7 @@ class MmgStudy:
     campaign: str
     model: str
     coefficients: dict[str, MmgCoefficient]
-    yaw_arm: YawArm
+    yaw_arm: PrimeValue
     rudder_angle_of_no_force_deg: float | None
     channels: dict[str, ChannelFit]
     open_water_points: int
@@ -152,7 +144,7 @@ def study_mmg(fit: MmgFit) -> MmgStudy:
         campaign=str(tests.path),
         model=tests.form.model.name,
         coefficients=coefficients,
-        yaw_arm=YawArm(value=float(arm), standard_error=arm_error),
+        yaw_arm=PrimeValue(value=float(arm), standard_error=arm_error),
         rudder_angle_of_no_force_deg=-float(np.degrees(fit.value("rudder_offset"))) if offset else None,
         channels={
             name: ChannelFit(unit=_UNITS[name], standard_deviation=deviation, unexplained=unexplained[name])
