@@ -17,6 +17,7 @@ from tank2sim.answer.parts import (
     Section,
     Table,
     Verdict,
+    records_table,
     table,
 )
 from tank2sim.answer.result import Result
