@@ -32,7 +32,7 @@ from tank2sim.identification.captive.uncertainty_budget import (
 )
 from tank2sim.records.campaigns import Campaign
 
-_SectionValues = dict[str, str | float | list[str] | None]
+_SectionValues = dict[str, bool | float | str | list[str] | None]
 
 
 @dataclass(frozen=True, kw_only=True)
