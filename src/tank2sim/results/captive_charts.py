@@ -70,7 +70,7 @@ def force_chart(
     up : str
         Title of the force with its unit, such as ``Y (N)``.
     title : str
-        Of the chart.
+        Title of the chart.
     size_px : (int, int)
         Width and height.
     """
@@ -120,7 +120,7 @@ def loop_chart(
     forces : mapping
         Name of a force in the loops to its title with unit; the panels from top to bottom.
     title : str
-        Of the chart.
+        Title of the chart.
     height_px : int
         Height of one panel.
     """
@@ -154,7 +154,7 @@ def harmonic_chart(
     up : str
         Title of the force with its unit.
     title : str
-        Of the chart.
+        Title of the chart.
     width_px, height_px : int
         Size of one panel.
     """
@@ -190,7 +190,7 @@ def residual_chart(
     residuals : sequence of Residual
         Runs are in the order of their first appearance.
     title : str
-        Of the chart.
+        Title of the chart.
     width_px, height_px : int
         Size of one panel.
     """

@@ -1,4 +1,4 @@
-"""Result of ``tow``: surge mass and drag of a towed body, what the tows determine, and theory."""
+"""Result of ``tow``: surge mass and drag of a towed body, models that the tows determine, and theory."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class TowResult(Result[TowStudy]):
         Raises
         ------
         InputError
-            The estimates are not those of a body: the total mass is not positive.
+            No body has these estimates: the total mass is not positive.
         """
         body = self.study.body
         source = f"tank2sim tow {PurePath(self.study.tows).name}, method {self.method}"
