@@ -192,8 +192,8 @@ def _alignment(reduction: Reduction) -> Iterator[str]:
     angle, error = math.degrees(found.angle_rad), math.degrees(found.standard_error_rad)
     yield (
         f"Y0 and N0 are as if the model were turned by {angle:.3g} ± {error:.1g} deg against the recorded drift (or "
-        "the hull were as asymmetric): check its alignment; nothing is corrected, the standard errors of Y0 and N0 hold "
-        "it, and [uncertainty] alignment_deg states how well it is known."
+        "the hull were as asymmetric): check its alignment. Nothing is corrected; the standard errors of Y0 and N0 "
+        "include it. [uncertainty] alignment_deg states how well it is known."
     )
 
 
