@@ -19,7 +19,6 @@ from tank2sim.identification.captive.reduction import Reduction, reduction_covar
 from tank2sim.identification.captive.result_card import Contents, reduced_card_text
 from tank2sim.identification.captive.study import ReductionStudy
 from tank2sim.results.captive_charts import (
-    Across,
     Residual,
     derivative_certainty_chart,
     force_chart,
@@ -309,8 +308,5 @@ class ReductionResult(Result[ReductionStudy]):
 
 def _plot_chart(plot: ReductionPlot) -> alt.TopLevelMixin:
     if isinstance(plot, HarmonicsPlot):
-        return harmonic_chart(plot.runs, plot.up, title=plot.title)
-    across = Across(title=plot.across, unit=plot.unit)
-    if isinstance(plot, ForcePlot):
-        return force_chart(plot.series, across, plot.up, title=plot.title)
-    return loop_chart(plot.loops, across, _LOOPS, title=plot.title)
+        return harmonic_chart(plot)
+    return force_chart(plot) if isinstance(plot, ForcePlot) else loop_chart(plot, _LOOPS)
