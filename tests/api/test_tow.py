@@ -77,7 +77,7 @@ def test_it_fits_a_screen_and_shows_its_charts(found):
 @pytest.mark.parametrize(
     ("options", "source"),
     [
-        ({"method": "magic"}, "--method"),
+        ({"method": "magic"}, "method"),
         ({"terms": ["B4"]}, "--terms"),
         ({"length_m": -3.0}, "--length-m"),
         ({"force_N": [1.0, -1.0]}, "force_N"),

@@ -2,9 +2,15 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_png, chart_specification
-from tank2sim.identification.captive.plot_data import ForceLoop, ForceSeries, Harmonics
+from tank2sim.identification.captive.plot_data import (
+    ForceLoop,
+    ForcePlot,
+    ForceSeries,
+    Harmonics,
+    HarmonicsPlot,
+    LoopPlot,
+)
 from tank2sim.results.captive_charts import (
-    Across,
     Residual,
     force_chart,
     harmonic_chart,
@@ -12,7 +18,17 @@ from tank2sim.results.captive_charts import (
     residual_chart,
 )
 
-DRIFT = Across(title="drift angle", unit="rad")
+
+def against_drift(*series, title=""):
+    return force_chart(ForcePlot(title=title, across="drift angle", unit="rad", up="Y (N)", series=series))
+
+
+def loops_of(loop, across, unit, forces):
+    return loop_chart(LoopPlot(title="Loops", across=across, unit=unit, loops=(loop,)), forces)
+
+
+def harmonics_of(*runs):
+    return harmonic_chart(HarmonicsPlot(title="Harmonics", up="Y (N)", runs=runs))
 
 
 def rows(specification, layer):
@@ -33,7 +49,7 @@ def drift_series(**more):
 
 
 def test_angles_stand_across_in_degrees_and_forces_upward_as_given():
-    specification = chart_specification(force_chart([drift_series()], DRIFT, "Y (N)"))
+    specification = chart_specification(against_drift(drift_series()))
     (points,) = layers_of(specification, "point")
     assert [(row["x"], row["v"]) for row in rows(specification, points)] == [(-4, -5), (0, 0.5), (8, 11)]
     assert points["encoding"]["x"]["title"] == "drift angle (deg)"
@@ -42,7 +58,7 @@ def test_angles_stand_across_in_degrees_and_forces_upward_as_given():
 
 def test_intervals_and_bands_reach_their_half_width_to_both_sides():
     fit = {"fit_x": [0.2, -0.1], "fit_value": [20.0, -8.0], "fit_half_width": [3.0, 1.0]}
-    specification = chart_specification(force_chart([drift_series(half_width=[1, 2, 4], **fit)], DRIFT, "Y (N)"))
+    specification = chart_specification(against_drift(drift_series(half_width=[1, 2, 4], **fit)))
     (band,) = layers_of(specification, "area")
     assert [(row["low"], row["high"]) for row in rows(specification, band)] == [(-9, -7), (17, 23)]
     intervals = [layer for layer in layers_of(specification, "rule") if "y2" in layer["encoding"]]
@@ -52,13 +68,13 @@ def test_intervals_and_bands_reach_their_half_width_to_both_sides():
 def test_zero_is_marked_only_among_the_values():
     above = ForceSeries(label="far from zero", x=[0.0, 1.0], value=[5.0, 6.0])
     for series, marked in ((drift_series(), 1), (above, 0)):
-        specification = chart_specification(force_chart([series], DRIFT, "Y (N)"))
+        specification = chart_specification(against_drift(series))
         assert len(layers_of(specification, "rule")) == marked
 
 
 def test_a_fit_is_drawn_from_left_to_right_whatever_its_order():
     series = drift_series(fit_x=[0.3, -0.3, 0.0], fit_value=[3.0, -3.0, 0.0])
-    specification = chart_specification(force_chart([series], DRIFT, "Y (N)"))
+    specification = chart_specification(against_drift(series))
     (line,) = layers_of(specification, "line")
     assert [row["v"] for row in rows(specification, line)] == [-3, 0, 3]
     assert line["encoding"]["order"]["field"] == "i"
@@ -74,8 +90,8 @@ def test_a_loop_keeps_the_order_of_time_and_its_forces_their_panels():
         fitted_motion=[*motion, 0.1],
         fitted={"Y": [1, 2, 3, 4, 1]},
     )
-    across = Across(title="sway velocity", unit="m/s")
-    specification = chart_specification(loop_chart([loop], across, {"Y": "Y (N)", "N": "N (N m)"}))
+    forces = {"Y": "Y (N)", "N": "N (N m)"}
+    specification = chart_specification(loops_of(loop, "sway velocity", "m/s", forces))
     sway, yaw = specification["vconcat"]
     (line,) = layers_of(sway, "line")
     assert [(row["i"], row["x"], row["v"]) for row in rows(specification, line)] == [
@@ -89,13 +105,13 @@ def test_a_loop_keeps_the_order_of_time_and_its_forces_their_panels():
 
 def test_a_yaw_rate_is_shown_in_degrees_a_second():
     loop = ForceLoop(label="yaw", motion=[np.pi / 180], forces={"N": [1.0]})
-    specification = chart_specification(loop_chart([loop], Across(title="r", unit="rad/s"), {"N": "N (N m)"}))
+    specification = chart_specification(loops_of(loop, "r", "rad/s", {"N": "N (N m)"}))
     assert rows(specification, specification["vconcat"][0]["layer"][0])[0]["x"] == 1.0
 
 
 def test_a_force_that_no_loop_has_is_refused():
     with pytest.raises(ValueError, match="no loop has the force X"):
-        loop_chart([ForceLoop(label="a", motion=[0], forces={"Y": [0]})], Across(title="v"), {"X": "X (N)"})
+        loops_of(ForceLoop(label="a", motion=[0], forces={"Y": [0]}), "v", "1", {"X": "X (N)"})
 
 
 def test_harmonics_are_bars_in_the_order_of_the_runs_with_the_fit_next_to_them():
@@ -103,7 +119,7 @@ def test_harmonics_are_bars_in_the_order_of_the_runs_with_the_fit_next_to_them()
         Harmonics(run="yaw_01", amplitude=[10.0, 0.1, 2.0], fitted=[9.5, 0.0, -2.1]),
         Harmonics(run="sway_00", amplitude=[5.0, 0.2]),
     ]
-    specification = chart_specification(harmonic_chart(runs, "Y (N)", title="Harmonics"))
+    specification = chart_specification(harmonics_of(*runs))
     assert len(specification["vconcat"]) == 3
     third = specification["vconcat"][2]
     (bars,), (ticks,) = layers_of(third, "bar"), layers_of(third, "tick")
@@ -137,9 +153,9 @@ def test_every_captive_chart_can_be_drawn():
     other = ForceSeries(label="rudder", x=[0.0, 0.1], value=[0.0, 1.0])
     loop = ForceLoop(label="run", motion=[0, 1], forces={"Y": [0, 1]}, fitted_motion=[0, 1], fitted={"Y": [0, 1]})
     charts = [
-        force_chart([series, other], DRIFT, "Y (N)", title="Static"),
-        loop_chart([loop], Across(title="v"), {"Y": "Y (N)"}, title="Loops"),
-        harmonic_chart([Harmonics(run="a", amplitude=[1, 2])], "Y (N)", title="Harmonics"),
+        against_drift(series, other, title="Static"),
+        loops_of(loop, "v", "1", {"Y": "Y (N)"}),
+        harmonics_of(Harmonics(run="a", amplitude=[1, 2])),
         residual_chart([Residual(run="a", kind="b", force="Y", value=1.0)], title="Residuals"),
     ]
     for chart in charts:

@@ -63,7 +63,7 @@ def test_tables_hold_the_glides_the_path_and_the_ranges(result) -> None:
     (state,) = study.states
     assert glides.iloc[0].to_dict() == {
         "path angle (deg)": pytest.approx(-30),
-        "incidence (deg)": state.incidence_deg,
+        "α (deg)": state.incidence_deg,
         "pitch (deg)": state.pitch_deg,
         "speed (m/s)": state.speed_mps,
         "C_L": state.lift_coefficient,

@@ -43,7 +43,7 @@ def reduce_runs(
     files : path or sequence of paths
         Files of the run, of any layout that ``campaign.toml`` may have.
     type : str, optional
-        Type of the run: one of :data:`TYPE_NAMES`; by default that of the campaign's sheet.
+        Type of the run: one of :data:`TYPE_NAMES`; by default as in the campaign's sheet.
     campaign : path, optional
         ``campaign.toml`` with tank, model, signs and columns; the run need not be in it.
     force_convention : str, optional

@@ -34,7 +34,7 @@ def reduce(
     campaign : path
         ``campaign.toml``.
     fill : str, optional
-        Take what the campaign cannot give from this published estimate, marked and with a wide uncertainty.
+        Published estimate of derivatives that the campaign cannot give; they are marked and have a wide uncertainty.
     scale : float or str, optional
         Make the card of a ship so many times as long as the model; ``"ship"``: as the campaign says.
     keep_going : bool
@@ -74,7 +74,7 @@ def reduce(
 
 
 def _ratio(campaign: Campaign, given: float | str | None) -> float | None:
-    """The ratio of lengths: a number, or ``ship`` for that of the campaign; None if none was given."""
+    """The ratio of lengths: a number, or ``ship`` for the ratio of the campaign; None if none was given."""
     if given is None:
         return None
     if given == "ship":
@@ -107,7 +107,7 @@ def _fill_notices(card: Contents, fill: str | None, ratio: float | None, campaig
             f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
         )
     if card.missing:
-        remedy = "" if fill else f" --fill {next(iter(FILLS))} takes what it can from a published estimate."
+        remedy = "" if fill else f" --fill {next(iter(FILLS))} takes some of them from a published estimate."
         notices.append(
             f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
             f"wrong as that.{remedy}"

@@ -50,7 +50,7 @@ def yaw(
     Parameters
     ----------
     records : path or sequence of paths
-        CSV files with ``t_s,phi_rad,current_A``; those of a body in air (``# medium: air``) give J_zz.
+        CSV files with ``t_s,phi_rad,current_A``; records of a body in air (``# medium: air``) give J_zz.
     inertia_kgm2, inertia_error_kgm2 : float, optional
         J_zz of body and rotor and its standard error; by default from records in air, or as the file says.
     torque_constant_NmpA : float, optional
@@ -60,7 +60,7 @@ def yaw(
     rig : Ship, Card, str or path, optional
         Card of the rig: its walls, gravity, accelerating and braking count.
     terms : str or sequence of str, optional
-        Terms in addition to the inertia (``"coulomb,viscous,quadratic"``); by default those of (3) for the medium.
+        Terms in addition to the inertia (``"coulomb,viscous,quadratic"``); by default the terms of (3) for the medium.
     mirror_percent : float
         Largest difference of mirror images that is accepted, % of the largest rate.
     method : str

@@ -31,19 +31,17 @@ from tank2sim.answer.charts.parts import (
     with_unit,
 )
 from tank2sim.answer.charts.theme import BAND_OPACITY
-from tank2sim.identification.captive.plot_data import ForceLoop, ForceSeries, Harmonics
+from tank2sim.identification.captive.plot_data import (
+    ForceLoop,
+    ForcePlot,
+    ForceSeries,
+    HarmonicsPlot,
+    LoopPlot,
+)
 from tank2sim.records.thinning import thin_line, thin_points
 
 _CROWDED = 40
 _USUAL_LIMIT = 2.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Across:
-    """What lies across: its words and its unit, a key of :data:`tank2sim.units.UNITS`; angles are shown in degrees."""
-
-    title: str
-    unit: str = "1"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,26 +54,19 @@ class Residual:
     value: float
 
 
-def force_chart(
-    series: Sequence[ForceSeries], across: Across, up: str, *, title: str = "", size_px: tuple[int, int] = (620, 380)
-) -> alt.LayerChart:
+def force_chart(plot: ForcePlot, *, size_px: tuple[int, int] = (620, 380)) -> alt.LayerChart:
     """A force against angle or amplitude: measured points with their intervals, the fits as lines in their bands.
 
     Parameters
     ----------
-    series : sequence of ForceSeries
-        In one colour each.
-    across : Across
-        What `x` is.
-    up : str
-        Title of the force with its unit, such as ``Y (N)``.
-    title : str
-        Of the chart.
+    plot : ForcePlot
+        Its series have one colour each; angles are shown in degrees.
     size_px : (int, int)
         Width and height.
     """
-    unit, factor = shown_unit(across.unit)
-    name = with_unit(across.title, unit)
+    series, up = plot.series, plot.up
+    unit, factor = shown_unit(plot.unit)
+    name = with_unit(plot.across, unit)
     look = series_look([run.label for run in series], as_points=[run.label for run in series])
     x = alt.X("x:Q", title=name, scale=alt.Scale(zero=False, padding=10))
     y = alt.Y("v:Q", title=up, scale=alt.Scale(zero=False))
@@ -99,33 +90,28 @@ def force_chart(
     layers.append(mark.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
     labels = ", ".join(run.label for run in series)
     return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
-        title=title,
+        title=plot.title,
         width=size_px[0],
         height=size_px[1],
-        description=f"{up} against {across.title} of {labels}; points were measured, lines are the fit with its band.",
+        description=f"{up} against {plot.across} of {labels}; points were measured, lines are the fit with its band.",
     )
 
 
-def loop_chart(
-    loops: Sequence[ForceLoop], across: Across, forces: Mapping[str, str], *, title: str = "", height_px: int = 260
-) -> alt.VConcatChart:
+def loop_chart(plot: LoopPlot, forces: Mapping[str, str], *, height_px: int = 260) -> alt.VConcatChart:
     """Hysteresis loops: forces over the motion, one panel a force; measured as points, the fit as a line.
 
     Parameters
     ----------
-    loops : sequence of ForceLoop
-        In one colour each.
-    across : Across
-        What `motion` is.
+    plot : LoopPlot
+        Its loops have one colour each.
     forces : mapping
         Name of a force in the loops to its title with unit; the panels from top to bottom.
-    title : str
-        Of the chart.
     height_px : int
         Height of one panel.
     """
-    unit, factor = shown_unit(across.unit)
-    name = with_unit(across.title, unit)
+    loops = plot.loops
+    unit, factor = shown_unit(plot.unit)
+    name = with_unit(plot.across, unit)
     look = series_look([loop.label for loop in loops], as_points=[loop.label for loop in loops])
     panels = []
     for place, (force, up) in enumerate(forces.items()):
@@ -139,25 +125,19 @@ def loop_chart(
             alt.layer(*_loop_layers(loops, force, factor, position, look)).properties(width=560, height=height_px)
         )
     labels = ", ".join(loop.label for loop in loops)
-    return stacked(panels, title=title, description=f"Forces over {across.title} of {labels}.")
+    return stacked(panels, title=plot.title, description=f"Forces over {plot.across} of {labels}.")
 
 
-def harmonic_chart(
-    runs: Sequence[Harmonics], up: str, *, title: str = "", width_px: int = 720, height_px: int = 110
-) -> alt.VConcatChart:
+def harmonic_chart(plot: HarmonicsPlot, *, width_px: int = 720, height_px: int = 110) -> alt.VConcatChart:
     """Amplitudes of a force's harmonics as bars, one panel a harmonic, the runs side by side; strokes are the fit.
 
     Parameters
     ----------
-    runs : sequence of Harmonics
-        In their order in the chart.
-    up : str
-        Title of the force with its unit.
-    title : str
-        Of the chart.
+    plot : HarmonicsPlot
     width_px, height_px : int
         Size of one panel.
     """
+    runs, up = plot.runs, plot.up
     count = max(len(vector(run.amplitude)) for run in runs)
     panels = []
     for order in range(1, count + 1):
@@ -173,7 +153,7 @@ def harmonic_chart(
         panels.append(alt.layer(*layers).properties(width=width_px, height=height_px))
     subtitle = "Bars: measured. Red strokes: fit." if any(run.fitted is not None for run in runs) else ""
     return alt.vconcat(*panels, spacing=14).properties(
-        title=alt.Title(title, subtitle=subtitle) if title and subtitle else title,
+        title=alt.Title(plot.title, subtitle=subtitle) if plot.title and subtitle else plot.title,
         description=f"Amplitudes of the harmonics of {up} in {len(runs)} runs.",
     )
 
@@ -190,7 +170,7 @@ def residual_chart(
     residuals : sequence of Residual
         Runs are in the order of their first appearance.
     title : str
-        Of the chart.
+        Title of the chart.
     width_px, height_px : int
         Size of one panel.
     """

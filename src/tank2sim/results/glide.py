@@ -37,7 +37,7 @@ _ROUNDING_N = 1e-9
 
 _STATE = {
     "path_angle_deg": "path angle",
-    "incidence_deg": "",
+    "incidence_deg": "α",
     "pitch_deg": "",
     "speed_mps": "",
     "lift_coefficient": "C_L",
@@ -45,10 +45,10 @@ _STATE = {
 }
 """Columns of steady glides, with their words."""
 
-_SIGNS = "Angles + up, incidence + when the flow comes from below"
+_SIGNS = "Angles + up, incidence α + when the flow comes from below"
 _TURNS = (
     ", roll + starboard side down: it turns a dive to starboard and a climb to port. The turning radius neglects the "
-    "added mass, as published; the radius with added mass is that of the transient model"
+    "added mass, as published; the transient model gives the radius with added mass"
 )
 _SWINGS = (
     "Root mean square over a period, against the steady glide of the controls as they are at each moment: of the "
@@ -267,8 +267,8 @@ def _printed_table(glides: Sequence[BalancedGlide], printed: Sequence[BalancedGl
         shown.caption,
         [*shown.columns, Column(title="speed over that above", digits=3)],
         [[*row, ratio] for row, ratio in zip(shown.rows, ratios, strict=True)],
-        f"Printed speeds are {factors} times the right ones: the drag that they balance, alpha (C_D0 + C_D alpha), is "
-        "not that of (7).",
+        f"Printed speeds are {factors} times the right ones: they balance the drag alpha (C_D0 + C_D alpha), which "
+        "differs from (7).",
         f"By lift and drag of (6) and (7) the printed glides are off balance by {_unbalance(printed)}, those above by "
         f"{_unbalance(glides)}.",
     )

@@ -87,7 +87,7 @@ class MmgReductionResult(Result[MmgStudy]):
         """Number of coefficients, and the worst residual."""
         study, measured = self.study, sum(found.origin == "measured" for found in self.coefficients.values())
         worst, channel = max(study.channels.items(), key=lambda channel: channel[1].unexplained)
-        opened = f"; {len(self._open)} are open, and those of ordinary ships" if self._open else ""
+        opened = f"; {len(self._open)} are open and taken from ordinary ships" if self._open else ""
         return (
             f"{study.model}: {measured} coefficients of the MMG method are measured in {len(study.conditions)} steady "
             f"conditions{opened}.",

@@ -19,7 +19,6 @@ from tank2sim.identification.captive.reduction import Reduction, reduction_covar
 from tank2sim.identification.captive.result_card import Contents, reduced_card_text
 from tank2sim.identification.captive.study import ReductionStudy
 from tank2sim.results.captive_charts import (
-    Across,
     Residual,
     derivative_certainty_chart,
     force_chart,
@@ -53,7 +52,7 @@ class ReductionResult(Result[ReductionStudy]):
     reduction : Reduction, optional
         None if the result was read from its JSON.
     contents : Contents, optional
-        Contents of the card: what was measured, and what was taken from published estimates.
+        Contents of the card: measured values and published estimates.
     """
 
     study: ReductionStudy
@@ -63,19 +62,19 @@ class ReductionResult(Result[ReductionStudy]):
 
     @cached_property
     def card(self) -> Card:
-        """The card found, with the covariance of what was measured; ``card.save("ship.toml")`` writes it.
+        """The card found, with the covariance of the measured values; ``card.save("ship.toml")`` writes it.
 
         Raises
         ------
         InputError
-            The derivatives are not those of a ship, or the result was read from its JSON.
+            No ship has these derivatives, or the result was read from its JSON.
         """
         if self.reduction is None or self.contents is None:
             raise InputError(self.study.campaign, "", "was not read with this result", "reduce the campaign again")
         card = parse_card(
             reduced_card_text(self.reduction, self.contents, self.study.card_scale or 1.0), "the reduced card"
         )
-        # Estimates are independent of what was measured.
+        # Estimates are independent of the measured values.
         entries, estimated = self.contents.entries, self.contents.estimated
         names = [name for name in entries if name in self.reduction.derivatives and name not in estimated]
         matrix = reduction_covariance(self.reduction, names)
@@ -136,8 +135,8 @@ class ReductionResult(Result[ReductionStudy]):
         if self.study.card_scale is not None or not isinstance(scale, float) or not isinstance(length, float):
             return []
         return [
-            f"The card is of the model, {length:.4g} m long; --scale ship makes it that of the ship of "
-            f"{length * scale:.4g} m."
+            f"The card is of the model, {length:.4g} m long; --scale ship makes a card of the ship, "
+            f"{length * scale:.4g} m long."
         ]
 
     @property
@@ -309,8 +308,5 @@ class ReductionResult(Result[ReductionStudy]):
 
 def _plot_chart(plot: ReductionPlot) -> alt.TopLevelMixin:
     if isinstance(plot, HarmonicsPlot):
-        return harmonic_chart(plot.runs, plot.up, title=plot.title)
-    across = Across(title=plot.across, unit=plot.unit)
-    if isinstance(plot, ForcePlot):
-        return force_chart(plot.series, across, plot.up, title=plot.title)
-    return loop_chart(plot.loops, across, _LOOPS, title=plot.title)
+        return harmonic_chart(plot)
+    return force_chart(plot) if isinstance(plot, ForcePlot) else loop_chart(plot, _LOOPS)

@@ -1,4 +1,4 @@
-"""Result of ``tow``: surge mass and drag of a towed body, what the tows determine, and theory."""
+"""Result of ``tow``: surge mass and drag of a towed body, models that the tows determine, and theory."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from tank2sim.answer.parts import (
     Section,
     Table,
     Verdict,
+    records_table,
     table,
 )
 from tank2sim.answer.result import Result
@@ -122,7 +123,7 @@ class TowResult(Result[TowStudy]):
         Raises
         ------
         InputError
-            The estimates are not those of a body: the total mass is not positive.
+            No body has these estimates: the total mass is not positive.
         """
         body = self.study.body
         source = f"tank2sim tow {PurePath(self.study.tows).name}, method {self.method}"
@@ -226,7 +227,7 @@ class TowResult(Result[TowStudy]):
         ):
             rows.append([words, *(f"{getattr(fit, field):.4g}" for fit in fits)])
         heads = ("", *(_METHODS[method] for method in self.study.methods))
-        tables = [table("Estimates by method", heads, rows, folded=True), self._polynomials()]
+        tables = [table("Estimates by method", heads, rows), self._polynomials()]
         return Section(heading="Estimates by method", text=_ESTIMATES, tables=tables)
 
     def _polynomials(self) -> Table:
@@ -244,20 +245,17 @@ class TowResult(Result[TowStudy]):
             heads,
             rows,
             *(notes if self.study.tows_of_the_paper else []),
+            folded=True,
             on_screen=False,
         )
 
     def _models(self) -> Section:
-        study = self.study
-        charts = []
+        study, name, charts = self.study, "what_these_tows_determine", []
         if study.models:
-            charts.append(Illustration(chart=model_chart(study.models), caption=_MODELS))
+            charts.append(Illustration(chart=model_chart(study.models), caption=_MODELS, name=name))
         if study.confidence_ellipses:
             chart = ellipse_chart(study.confidence_ellipses, study.tow_by_tow)
-            charts.append(Illustration(chart=chart, caption=_ELLIPSES))
-        named = [
-            Illustration(chart=each.chart, caption=each.caption, name="what_these_tows_determine") for each in charts
-        ]
+            charts.append(Illustration(chart=chart, caption=_ELLIPSES, name=name))
         unknowns = [name for name in _UNITS if any(name in model.estimates for model in study.models)]
         estimates: list[list[Cell]] = [
             [
@@ -300,7 +298,7 @@ class TowResult(Result[TowStudy]):
                     on_screen=False,
                 ),
             ],
-            charts=named,
+            charts=charts,
         )
 
     def _masses_by_tow(self) -> list[str]:
@@ -350,16 +348,14 @@ class TowResult(Result[TowStudy]):
         if best := self.study.best:
             mass, half = best.estimates["M"], best.half_widths_95["M"]
             estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
-        rows: list[list[Cell]] = [
-            [mass.basis, mass.k11, round(mass.deep_kg), round(mass.near_surface_kg)]
-            for mass in self.study.mass_by_theory
-        ]
-        heads = ("body", "k₁₁", "(1 + k₁₁) ρ V (kg)", "near the surface, M_s (kg)")
-        return Section(
-            heading="Mass by theory",
-            text=_THEORY + estimate,
-            tables=[table("Mass in surge by theory (2.5)", heads, rows)],
-        )
+        fields = {
+            "basis": "body",
+            "k11": "k₁₁",
+            "deep_kg": "(1 + k₁₁) ρ V",
+            "near_surface_kg": "near the surface, M_s",
+        }
+        masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
+        return Section(heading="Mass by theory", text=_THEORY + estimate, tables=[masses])
 
     def _by_tow(self) -> list[Section]:
         if not self.study.tow_by_tow:

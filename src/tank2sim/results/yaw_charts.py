@@ -33,7 +33,7 @@ def record_chart(name: str, columns: Columns) -> alt.VConcatChart:
 
 
 def balance_chart(balance: EnergyBalance, *, width_px: int = 340) -> alt.HConcatChart:
-    """Work of the motor in each subinterval (points) and what it is spent on (bars), the mean over all pairs."""
+    """Work of the motor in each subinterval (points) and its uses (bars), means over all pairs."""
     terms = {term.replace("_", " "): parts for term, parts in balance.spent_J.items()}
     look = series_look([*terms, "motor"], as_points=["motor"])
     panels = []
@@ -56,7 +56,7 @@ def balance_chart(balance: EnergyBalance, *, width_px: int = 340) -> alt.HConcat
         motors = Chart(data(points)).mark_point(size=60, strokeWidth=2)
         motors = motors.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
         panels.append(alt.layer(stacked, motors).properties(width=width_px, height=260))
-    title = "Work of the motor, and what it goes into"
+    title = "Work of the motor and its uses"
     description = (
         "Energy balance of each subinterval: kinetic energy and each term of friction against the motor's work."
     )

@@ -133,7 +133,7 @@ def steady_glide(
     Raises
     ------
     InputError
-        The angle cannot be flown (the message names the smallest possible), angle or roll is not that of a glide, or
+        The angle cannot be flown (the message names the smallest possible), angle or roll is beyond those of glides, or
         the glider is light in a dive or heavy in a climb.
     """
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)

@@ -117,7 +117,7 @@ def _missing(reduction: Reduction) -> Iterator[str]:
     if reduction.missing:
         yield f"The campaign does not give {', '.join(reduction.missing)}."
     if reduction.campaign.model.yaw_inertia_kgm2 is None:
-        yield "[model] yaw_inertia_kgm2 is missing: the card has that of a radius of gyration of 0.25 L, an estimate."
+        yield "[model] yaw_inertia_kgm2 is missing: the card has an estimate by a radius of gyration of 0.25 L."
 
 
 def _oscillating(reduction: Reduction) -> tuple[OscillationMotion, ...]:
@@ -191,9 +191,9 @@ def _alignment(reduction: Reduction) -> Iterator[str]:
         return
     angle, error = math.degrees(found.angle_rad), math.degrees(found.standard_error_rad)
     yield (
-        f"Y0 and N0 are those of a model turned by {angle:.3g} ± {error:.1g} deg against the recorded drift (or of a "
-        "hull that is as asymmetric): check its alignment; nothing is corrected, the standard errors of Y0 and N0 hold "
-        "it, and [uncertainty] alignment_deg states how well it is known."
+        f"Y0 and N0 are as if the model were turned by {angle:.3g} ± {error:.1g} deg against the recorded drift (or "
+        "the hull were as asymmetric): check its alignment. Nothing is corrected; the standard errors of Y0 and N0 "
+        "include it. [uncertainty] alignment_deg states how well it is known."
     )
 
 
@@ -238,7 +238,7 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
         yield (
             f"The harmonics of {force} scatter from run to run {np.sqrt(noise):.1f} times as much as the noise within "
             "the runs explains, and the standard errors are as much wider: (3.8) does not follow them fully, or the "
-            "motion is not what was recorded."
+            "recorded motion is wrong."
         )
     test = result.asymmetry
     if test is not None and test.names:

@@ -30,7 +30,7 @@ _ACROSS = {
     "static_rudder": ("rudder angle", "rad"),
     "steady_turn": ("yaw rate r'", "1"),
 }
-"""Kind of steady run to what it varies, and its unit."""
+"""Kind of steady run to the motion that it varies, and its unit."""
 _LETTER = {"static_drift": "v", "static_rudder": "d", "steady_turn": "r"}
 _ZERO = 1e-9
 """Smaller angles (rad) count as zero."""
@@ -91,7 +91,7 @@ class ForceLoop:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Harmonics:
-    """Amplitudes of the harmonics (1, 2, 3, ... in this order) of a force in one run, and those of the fit if given."""
+    """Amplitudes of the harmonics (1, 2, 3, ... in this order) of a force in one run, measured and fitted."""
 
     run: str
     amplitude: Array

@@ -330,7 +330,7 @@ def _used_runs(
             not_used[run.run.name] = f"its speed is {speed:.4g} m/s, and the test speed {campaign.test.speed_mps:.4g}"
         elif abs(turning - usual) > SPEED_RANGE * usual and not options.off_speed:
             found, nominal = (f"{radps * 60 / (2 * np.pi):.4g}" for radps in (turning, usual))
-            not_used[run.run.name] = f"its rate of revolution is {found} rpm, and that of most others {nominal}"
+            not_used[run.run.name] = f"its rate of revolution is {found} rpm, and most others have {nominal} rpm"
         else:
             used.append(run)
     return used, not_used
@@ -416,7 +416,7 @@ def is_resistance(campaign: Campaign) -> bool:
 def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:
     """Covariance (k, k), prime, of the derivatives `names` of a campaign.
 
-    Type A is that of the regression of each force, whose errors are independent. An error common to many runs (Type B,
+    Type A comes from the regressions of the forces, whose errors are independent. An error common to many runs (Type B,
     or shown by the campaign itself) moves the derivatives of all three forces together: the outer product of what they
     move by.
     """

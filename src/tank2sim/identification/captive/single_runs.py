@@ -114,7 +114,7 @@ class SingleRun:
     history : dict
         Columns ``t_s``, and record, fit and residual of each force (``X_N``, ``X_fit_N``, ``X_residual_N``), to draw.
     faults : tuple of str
-        What contradicts the record.
+        Contradictions in the record.
     """
 
     name: str
@@ -299,8 +299,8 @@ def _history(reduced: ReducedRun) -> Columns:
 def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
     """A force averaged over the periods of a run, by phase.
 
-    The mean of a bin is that of the harmonics at its middle and of the residuals inside it: the curvature of the force
-    over the bin does not bias it, and a trend of the zero does not widen it.
+    The mean of a bin is the value of the harmonics at its middle plus the mean residual inside it: the curvature of
+    the force over the bin does not bias it, and a trend of the zero does not widen it.
 
     Parameters
     ----------
@@ -398,7 +398,7 @@ def _motion_coefficients(run: ReducedRun) -> list[FourierCoefficient]:
 
 
 def _pairs(signal: str, unit: str, values: Array, errors: Array) -> list[FourierCoefficient]:
-    """Mean and pairs of cosine and sine; what follows the last pair (the trend) is left out."""
+    """Mean and pairs of cosine and sine, without the trend, which follows the last pair."""
     found = []
     for order in range((len(values) - 1) // 2 + 1):
         places = [0] if order == 0 else [2 * order - 1, 2 * order]

@@ -32,7 +32,7 @@ from tank2sim.identification.captive.uncertainty_budget import (
 )
 from tank2sim.records.campaigns import Campaign
 
-_SectionValues = dict[str, str | float | list[str] | None]
+_SectionValues = dict[str, bool | float | str | list[str] | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,7 +235,7 @@ class ReductionStudy:
     model, test : dict
         Keys of these sections of the file to values.
     card_scale : float, optional
-        Length of the card's ship over that of the model; None: the card is of the model.
+        Length of the card's ship over the length of the model; None: the card is of the model.
     conventions : DerivativeConventions
     rigid_body : ReducedBody
     derivatives : dict
@@ -315,7 +315,7 @@ def study_reduction(
     ----------
     reduction : Reduction
     card : Contents
-        Of its card.
+        Contents of its card.
     warnings : tuple of str
         Messages for the user, in sentences.
     card_scale : float, optional

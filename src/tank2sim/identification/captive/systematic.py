@@ -105,7 +105,7 @@ class SystematicError:
                 "errors include its effect."
             )
         direction = "more" if self.size > 0 else "less"
-        alternatives = f" (or those of {', '.join(self.or_runs)} err)" if self.or_runs else ""
+        alternatives = f" (or the runs of {', '.join(self.or_runs)} err)" if self.or_runs else ""
         return (
             f"The {self.force} gauge reads {100 * abs(self.size):.2g} ± {100 * self.standard_error:.1g} % {direction} "
             f"in runs of {self.runs} than all other kinds of run imply{alternatives}: check its calibration there; "

@@ -183,7 +183,7 @@ def model_length(length_m: float) -> Iterator[Caution]:
         yield Caution(
             "model length",
             f"The model is {length_m:.3g} m long: below {SHORTEST_MODEL_M:g} m the scale effect grows, and most "
-            "coefficients of 2 m models differ by about 10 % from those of 4 m (Krezelewski and Misiag).",
+            "coefficients of 2 m models differ by about 10 % from 4 m models (Krezelewski and Misiag).",
         )
 
 
@@ -312,7 +312,7 @@ def blockage(beam_m: float | None, draught_m: float | None, tank: Tank) -> Itera
         yield Caution(
             "blockage",
             f"The water is {tank.depth_m / draught_m:.2g} draughts deep; deep water is more than "
-            f"{LEAST_DEPTH_RATIO:g} (IMO MSC.137(76)): the derivatives are those of shallow water.",
+            f"{LEAST_DEPTH_RATIO:g} (IMO MSC.137(76)): the derivatives hold in shallow water.",
         )
 
 
@@ -360,8 +360,8 @@ def carried_mass(body: CarriedBody, block_coefficient: float | None = None) -> I
         low, high = BLOCK_COEFFICIENTS
         yield Caution(
             "mass",
-            f"The mass is {block:.3g} times that of the water in L x B x T, and ships have {low:g} to {high:g}: check "
-            "mass, length, beam and draught.",
+            f"The mass is {block:.3g} times the mass of the water in L x B x T, and ships have {low:g} to {high:g}: "
+            "check mass, length, beam and draught.",
         )
     if block is not None and block_coefficient is not None and abs(block / block_coefficient - 1) > BLOCK_TOLERANCE:
         yield Caution(

@@ -175,7 +175,7 @@ def force_convention(
         if value is not None and value > 0:
             message = f"{name} is {value:.3g}: the added {what} is negative"
             if value >= inertia:
-                message += f", and with that of the model ({inertia:.3g}) the whole is too"
+                message += f", and with the inertia of the model ({inertia:.3g}) the whole is too"
             yield Caution("force convention", f"{message}; {_likely_cause(value, inertia, convention)}.")
 
 

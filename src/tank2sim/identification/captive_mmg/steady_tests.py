@@ -180,10 +180,10 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
     return {
         "propeller.y_P": (form.propeller.y_P, "give the place of the right propeller over L"),
         "rudder.y_R": (form.rudder and form.rudder.y_R, "give the place of the right rudder over L"),
-        "averages.columns.thrust_left": (columns.thrust_left, "thrust is that of the right one: name both columns"),
+        "averages.columns.thrust_left": (columns.thrust_left, "thrust is for the right propeller: name both columns"),
         "averages.columns.rudder_normal_force_left": (
             columns.rudder_normal_force_left,
-            "rudder_normal_force is that of the right one: name both columns",
+            "rudder_normal_force is for the right rudder: name both columns",
         ),
     }
 

@@ -14,6 +14,7 @@ from tank2sim.cards.covariance import Covariance
 from tank2sim.cards.plausibility import unusual_signs, yaw_damping
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.study import PrimeValue
 from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
@@ -21,12 +22,12 @@ from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit
 from tank2sim.marks import CHECK
 
 _UNEXPLAINED = 0.5
-"""Share of a channel (rms of what is left over rms of the readings) from which the method is not that of the
+"""Share of a channel (rms of the residuals over rms of the readings) from which the method does not describe the
 ship, and the result is refused. Project choice: a wrong sign leaves more than 1, HMRI's KVLCC2 at most 0.13."""
 _CURVE_UNEXPLAINED = 0.2
-"""Share of K_T or K_Q (rms of what is left over that of the points) from which the open-water curve is not that of the
-propeller behind the model. Project choice: open-water tests scatter by 1 or 2 %, a wrong sign leaves 100 %, a diameter
-that is 10 % too large 35 % (HMRI's KVLCC2)."""
+"""Share of K_T or K_Q (rms of the residuals over rms of the points) from which the open-water curve belongs to another
+propeller than the one behind the model. Project choice: open-water tests scatter by 1 or 2 %, a wrong sign leaves
+100 %, a diameter that is 10 % too large 35 % (HMRI's KVLCC2)."""
 _CURVE_DOUBTFUL = 0.04
 """Share from which the result is marked. Project choice: HMRI's KVLCC2 has 0.007, and K_T 5 % too large 0.047."""
 _SIGNIFICANT = 2.0
@@ -39,7 +40,7 @@ _UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "T_left": "N", "
 
 
 @dataclass(frozen=True, kw_only=True)
-class MmgCoefficient:
+class MmgCoefficient(PrimeValue):
     """One coefficient of the method.
 
     Parameters
@@ -47,26 +48,16 @@ class MmgCoefficient:
     value, standard_error : float
         Hull: by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them.
     origin : str
-        ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open``: that of ordinary ships.
+        ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open`` (taken from ordinary ships).
     type_a : float
         Standard error by the scatter of the tests alone.
     type_b : dict
         Key of ``[uncertainty]`` to the standard error by it.
     """
 
-    value: float
-    standard_error: float
     origin: str
     type_a: float
     type_b: dict[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class YawArm:
-    """x_R' + a_H x_H', which tests show better than x_H' itself."""
-
-    value: float
-    standard_error: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +88,8 @@ class MmgStudy:
         File of the campaign, and name of the model.
     coefficients : dict
         By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot.
-    yaw_arm : YawArm
+    yaw_arm : PrimeValue
+        x_R' + a_H x_H', which tests show better than x_H' itself.
     rudder_angle_of_no_force_deg : float, optional
         Positive to starboard, straight ahead; None if the tests do not show it.
     channels : dict
@@ -115,7 +107,7 @@ class MmgStudy:
     campaign: str
     model: str
     coefficients: dict[str, MmgCoefficient]
-    yaw_arm: YawArm
+    yaw_arm: PrimeValue
     rudder_angle_of_no_force_deg: float | None
     channels: dict[str, ChannelFit]
     open_water_points: int
@@ -152,7 +144,7 @@ def study_mmg(fit: MmgFit) -> MmgStudy:
         campaign=str(tests.path),
         model=tests.form.model.name,
         coefficients=coefficients,
-        yaw_arm=YawArm(value=float(arm), standard_error=arm_error),
+        yaw_arm=PrimeValue(value=float(arm), standard_error=arm_error),
         rudder_angle_of_no_force_deg=-float(np.degrees(fit.value("rudder_offset"))) if offset else None,
         channels={
             name: ChannelFit(unit=_UNITS[name], standard_deviation=deviation, unexplained=unexplained[name])
@@ -200,7 +192,7 @@ def _significant(fit: MmgFit, name: str, sign: int) -> bool:
 
 
 def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[str]:
-    """Marks of a result that contradicts itself, or is not that of a ship."""
+    """Marks of a result that contradicts itself, or that no ship has."""
     found: list[str] = []
     for name, share in fit.curves_unexplained.items():
         if share > _CURVE_DOUBTFUL:
@@ -210,7 +202,7 @@ def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[str
             )
     if fit.at_limit:
         values = ", ".join(f"{name} = {fit.value(name):.3g}" for name in fit.at_limit)
-        found.append(f"{values} at the limit of what is looked for; the tests are not those of a ship there")
+        found.append(f"{values} at the limit of the search; no ship gives such tests")
     for name, (mean, deviation) in ORDINARY.items():
         value = coefficients[name].value
         if abs(value - mean) > _TOO_FAR * deviation:
@@ -229,7 +221,7 @@ def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[str
 
 
 def mmg_coefficients(fit: MmgFit) -> dict[str, MmgCoefficient]:
-    """Coefficients by the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot; with torque, those of K_Q (q_0,
+    """Coefficients by the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot; with torque, K_Q (q_0,
     q_1, q_2) and the relative rotative efficiency eta_R, too."""
     found = {}
     for place, name in enumerate(fit.names):
@@ -256,7 +248,7 @@ def mmg_card(fit: MmgFit) -> Card:
     Raises
     ------
     InputError
-        The coefficients are not those of a ship.
+        No ship has these coefficients.
     """
     values = {name: mean for name, (mean, _) in ORDINARY.items()} | dict(
         zip(fit.names, map(float, fit.values), strict=True)

@@ -164,7 +164,7 @@ def _added_mass(fit: TowFit) -> Iterator[str]:
         for name, factor in FOREIGN_UNITS.items()
         if USUAL_SHARES[0] <= (1 + share) * factor - 1 <= USUAL_SHARES[1]
     ]
-    likely = f"; it would be that of a body if {' or if '.join(units)}" if units else ""
+    likely = f"; it would fit a body if {' or if '.join(units)}" if units else ""
     yield (
         f"{CHECK} {fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
         f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."

@@ -21,7 +21,7 @@ TOW_PARAMETERS = {
 """Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
 
 DELAY = "delay"
-"""Unknown in addition to those of (1.5): time from t = 0 to the start of the body, s."""
+"""Unknown that (1.5) does not have: time from t = 0 to the start of the body, s."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,7 +46,7 @@ class TowFit:
         Condition number of the normal matrix, of (b_ij) in (1.12); and of that matrix with a diagonal of ones, which
         is free of the units.
     J : float
-        Of (1.6), N s^(1/2), with the polynomial speed of the tows.
+        J of (1.6), N s^(1/2), with the polynomial speed of the tows.
     largest_speed_error_mps : float
         Largest absolute difference of the integrated speed from the mean of the tows; infinite where it overflows.
     """
@@ -118,7 +118,7 @@ class TowSolution:
     design : array (rows, free unknowns)
         Design matrix; without a column for M if it was given.
     covariance : array (unknowns, unknowns), optional
-        Of the values; None where the method gives none.
+        Covariance of the values; None where the method gives none.
     """
 
     values: Array

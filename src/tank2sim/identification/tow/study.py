@@ -1,4 +1,4 @@
-"""Study of a towed body: its estimates, and those of other models from the same readings."""
+"""Study of a towed body: its estimates, and estimates by other models from the same readings."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class TowSpeeds:
 class TowStudy(TowIdentification):
     """Estimates from tows, with alternative models and their spread.
 
-    The other parameters are those of :class:`.TowIdentification`.
+    :class:`.TowIdentification` has the other parameters.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def known_added_inertia(result: YawIdentification, method: str) -> tuple[float, 
     found = result.added_inertia(method)
     if found is None:
         remedy = "give records in water, and in air or --inertia-kgm2"
-        raise InputError(source, "", "does not separate the added inertia from that of the body", remedy)
+        raise InputError(source, "", "does not separate the added inertia from the inertia of the body", remedy)
     if found[0] <= 0:
         raise InputError(source, "", "gives a negative added inertia, which no body has", "check J_zz and k_t")
     return found
@@ -108,7 +108,7 @@ def _replace_key(text: str, source: str, key: str, value: float, origin: str) ->
 
 
 def rig_card_text(result: YawIdentification, method: str, *, name: str, source: str, known: YawRig | None) -> str:
-    """TOML text of a rig card with the numbers of one method; the notes are those of the result.
+    """TOML text of a rig card with the numbers of one method; the notes come from the result.
 
     Raises
     ------

@@ -323,7 +323,7 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
     (stated,) = constants
     if stated is not None:
         return stated, []
-    taken = f"that of the published rig's motor, {TORQUE_CONSTANT_NMPA:g} N m/A, is taken."
+    taken = f"the published rig's {TORQUE_CONSTANT_NMPA:g} N m/A is taken."
     note = f"No record states the torque constant: {taken}"
     return TORQUE_CONSTANT_NMPA, [note]
 
@@ -360,6 +360,6 @@ def _lacking(body: BodyInertia) -> list[str]:
     if body.error_kgm2 is not None:
         return []
     return [
-        "J_zz has no standard error, and that of the added inertia does not include one: give --inertia-error-kgm2, "
-        "or a line '# inertia_error_kgm2: 0.0002'."
+        "J_zz has no standard error, and the error of the added inertia does not include one: give "
+        "--inertia-error-kgm2, or a line '# inertia_error_kgm2: 0.0002'."
     ]

@@ -139,7 +139,7 @@ class YawEstimates:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class YawStudy(YawEstimates):
-    """Estimates of a body; the other parameters are those of :class:`YawEstimates`.
+    """Estimates of a body; :class:`YawEstimates` has the other parameters.
 
     Parameters
     ----------
