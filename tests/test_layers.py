@@ -32,7 +32,7 @@ LAYERS: tuple[frozenset[str], ...] = (
 KNOWN_CIRCLES = (
     {"audit", "signals", "trial"},
     {
-        *("ship", "autopilot", "bridge", "craft_stability", "fmu", "glide", "influence"),
+        *("ship", "autopilot", "bridge", "fmu", "glide", "influence"),
         *("manoeuvre", "stability", "steering_page", "turn_tuning", "verbs", "bundled_ships"),
     },
 )

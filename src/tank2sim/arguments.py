@@ -193,10 +193,9 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
             except ArgumentError as fault:
                 faults.append(fault)
         raise next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
-    if (bounds := bounds_of(kind)) is not None and get_origin(kind) is Annotated:
-        return bounds.checked(name, value)
     if get_origin(kind) is Annotated:
-        return _as_kind(name, value, get_args(kind)[0])
+        bounds = bounds_of(kind)
+        return _as_kind(name, value, get_args(kind)[0]) if bounds is None else bounds.checked(name, value)
     origin, parts = get_origin(kind) or kind, get_args(kind)
     if origin is Literal:
         if not isinstance(value, str | int) or value not in parts:

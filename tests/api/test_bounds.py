@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import click
 import numpy as np
@@ -147,12 +148,14 @@ def test_a_function_is_checked_by_its_annotations() -> None:
         texts: Sequence[str] = (),
         numbers: Mapping[str, float] | None = None,
         path: str | Path = "",
+        output: Annotated[Path, "a file to write"] = Path(),
         unknown: NotThere | None = None,  # type: ignore[name-defined]  # noqa: F821
     ) -> tuple[object, ...]:
         return angle, speed, texts, numbers, path, unknown
 
     assert asked(5) == (5, None, (), None, "", None)
     assert asked(-360.0, speed=3, texts=["a"], numbers={"b": 1}, path=Path("c"), unknown=object())[:2] == (-360.0, 3)
+    assert asked(5, output=Path("d")) == asked(5)
     for wrong in (
         {"speed": 0},
         {"speed": "3"},
@@ -162,6 +165,7 @@ def test_a_function_is_checked_by_its_annotations() -> None:
         {"numbers": {1: 1}},
         {"numbers": []},
         {"path": 5},
+        {"output": 5},
     ):
         with pytest.raises(t2s.InputError) as caught:
             asked(5, **wrong)

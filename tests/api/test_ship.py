@@ -188,7 +188,7 @@ def test_an_fmu_passes_its_check(ship, tmp_path) -> None:
     made = ship.to_fmu(tmp_path / "m.fmu", fmi=3)
     assert made.path.stat().st_size == len(made.exported.content)
     found = t2s.check_fmu(tmp_path / "m.fmu")
-    assert found.passed and found.report.fmi == 3 and not found.problems
+    assert found.passed and found.study.fmi == 3 and not found.problems
 
 
 @pytest.mark.slow
@@ -197,7 +197,7 @@ def test_a_script_without_a_guard_may_use_processes(tmp_path) -> None:
     script.write_text(
         "import tank2sim as t2s\n"
         "print('once')\n"
-        "print(t2s.load('mariner').turn(35, duration_s=5.0, members=80).bands.asked.usable)\n"
+        "print(t2s.load('mariner').turn(35, duration_s=5.0, members=80).study.ensemble.usable)\n"
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=250, check=False)
     assert done.stdout == "once\n80\n", done.stderr

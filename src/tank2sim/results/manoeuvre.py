@@ -147,14 +147,14 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
             return (_pull_outs(study.figures, study.other_side.figures),)
         judged = [figure for figure in figures if figure.limit is not None]
         if failed := [figure.label.lower() for figure in judged if figure.verdict is Verdict.FAILED]:
-            return (f"Beyond the limit of IMO MSC.137(76): {' and '.join(failed)}.",)
+            return (f"These figures exceed their limits of IMO MSC.137(76): {', '.join(failed)}.",)
         if any(figure.verdict is Verdict.CAUTION for figure in judged):
             return (
                 "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76).",
             )
         if judged:
-            names = " and ".join(figure.label.lower() for figure in judged)
-            return (f"Within the limits of IMO MSC.137(76): {names}.",)
+            names = ", ".join(figure.label.lower() for figure in judged)
+            return (f"These figures are within the limits of IMO MSC.137(76): {names}.",)
         width = study.figures.get("loop_width_deg")
         if study.kind == "spiral" and isinstance(width, float):
             if width > 0:

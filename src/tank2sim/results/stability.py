@@ -156,7 +156,7 @@ class StabilityResult(Result[StabilityStudy]):
     def _criteria(self) -> list[str]:
         met = [criterion.passed for criterion in self.study.imo]
         if missed := [criterion.name for criterion in self.study.imo if criterion.passed is False]:
-            return [f"Not met of IMO MSC.137(76): {'; '.join(missed)}."]
+            return [f"These criteria of IMO MSC.137(76) are not met: {'; '.join(missed)}."]
         if all(met):
             return ["All criteria of IMO MSC.137(76) are met."]
         count = met.count(True)

@@ -78,7 +78,7 @@ def test_a_figure_linear_in_the_numbers_has_the_spread_of_the_covariance(tmp_pat
         # "total" terms of the Mariner's card: Yr and Nr contain m and m x_G already.
         slope = np.array([d["Nr"], -d["Yr"]])
         bands = named_bands(one, ["criterion_C"], EnsembleRequest(400, 3))
-        assert bands.deviations["criterion_C"] == pytest.approx(math.sqrt(slope @ cov @ slope), rel=0.1)
+        assert bands.figures["criterion_C"].standard_deviation == pytest.approx(math.sqrt(slope @ cov @ slope), rel=0.1)
 
 
 CURRENT = """

@@ -54,8 +54,8 @@ def test_a_ship_with_two_speeds_goes_at_the_one_it_comes_to() -> None:
 @pytest.mark.slow  # with the IMO manoeuvres
 def test_stability_marks_a_ship_with_two_speeds_in_its_first_line() -> None:
     result = Ship(card_with(HUMP)).stability(spirals=False)
-    assert result.headline[0].startswith("CHECK")
-    assert [one["stable"] for one in result.content()["steady_speeds"]] == [True, False, True]  # type: ignore[attr-defined]
+    assert repr(result).startswith("CHECK")
+    assert [one.stable for one in result.study.steady_speeds] == [True, False, True]
 
 
 @pytest.mark.slow
