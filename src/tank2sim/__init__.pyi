@@ -18,7 +18,6 @@ from .api.design import (
     design_trial as design_trial,
 )
 from .api.fmu import check_fmu as check_fmu
-from .api.gap import GapResult as GapResult
 from .api.gap import find_gap as find_gap
 from .api.guess import guess as guess
 from .api.identification import identify as identify
@@ -59,6 +58,7 @@ from .results.design import CampaignDesignResult as CampaignDesignResult
 from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
+from .results.gap import GapResult as GapResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
 from .results.identification import IdentificationResult as IdentificationResult

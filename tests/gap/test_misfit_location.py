@@ -39,7 +39,9 @@ def test_places_are_where_the_misfit_was_put_and_their_shares_are_of_all() -> No
     assert (first.trial, first.signal, second.trial, second.signal) == ("turn", "motion.u", "zigzag", "motion.v")
     assert first.t_start_s == pytest.approx(100.0, abs=6.0) and first.t_end_s == pytest.approx(200.0, abs=6.0)
     # 8^2 against 4^2 over 100 s each
-    assert first.share == pytest.approx(0.8, abs=0.03) and first.share + second.share == pytest.approx(1.0)
+    assert first.share_of_misfit == pytest.approx(
+        0.8, abs=0.03
+    ) and first.share_of_misfit + second.share_of_misfit == pytest.approx(1.0)
     assert len(places([of_velocities(replay), of_velocities(zigzag)], limit=1)) == 1
 
 
@@ -55,7 +57,7 @@ def test_a_track_is_a_place_while_it_is_left_and_not_for_staying_off() -> None:
     off = 0.4 * np.clip(TIME - 150.0, 0.0, 50.0)
     drifted = replace(replay, before={**replay.before, "motion.y": replay.before["motion.y"] + off})
     (place,) = places([drifted])
-    assert place.signal == "motion.y" and place.share == 1.0
+    assert place.signal == "motion.y" and place.share_of_misfit == 1.0
     assert place.t_start_s == pytest.approx(150.0, abs=8.0) and place.t_end_s == pytest.approx(200.0, abs=8.0)
 
 
@@ -94,7 +96,7 @@ def test_a_motion_that_ran_away_is_a_place() -> None:
     (place,) = places(
         [Passed(replay.name, False, TIME, NOISE, replay.measured, {**replay.before, "motion.r": lost}, replay.after)]
     )
-    assert place.signal == "motion.r" and place.share == 1.0
+    assert place.signal == "motion.r" and place.share_of_misfit == 1.0
     assert place.t_start_s == pytest.approx(250.0, abs=6.0) and place.t_end_s == TIME[-1]
 
 

@@ -24,7 +24,9 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 def study_values(study: object) -> dict[str, Any]:
     """Return a study as JSON values: names of fields are keys, lists for arrays, None for what is not finite."""
-    values: dict[str, Any] = plain_json(_adapter(type(study)).dump_python(study, mode="json", warnings="error"))
+    values: dict[str, Any] = plain_json(
+        _adapter(type(study)).dump_python(study, mode="json", by_alias=True, warnings="error")
+    )
     return values
 
 

@@ -21,6 +21,7 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
     "demo": ("results.demo:DemoResult",),
     "design": ("results.design:CampaignDesignResult", "results.design:TrialDesignResult"),
     "export": ("results.fmu:ExportResult",),
+    "gap": ("results.gap:GapResult", "results.gap_fleet:FleetResult"),
     "glide": ("results.glide:GlideResult",),
     "influence": (
         "results.influence:InfluenceResult",

@@ -5,7 +5,7 @@ Units are in the names of keys; what is not a finite number is null. A schema al
 
 from __future__ import annotations
 
-from typing import Any, NotRequired
+from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter
 from typing_extensions import TypedDict
@@ -36,70 +36,8 @@ class _Keys(_Part):
     schema: str
 
 
-class GapReplayKeys(_Part):
-    """A trial as measured and as simulated by the card given and by the card found, thinned to draw."""
-
-    trial: str
-    held_out: bool
-    measured: JsonColumns
-    before: JsonColumns
-    found: JsonColumns
-
-
-class MissingKeys(_Part):
-    """A missing force or a contradiction of records: points and means of bins over a state, means over time."""
-
-    equation: NotRequired[str]
-    quantity: NotRequired[str]
-    explaining: str
-    explained: dict[str, JsonNumber]
-    points: dict[str, list[str] | list[JsonNumber]]
-    means: JsonColumns
-    over_time: dict[str, list[str] | list[JsonNumber]]
-
-
-class RefittedKeys(_Part):
-    """A coefficient that was fitted together with the effects, and as the given card has it: prime or SI, rudder to
-    starboard."""
-
-    name: str
-    value: JsonNumber
-    standard_error: JsonNumber
-    before: JsonNumber
-    standard_error_before: JsonNumber
-
-
-class GapKeys(_Keys):
-    """The missing effect of a model."""
-
-    ship: str
-    verdict: str
-    effects: list[dict[str, Any]]
-    coefficients: list[RefittedKeys]
-    alternatives: list[str]
-    where: list[dict[str, Any]]
-    acting: list[dict[str, Any]]
-    equation: str
-    misfit: dict[str, Any]
-    could_hide: dict[str, dict[str, JsonNumber]]
-    could_hide_in_words: dict[str, str]
-    next_test: dict[str, Any] | None
-    rivals: list[dict[str, Any]]
-    trials: list[dict[str, Any]]
-    figures: list[dict[str, Any]]
-    agreement: dict[str, Any]
-    missing_force: MissingKeys | None
-    missing_signal: MissingKeys | None
-    replays: list[GapReplayKeys]
-    cautions: list[str]
-    notices: list[str]
-    files: NotRequired[list[str]]
-
-
-KEYS: dict[str, Any] = {
-    "gap": GapKeys,
-}
-"""Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
+KEYS: dict[str, Any] = {}
+"""Command to the keys of its JSON; ``report`` has none."""
 
 
 @checked

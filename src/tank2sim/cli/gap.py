@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.bounds import Count, Effects
 from tank2sim.api.gap import find_gap, gap_options
-from tank2sim.api.gap_files import folder_made, put, refuse_early
 from tank2sim.api.trial import trial_files
+from tank2sim.arguments import Count, Effects
 from tank2sim.bundled import bundled_cards
 from tank2sim.cli.console import json_option, screen, show_notices, show_result
 from tank2sim.cli.options import OutputFile, executor_option, number
@@ -17,6 +16,7 @@ from tank2sim.cli.progress import showing_stages
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.errors import InputError
 from tank2sim.gap.fleet.ships import GAP, HOLDOUT, ship_alone
+from tank2sim.gap.outcome.files import folder_made, put, refuse_early
 from tank2sim.gap.workflow import MOST_EFFECTS
 
 

@@ -10,17 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tank2sim.answer.page import render_page
-from tank2sim.api.gap import GapResult, misfit_text
-from tank2sim.api.gap_files import folder_made, put, refuse_early
-from tank2sim.api.result import screen_table
+from tank2sim.api.gap import gap_result
 from tank2sim.api.trial import fitted_and_held
 from tank2sim.cards import read_card
-from tank2sim.cli.console import screen, show_notices, show_table
+from tank2sim.cli.console import screen, show_notices, show_result
 from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
-from tank2sim.files import json_text, writable_folder, write_together
+from tank2sim.files import json_text, parsed_json, read_text, writable_folder, write_together
 from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
 from tank2sim.gap.fleet.search import (
     Fault,
@@ -30,12 +27,15 @@ from tank2sim.gap.fleet.search import (
     find_in_turn,
     nonlinear_card,
 )
-from tank2sim.gap.fleet.ships import Fleet, ShipFolder, fleet_in
-from tank2sim.gap.fleet.summary import FleetSummary, ShipSummary, ship_summary
+from tank2sim.gap.fleet.ships import GAP, Fleet, ShipFolder, fleet_in
+from tank2sim.gap.fleet.summary import FleetStudy, ShipSummary, fleet_study, ship_summary
 from tank2sim.gap.inference.fit_all import StageReport
+from tank2sim.gap.outcome.files import folder_made, put, refuse_early
+from tank2sim.gap.outcome.study import GapStudy
 from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions
-from tank2sim.report.gap.fleet_page import fleet_page
+from tank2sim.results.gap import GapResult
+from tank2sim.results.gap_fleet import FleetResult
 
 JSON, PAGE = "fleet.json", "fleet.html"
 
@@ -92,13 +92,13 @@ def run_fleet(request: FleetRequest) -> int:
         course = _course(fleet, request)
         _compute(course, request, progress)
         progress("writing the fleet's page")
-        summary = _summary(fleet, course, request.output)
-        text = json_text(summary.as_json())
-        files = {request.output / JSON: text, request.output / PAGE: render_page(fleet_page(summary))}
+        result = FleetResult(_study(fleet, course, request.output), linked=True)
+        text = result.to_json()
+        files = {request.output / JSON: text, request.output / PAGE: result.page()}
         files |= {request.json_file: text} if request.json_file else {}
         write_together(files, inputs=[path for ship in fleet.ships for path in ship.inputs], outputs=[*files])
-    _show(summary, course, request.output)
-    return 2 if summary.faults else 0
+    _show(result, course, request.output)
+    return 2 if course.faults else 0
 
 
 def _course(fleet: Fleet, request: FleetRequest) -> _Course:
@@ -168,7 +168,7 @@ def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | N
     folder = output / ship.folder.name
     record, why = course.wanted[ship.folder]
     try:
-        files, notices = GapResult(gap, ship.fitted, ship.held).files(folder)
+        files, notices = gap_result(gap, ship.fitted, ship.held).files(folder)
     except InputError as error:
         return Fault(str(error))
     except OSError:
@@ -184,34 +184,37 @@ def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | N
     return None
 
 
-def _summary(fleet: Fleet, course: _Course, output: Path) -> FleetSummary:
-    ships = [ship_summary(output / name) for name in course.done]
-    ships += [ShipSummary(name, fault=fault) for name, fault in course.faults.items()]
+def _study(fleet: Fleet, course: _Course, output: Path) -> FleetStudy:
+    ships = [ship_summary(name, _written(output / name)) for name in course.done]
+    ships += [ShipSummary(folder=name, fault=fault) for name, fault in course.faults.items()]
     notices = [f"{path}: holds neither card nor trial, and was passed over" for path in fleet.passed_over]
-    ordered = tuple(sorted(ships, key=lambda ship: ship.folder))
-    return FleetSummary(fleet.folder.resolve().name, ordered, tuple(notices))
+    return fleet_study(fleet.folder.resolve().name, ships, notices)
 
 
-def _show(summary: FleetSummary, course: _Course, output: Path) -> None:
-    rows: list[list[object]] = []
-    for ship in summary.ships:
-        names = " + ".join(str(effect["name"]) for effect in ship.effects) or "-"
-        misfits = ["-" if misfit is None else misfit_text(misfit) for misfit in ship.misfits()]
-        rows.append([ship.folder, ship.verdict or "no result", names, *misfits, course.done.get(ship.folder, "-")])
-    heads = ["ship", "verdict", "effect", "before", "after", "result"]
-    title = "Misfit in units of the noise (1 is noise), of trials held out where there are some"
-    show_table(screen_table(title, heads, rows, wide=True))
-    show_notices([*summary.notices, *course.notices, *_without_ship(summary, output)])
-    written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(summary.ships)} ships"
+def _written(folder: Path) -> GapStudy:
+    """The study of the ship with results in a folder; raises InputError if they were changed in the meantime."""
+    remedy = "let one run at a time write there, and run it again"
+    try:
+        return GapResult.read(parsed_json(read_text(folder / GAP), folder / GAP, remedy), str(folder / GAP)).study
+    except (InputError, AttributeError):  # the latter of JSON that is no object
+        raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None
+
+
+def _show(result: FleetResult, course: _Course, output: Path) -> None:
+    show_result(result)
+    for name, origin in sorted(course.done.items()):
+        screen.print(f"{name}: {origin}", soft_wrap=True, markup=False)
+    show_notices([*course.notices, *_without_ship(result.study, output)])
+    written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(result.study.ships)} ships"
     screen.print(written, soft_wrap=True, markup=False)
-    for fault in dict.fromkeys(fault.fault for fault in summary.faults):
-        names = ", ".join(ship.folder for ship in summary.faults if ship.fault == fault)
+    for fault in dict.fromkeys(course.faults[name] for name in sorted(course.faults)):
+        names = ", ".join(name for name in sorted(course.faults) if course.faults[name] == fault)
         print(f"tank2sim: {names}: {' '.join(fault.split())}", file=sys.stderr)
 
 
-def _without_ship(summary: FleetSummary, output: Path) -> list[str]:
+def _without_ship(study: FleetStudy, output: Path) -> list[str]:
     """Notices of results of ships that are no longer in the fleet."""
-    ships = {ship.folder for ship in summary.ships}
+    ships = {ship.folder for ship in study.ships}
     return [
         f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept"
         for path in sorted(output.glob(f"*/{RUN}"))

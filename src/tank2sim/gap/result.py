@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
@@ -93,10 +93,10 @@ class Refitted:
     """
 
     name: str
-    value: float
-    standard_error: float
-    before: float
-    standard_error_before: float
+    value: Number
+    standard_error: Number
+    before: Number
+    standard_error_before: Number
 
     @property
     def moved(self) -> float:
@@ -119,8 +119,8 @@ class Rival:
     """
 
     effects: tuple[str, ...]
-    loss: float
-    probability: float
+    loss: Unbounded
+    probability: Number
 
 
 @dataclass(frozen=True)
@@ -130,11 +130,11 @@ class MisfitPlace:
     Parameters
     ----------
     trial, signal : str
-        Trial's name; variable of the model (``motion.x``).
+        Trial's name and variable of the model (``motion.x``); in the study of a gap its file and column.
     t_start_s, t_end_s : float
         When, in the trial's own time, s.
-    share : float
-        Of the whole misfit (sum of squares of simulated less measured, in noise units, beyond the noise; of positions
+    share_of_misfit : float
+        Of the whole (sum of squares of simulated less measured, in noise units, beyond the noise; of positions
         and headings that of its growth).
     """
 
@@ -142,7 +142,7 @@ class MisfitPlace:
     signal: str
     t_start_s: float
     t_end_s: float
-    share: float
+    share_of_misfit: Number
 
 
 @dataclass(frozen=True)

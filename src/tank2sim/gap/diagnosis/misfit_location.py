@@ -83,7 +83,7 @@ def places(passed: Sequence[Passed], limit: int = 12) -> tuple[MisfitPlace, ...]
     ]
     whole = sum(excess for excess, _ in found)
     found.sort(key=lambda pair: -pair[0])
-    return tuple(replace(place, share=excess / whole) for excess, place in found[:limit])
+    return tuple(replace(place, share_of_misfit=excess / whole) for excess, place in found[:limit])
 
 
 def _misfit_runs(replay: Passed, signal: str) -> list[tuple[int, int, float]]:

@@ -1,140 +1,118 @@
-"""Results of a fleet, ship by ship, read from the results of each ship, of whatever run."""
+"""The study of a fleet: the findings of all its ships, of whatever run."""
 
 from __future__ import annotations
 
-import json
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass
 
-from tank2sim.errors import InputError
-from tank2sim.gap.fleet.ships import GAP, IMPROVED
+from tank2sim.gap.outcome.study import EffectFound, GapStudy, SetMisfit
 
 REPORT_FILE = "report.html"
-"""Page of a ship, next to it ``gap.json``."""
+"""Page of a ship, next to its ``gap.json``."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
+class BeforeAfter:
+    """Misfits by the card as given and by the card found."""
+
+    before: SetMisfit
+    after: SetMisfit
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialCounts:
+    """Numbers of fitting and held-out trials."""
+
+    fit: int
+    holdout: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class ShipSummary:
     """One ship of a fleet.
 
     Parameters
     ----------
     folder : str
-        Name of its folder, and of that of its results.
+        Name of its folder, and of the folder of its results.
+    fault : str
+        Reason why it has no result, in one line; other fields except `folder` are then empty.
     name : str
-        Name of the ship, as its card has it.
+        Name of the ship on its card.
     verdict : str
         One of :data:`.result.GAP_VERDICTS`.
-    effects : tuple of mappings
-        As in ``gap.json``: ``name``, ``parameters``, ``standard_errors``, ``confidence``; in the units of their names.
+    effects : tuple of EffectFound
     alternatives : tuple of str
         Explanations that its trials cannot distinguish from them.
-    misfit : mapping
-        ``before`` and ``after`` to {``fit``, ``holdout``}: units of the noise, None without such trials or where a
-        simulation exceeded all bounds.
-    trials : mapping
-        Numbers of trials, by ``fit`` and ``holdout``.
-    fault : str
-        Reason why it has no result, in one line; all fields except `folder` are then empty.
+    misfit : BeforeAfter or None
+    trials : TrialCounts or None
+    report : str
+        Path of its page from the folder of the fleet's results.
     """
 
     folder: str
+    fault: str = ""
     name: str = ""
     verdict: str = ""
-    effects: tuple[Mapping[str, Any], ...] = ()
+    effects: tuple[EffectFound, ...] = ()
     alternatives: tuple[str, ...] = ()
-    misfit: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
-    trials: Mapping[str, int] = field(default_factory=dict)
-    fault: str = ""
+    misfit: BeforeAfter | None = None
+    trials: TrialCounts | None = None
+    report: str = ""
 
     @property
-    def judged_by(self) -> str:
-        """``holdout``, or ``fit`` where no trial was held out."""
-        return "holdout" if self.trials.get("holdout") else "fit"
+    def held_out(self) -> bool:
+        """Whether held-out trials judge it; else the fitted ones do."""
+        return self.trials is not None and self.trials.holdout > 0
 
+    @property
     def misfits(self) -> tuple[float | None, float | None]:
-        """Misfit before and after of the trials by which it is judged."""
-        before, after = (self.misfit.get(version, {}).get(self.judged_by) for version in ("before", "after"))
-        return before, after
-
-    def as_json(self) -> dict[str, object]:
-        """In the form of ``fleet.json``."""
-        if self.fault:
-            return {"folder": self.folder, "fault": self.fault}
-        return {
-            "folder": self.folder,
-            "name": self.name,
-            "verdict": self.verdict,
-            "effects": list(self.effects),
-            "alternatives": list(self.alternatives),
-            "misfit": self.misfit,
-            "trials": self.trials,
-            "report": f"{self.folder}/{REPORT_FILE}",
-        }
+        """Misfit before and after of the trials that judge it."""
+        if self.misfit is None:
+            return None, None
+        before, after = self.misfit.before, self.misfit.after
+        return (before.holdout, after.holdout) if self.held_out else (before.fit, after.fit)
 
 
-@dataclass(frozen=True)
-class FleetSummary:
+@dataclass(frozen=True, kw_only=True)
+class FleetStudy:
     """All ships of a fleet.
 
     Parameters
     ----------
-    name : str
+    fleet : str
         Name of the folder.
+    verdicts : dict
+        Verdict to the number of ships that have it.
     ships : tuple of ShipSummary
         In the order of their folders' names, those with a fault among them.
     notices : tuple of str
     """
 
-    name: str
+    fleet: str
+    verdicts: dict[str, int]
     ships: tuple[ShipSummary, ...]
     notices: tuple[str, ...] = ()
 
-    @property
-    def verdicts(self) -> dict[str, int]:
-        """Verdict to the number of ships that have it."""
-        words = [ship.verdict for ship in self.ships if not ship.fault]
-        return {word: words.count(word) for word in sorted(set(words))}
 
-    @property
-    def faults(self) -> tuple[ShipSummary, ...]:
-        """The ships without a result."""
-        return tuple(ship for ship in self.ships if ship.fault)
-
-    def as_json(self) -> dict[str, object]:
-        """In the form of ``fleet.json``."""
-        return {
-            "fleet": self.name,
-            "verdicts": self.verdicts,
-            "ships": [ship.as_json() for ship in self.ships],
-            "notices": list(self.notices),
-        }
+def fleet_study(fleet: str, ships: Iterable[ShipSummary], notices: Iterable[str] = ()) -> FleetStudy:
+    """Return the study of the ships of a folder."""
+    ordered = tuple(sorted(ships, key=lambda ship: ship.folder))
+    words = [ship.verdict for ship in ordered if not ship.fault]
+    verdicts = {word: words.count(word) for word in sorted(set(words))}
+    return FleetStudy(fleet=fleet, verdicts=verdicts, ships=ordered, notices=tuple(notices))
 
 
-def ship_summary(folder: Path) -> ShipSummary:
-    """Summary of the ship whose results are in a folder.
-
-    Raises
-    ------
-    InputError
-        They were changed or taken away while this run went on.
-    """
-    try:
-        results = json.loads((folder / GAP).read_text(encoding="utf-8"))
-        card = tomllib.loads((folder / IMPROVED).read_text(encoding="utf-8-sig"))
-        held = [bool(trial["held_out"]) for trial in results["trials"]]
-        return ShipSummary(
-            folder=folder.name,
-            name=str(card["ship"]["name"]),
-            verdict=results["verdict"],
-            effects=tuple(results["effects"]),
-            alternatives=tuple(results["alternatives"]),
-            misfit={version: results["misfit"][version] for version in ("before", "after")},
-            trials={"fit": held.count(False), "holdout": held.count(True)},
-        )
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        remedy = "let one run at a time write there, and run it again"
-        raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None
+def ship_summary(folder: str, study: GapStudy) -> ShipSummary:
+    """Return the summary of a ship with results in the folder of this name."""
+    held = [trial.held_out for trial in study.trials]
+    return ShipSummary(
+        folder=folder,
+        name=study.ship,
+        verdict=study.verdict,
+        effects=study.effects,
+        alternatives=study.alternatives,
+        misfit=BeforeAfter(before=study.misfit.before, after=study.misfit.after),
+        trials=TrialCounts(fit=held.count(False), holdout=held.count(True)),
+        report=f"{folder}/{REPORT_FILE}",
+    )

@@ -1,23 +1,37 @@
-"""Results of the gap workflow as JSON, and its parameters in the units of cards and readers."""
+"""Study of a gap made from the results of the workflow, and parameters in the units of cards and readers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.files import plain_json
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
 from tank2sim.gap.inference.wave_band import WaveBand
-from tank2sim.gap.outcome.lacking import missing_as_json
+from tank2sim.gap.outcome.lacking import lacking_study
+from tank2sim.gap.outcome.study import (
+    ActingInterval,
+    DecidingTest,
+    EffectFound,
+    EffectSize,
+    GapFigure,
+    GapMisfit,
+    GapReplay,
+    GapStudy,
+    SetMisfit,
+    SignalNoise,
+    TrialEstimate,
+    TrialMisfit,
+    TrialSurroundings,
+    WaveMotion,
+)
 from tank2sim.gap.proof.cross_check import proof_cautions
-from tank2sim.gap.result import NO_EFFECT_MISSING, Gap, Named, NextTest, Passed, Refitted
-from tank2sim.identification.trials.assessment.evaluation import FigureComparison
+from tank2sim.gap.result import NO_EFFECT_MISSING, Acting, Gap, MisfitPlace, Named, NextTest, Passed
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import Indices, drawn_columns, thin_points
@@ -42,51 +56,44 @@ MANY_HIDDEN = 0.25
 choice: of varied manoeuvres a tenth does not show, of the first 50 s of one turn two fifths, of 10 s nearly all)."""
 
 
-def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """All results, in the form of ``gap.json``; angles in degrees, None for values that are not finite.
+def gap_study(gap: Gap, files: Mapping[str, str] | None = None) -> GapStudy:
+    """Return the study of a gap; angles in degrees.
 
     Parameters
     ----------
     gap : Gap
     files : mapping, optional
-        Name of a trial to that of its file; by default ``<name>.csv``, of the trial format.
+        Name of a trial to its file; by default ``<name>.csv``.
     """
     names = {replay.name: (files or {}).get(replay.name, f"{replay.name}.csv") for replay in gap.passed}
+    held_out = {replay.name for replay in gap.passed if replay.held_out}
     cautions = (*proof_cautions(gap), *hidden_effects_caution(gap))
-    found: dict[str, Any] = plain_json(
-        {
-            "ship": gap.card.ship.name,
-            "verdict": gap.verdict,
-            "effects": [
-                _effect(effect, {replay.name for replay in gap.passed if replay.held_out}) for effect in gap.effects
-            ],
-            "coefficients": [_coefficient(coefficient) for coefficient in gap.coefficients],
-            "alternatives": [joined(alternative) for alternative in gap.alternatives],
-            "where": _where(gap, names),
-            "acting": _acting(gap, names),
-            "equation": gap.equation,
-            "misfit": _misfit(gap),
-            "could_hide": {effect: _in_file(sizes) for effect, sizes in hidden(gap).items()},
-            "could_hide_in_words": {
-                effect: "; ".join(hidden_in_words(effect, name, size) for name, size in sizes.items())
-                for effect, sizes in hidden(gap).items()
-            },
-            "next_test": _next_test(gap.next_test),
-            "rivals": [
-                {"effects": list(rival.effects), "loss": _finite(rival.loss), "probability": _finite(rival.probability)}
-                for rival in gap.rivals
-            ],
-            "trials": [_trial(replay, names[replay.name]) for replay in gap.passed],
-            "figures": _figures(gap, names),
-            "agreement": _agreement(gap, names),
-            "missing_force": missing_as_json(missing_force_intervals(gap), names),
-            "missing_signal": missing_as_json(contradiction(gap), names),
-            "replays": [_replay(replay, names[replay.name]) for replay in gap.passed],
-            "cautions": list(cautions),
-            "notices": [*cautions, *gap.notices],
-        }
+    return GapStudy(
+        ship=gap.card.ship.name,
+        verdict=gap.verdict,
+        effects=tuple(_effect(effect, held_out) for effect in gap.effects),
+        coefficients=gap.coefficients,
+        alternatives=tuple(joined(alternative) for alternative in gap.alternatives),
+        where=tuple(_place(place, names) for place in gap.where),
+        acting=tuple(_interval(interval, names) for interval in acting(gap)[:_MOST_PASSAGES]),
+        equation=gap.equation,
+        misfit=_misfit(gap),
+        could_hide={effect: _in_file(sizes) for effect, sizes in hidden(gap).items()},
+        could_hide_in_words={
+            effect: "; ".join(hidden_in_words(effect, name, size) for name, size in sizes.items())
+            for effect, sizes in hidden(gap).items()
+        },
+        next_test=_next_test(gap.next_test) if gap.next_test else None,
+        rivals=gap.rivals,
+        trials=tuple(_trial(replay, names[replay.name]) for replay in gap.passed),
+        figures=_figures(gap, names),
+        agreement=_agreement(gap, names),
+        missing_force=lacking_study(missing_force_intervals(gap), names),
+        missing_signal=lacking_study(contradiction(gap), names),
+        replays=tuple(_replay(replay, names[replay.name]) for replay in gap.passed),
+        cautions=cautions,
+        notices=(*cautions, *gap.notices),
     )
-    return found
 
 
 def hidden(gap: Gap) -> dict[str, Mapping[str, float]]:
@@ -164,161 +171,137 @@ def measured_in(trial: Passed) -> tuple[str, ...]:
     return tuple(name for name in trial.noise if np.isfinite(trial.measured[name]).any())
 
 
-def paired_figures(gap: Gap) -> list[tuple[FigureComparison | None, FigureComparison]]:
-    """Each figure of a turn or zigzag, before (None if not found) and after; the same where no effect was added."""
-    old = {(figure.trial, figure.name): figure for figure in gap.figures_before}
-    return [(old.get((figure.trial, figure.name)), figure) for figure in gap.figures_after or gap.figures_before]
+def _place(place: MisfitPlace, names: Mapping[str, str]) -> MisfitPlace:
+    """A place with its file, its column and rounded times."""
+    return replace(
+        place,
+        trial=names.get(place.trial, f"{place.trial}.csv"),
+        signal=signal_display_name(place.signal).file,
+        t_start_s=_time(place.t_start_s),
+        t_end_s=_time(place.t_end_s),
+    )
 
 
-def _where(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
-    return [
-        {
-            "trial": names.get(place.trial, f"{place.trial}.csv"),
-            "signal": signal_display_name(place.signal).file,
-            "t_start_s": _time(place.t_start_s),
-            "t_end_s": _time(place.t_end_s),
-            "share_of_misfit": _finite(place.share),
-        }
-        for place in gap.where
-    ]
+def _interval(interval: Acting, names: Mapping[str, str]) -> ActingInterval:
+    return ActingInterval(
+        trial=names.get(interval.trial, f"{interval.trial}.csv"),
+        equation=interval.equation,
+        t_start_s=_time(interval.t_start_s),
+        t_end_s=_time(interval.t_end_s),
+        standard_errors=interval.size,
+        force_N=_finite(interval.force) if interval.equation in ("surge", "sway") else None,
+        moment_Nm=_finite(interval.force) if interval.equation == "yaw" else None,
+    )
 
 
-_FORCE_KEYS = {"surge": "force_N", "sway": "force_N", "yaw": "moment_Nm"}
-"""Key of the root mean square of what is missing in an equation."""
-
-
-def _acting(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
-    found: list[dict[str, object]] = []
-    for interval in acting(gap)[:_MOST_PASSAGES]:
-        force = {_FORCE_KEYS[interval.equation]: _finite(interval.force)} if interval.equation in _FORCE_KEYS else {}
-        found.append(
-            {
-                "trial": names.get(interval.trial, f"{interval.trial}.csv"),
-                "equation": interval.equation,
-                "t_start_s": _time(interval.t_start_s),
-                "t_end_s": _time(interval.t_end_s),
-                "standard_errors": _finite(interval.size),
-                **force,
-            }
+def _figures(gap: Gap, names: Mapping[str, str]) -> tuple[GapFigure, ...]:
+    """Each figure of a turn or zigzag before and after; the same where no effect was added."""
+    old = {(figure.trial, figure.name): figure.predicted for figure in gap.figures_before}
+    return tuple(
+        GapFigure(
+            trial=names.get(figure.trial, figure.trial),
+            figure=figure.name,
+            measured=figure.measured,
+            before=_finite(old.get((figure.trial, figure.name))),
+            after=_finite(figure.predicted),
         )
-    return found
+        for figure in gap.figures_after or gap.figures_before
+    )
 
 
-def _figures(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
-    return [
-        {
-            "trial": names.get(after.trial, after.trial),
-            "figure": after.name,
-            "measured": _finite(after.measured),
-            "before": _finite(before.predicted if before else None),
-            "after": _finite(after.predicted),
-        }
-        for before, after in paired_figures(gap)
-    ]
-
-
-def _effect(effect: Named, held_out: set[str]) -> dict[str, object]:
-    return {
-        "name": effect.name,
-        "parameters": _in_file(effect.parameters, estimate_in_file),
-        "standard_errors": _in_file(effect.standard_errors),
-        "confidence": _finite(effect.confidence),
-        "by_trial": _by_trial(effect, held_out),
-    }
-
-
-def _by_trial(effect: Named, held_out: set[str]) -> list[dict[str, object]]:
-    return [
-        {
-            "trial": trial,
-            "held_out": trial in held_out,
-            **_in_file({"speed_mps": found.speed_mps, "direction_rad": found.direction_rad}, estimate_in_file),
-            "standard_errors": _in_file(
-                {"speed_mps": found.speed_error_mps, "direction_rad": found.direction_error_rad}
-            ),
-        }
+def _effect(effect: Named, held_out: set[str]) -> EffectFound:
+    by_trial = [
+        TrialSurroundings(
+            trial=trial,
+            held_out=trial in held_out,
+            speed_mps=found.speed_mps,
+            direction_deg=estimate_in_file("direction_rad", found.direction_rad)[1],
+            speed_error_mps=found.speed_error_mps,
+            direction_error_deg=math.degrees(found.direction_error_rad),
+        )
         for trial, found in effect.by_trial.items()
     ]
-
-
-def _coefficient(coefficient: Refitted) -> dict[str, object]:
-    return {name: _finite(value) if isinstance(value, float) else value for name, value in asdict(coefficient).items()}
+    return EffectFound(
+        name=effect.name,
+        parameters=_in_file(effect.parameters, estimate_in_file),
+        standard_errors=_in_file(effect.standard_errors),
+        confidence=effect.confidence,
+        by_trial=tuple(by_trial),
+    )
 
 
 def _in_file(
     values: Mapping[str, float], convert: Callable[[str, float], tuple[str, float]] = in_file_units
-) -> dict[str, float | None]:
-    return {key: _finite(value) for key, value in (convert(*item) for item in values.items())}
+) -> dict[str, float]:
+    return dict(convert(*item) for item in values.items())
 
 
-def _misfit(gap: Gap) -> dict[str, object]:
-    noise = {}
-    for variable, (sigma, origin) in gap.noise.items():
-        name = signal_display_name(variable)
-        noise[name.file] = {"sigma": _finite(name.factor * sigma), "from": origin}
-    sets, alone = {"fit": False, "holdout": True}, gap.effect_alone
-    return {
-        "noise": noise,
-        "noise_floor": NOISE_FLOOR,
-        **({"in_waves": _waves(gap.waves)} if gap.waves else {}),
-        **{
-            version: {word: _finite(gap.misfit(version, held_out=held)) for word, held in sets.items()}
-            for version in ("before", "after", "black_box")
+def _misfit(gap: Gap) -> GapMisfit:
+    alone = {key: _finite(value) for key, value in gap.effect_alone.items()}
+
+    def of(version: str) -> SetMisfit:
+        fit, held = (_finite(gap.misfit(version, held_out=held_out)) for held_out in (False, True))
+        return SetMisfit(fit=fit, holdout=held)
+
+    return GapMisfit(
+        noise={
+            name.file: SignalNoise(sigma=name.factor * sigma, origin=origin)
+            for name, (sigma, origin) in ((signal_display_name(key), noise) for key, noise in gap.noise.items())
         },
-        **({"effect_alone": {key: _finite(value) for key, value in alone.items()}} if alone else {}),
-    }
+        before=of("before"),
+        after=of("after"),
+        black_box=of("black_box"),
+        in_waves=_waves(gap.waves) if gap.waves else None,
+        effect_alone=SetMisfit(fit=alone.get("fit"), holdout=alone.get("holdout")) if alone else None,
+        noise_floor=NOISE_FLOOR,
+    )
 
 
-def _waves(waves: WaveBand) -> dict[str, object]:
+def _waves(waves: WaveBand) -> WaveMotion:
     moved = {signal_display_name(variable): sigma for variable, sigma in waves.motion.items()}
-    return {
-        "period_s": _finite(waves.period_s),
-        "motion": {name.file: _finite(name.factor * sigma) for name, sigma in moved.items()},
-    }
+    return WaveMotion(period_s=waves.period_s, motion={name.file: name.factor * sigma for name, sigma in moved.items()})
 
 
-def _trial(replay: Passed, file: str) -> dict[str, object]:
+def _trial(replay: Passed, file: str) -> TrialMisfit:
     versions = ("before", "after", *(("black_box",) if replay.black_box else ()))
-    return {
-        "trial": file,
-        "held_out": replay.held_out,
-        "misfit": {version: _finite(replay.misfit(version)) for version in versions} if measured_in(replay) else {},
-        "signals": {
-            signal_display_name(variable).file: {
-                version: _finite(replay.misfit(version, variable)) for version in versions
-            }
-            for variable in measured_in(replay)
+    signals = measured_in(replay)
+    return TrialMisfit(
+        trial=file,
+        held_out=replay.held_out,
+        misfit={version: replay.misfit(version) for version in versions} if signals else {},
+        signals={
+            signal_display_name(variable).file: {version: replay.misfit(version, variable) for version in versions}
+            for variable in signals
         },
-    }
+    )
 
 
-def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, object]:
-    agreement: dict[str, object] = {}
+def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, dict[str, TrialEstimate]]:
+    agreement = {}
     for variable, trials in gap.agreement.items():
         effect, parameter = effect_parameter_name(variable)
         agreement[f"{effect}.{in_file_units(parameter, 0.0)[0]}"] = {
-            names.get(trial, trial): {
-                "value": _finite(estimate_in_file(parameter, value)[1]),
-                "standard_error": _finite(in_file_units(parameter, error)[1]),
-            }
+            names.get(trial, trial): TrialEstimate(
+                value=estimate_in_file(parameter, value)[1], standard_error=in_file_units(parameter, error)[1]
+            )
             for trial, (value, error) in trials.items()
         }
     return agreement
 
 
-def _replay(replay: Passed, file: str) -> dict[str, object]:
+def _replay(replay: Passed, file: str) -> GapReplay:
     """Columns of what was measured and of both simulations at the same instants, thinned to draw."""
     names = {variable: signal_display_name(variable) for variable in measured_in(replay)}
-    versions = {"measured": replay.measured, "before": replay.before, "found": replay.after}
     kept = _drawn_rows(replay)
-    return {"trial": file, "held_out": replay.held_out} | {
-        key: drawn_columns(
+    measured, before, found = (
+        drawn_columns(
             {"t_s": replay.time_s[kept]}
             | {name.file: name.factor * values[variable][kept] for variable, name in names.items()},
             len(kept),
         )
-        for key, values in versions.items()
-    }
+        for values in (replay.measured, replay.before, replay.after)
+    )
+    return GapReplay(trial=file, held_out=replay.held_out, measured=measured, before=before, found=found)
 
 
 def _drawn_rows(replay: Passed) -> Indices:
@@ -334,28 +317,24 @@ def _drawn_rows(replay: Passed) -> Indices:
     return kept
 
 
-def _next_test(test: NextTest | None) -> dict[str, object] | None:
-    if test is None:
-        return None
-    expected = {manoeuvre: _finite(score) for manoeuvre, score in test.expected.items()}
-    sizes = {
-        name: {"parameters": _in_file(values, estimate_in_file), "standard_errors": _in_file(errors)}
-        for name, (values, errors) in test.sizes.items()
-    }
-    return {
-        "manoeuvre": test.manoeuvre,
-        "orders": NEXT_TEST_FILE,
-        "heading_deg": round(math.degrees(test.heading_rad), 6),
-        "needs_instants": test.needs_instants,
-        "why": test.why,
-        "expected": expected,
-        "candidates": sizes,
-    }
+def _next_test(test: NextTest) -> DecidingTest:
+    return DecidingTest(
+        manoeuvre=test.manoeuvre,
+        orders=NEXT_TEST_FILE,
+        heading_deg=round(math.degrees(test.heading_rad), 6),
+        needs_instants=test.needs_instants,
+        why=test.why,
+        expected={name: score if math.isfinite(score) else math.nan for name, score in test.expected.items()},
+        candidates={
+            name: EffectSize(parameters=_in_file(values, estimate_in_file), standard_errors=_in_file(errors))
+            for name, (values, errors) in test.sizes.items()
+        },
+    )
 
 
-def _time(value: float) -> float | None:
+def _time(value: float) -> float:
     """To the microsecond, far below any sample's distance: adding up steps leaves errors in the last digits."""
-    return _finite(round(value, 6) + 0.0 if math.isfinite(value) else value)  # + 0.0 turns -0.0 into 0.0
+    return round(value, 6) + 0.0 if math.isfinite(value) else value  # + 0.0 turns -0.0 into 0.0
 
 
 def _finite(value: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""JSON of the missing force or signal: its points over a state, means of bins, and means over time."""
+"""Study of the missing force or signal: its points over a state, means of bins, and means over time."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tank2sim.arrays import Array, Columns
+from tank2sim.gap.outcome.study import MISSING_COLUMNS, STATE_COLUMNS, Lacking
 from tank2sim.gap.result import MissingForce, MissingSignal
 from tank2sim.records.thinning import drawn_columns, thin_points
 from tank2sim.units import from_si
@@ -24,55 +25,46 @@ PARTS_OVER_TIME = 90
 NORMAL = 1.959964
 """Half a 95 % interval in standard errors."""
 
-STATE_COLUMNS = {
-    "rudder": "rudder_deg",
-    "drift": "drift_deg",
-    "yaw rate": "yaw_rate_degps",
-    "speed": "speed_mps",
-    "heading": "heading_deg",
-}
-"""State that explains a force to its name with the unit in the JSON."""
-
-MISSING_COLUMNS = {"X": "force_N", "Y": "force_N", "N": "moment_Nm", "turning": "rate_degps"} | dict.fromkeys(
-    ("north", "east", "ahead", "starboard"), "velocity_mps"
-)
-"""Equation or quantity to the name of what is missing with the unit in the JSON."""
-
 _TURN = 2 * math.pi
 
 
-def missing_as_json(lacking: MissingForce | MissingSignal | None, files: Mapping[str, str]) -> dict[str, object] | None:
-    """``missing_force`` or ``missing_signal`` of ``gap.json``; None if nothing is missing.
+def lacking_study(lacking: MissingForce | MissingSignal | None, files: Mapping[str, str]) -> Lacking | None:
+    """Return ``missing_force`` or ``missing_signal`` of ``gap.json``; None if nothing is missing.
 
     Parameters
     ----------
     lacking : MissingForce, MissingSignal or None
-        ``heading`` is given from 0 to 360 deg; rows with an unknown state or value are left out of ``points`` and
-        ``means``.
+        Headings become 0 to 360 deg; rows with an unknown state or value are left out of ``points`` and ``means``.
     files : mapping
-        Name of a trial to that of its file; by default ``<name>.csv``.
+        Name of a trial to its file; by default ``<name>.csv``.
     """
     if lacking is None:
         return None
-    if isinstance(lacking, MissingForce):
-        key, name, values = "equation", lacking.equation, lacking.force
-    else:
-        key, name, values = "quantity", lacking.quantity, lacking.values
-    over, what = STATE_COLUMNS[lacking.explaining], MISSING_COLUMNS[name]
+    equation = lacking.equation if isinstance(lacking, MissingForce) else None
+    quantity = lacking.quantity if isinstance(lacking, MissingSignal) else None
+    values = lacking.force if isinstance(lacking, MissingForce) else lacking.values
+    over, what = STATE_COLUMNS[lacking.explaining], MISSING_COLUMNS[equation or quantity or ""]
     state = lacking.states[lacking.explaining]
     state = from_si(over, 1.0) * (np.mod(state, _TURN) if lacking.explaining == "heading" else state)
     values = from_si(what, 1.0) * values
-    trials = np.array([files.get(trial, f"{trial}.csv") for trial in lacking.trials], dtype=object)
+    trials = np.array(lacking.trials, dtype=object)
     known = np.flatnonzero(np.isfinite(state) & np.isfinite(values))
     kept = known[thin_points([state[known], values[known]], FORCE_POINTS)]
-    return {
-        key: name,
-        "explaining": lacking.explaining,
-        "explained": dict(lacking.explained),
-        "points": {"trial": trials[kept].tolist(), **_columns({over: state[kept], what: values[kept]})},
-        "means": _columns(means_of_bins(state[known], values[known], trials[known], over=over, what=what)),
-        "over_time": _over_time(lacking.time_s, values, trials, what),
-    }
+    points, over_time = {}, {}
+    for trial in dict.fromkeys(lacking.trials):
+        file, rows = files.get(trial, f"{trial}.csv"), trials == trial
+        shown = kept[rows[kept]]
+        points[file] = _columns({over: state[shown], what: values[shown]})
+        over_time[file] = _over_time(lacking.time_s[rows], values[rows], what)
+    return Lacking(
+        equation=equation,
+        quantity=quantity,
+        explaining=lacking.explaining,
+        explained=dict(lacking.explained),
+        points=points,
+        means=_columns(means_of_bins(state[known], values[known], trials[known], over=over, what=what)),
+        over_time=over_time,
+    )
 
 
 def means_of_bins(
@@ -99,17 +91,12 @@ def means_of_bins(
     return dict(zip((over, what, "low_95", "high_95", "trials"), np.array(rows).reshape(-1, 5).T, strict=True))
 
 
-def _over_time(time_s: Array, values: Array, trials: np.ndarray, what: str) -> dict[str, object]:
-    """Means over parts of equal length of each trial."""
-    names: list[str] = []
-    rows: list[tuple[float, ...]] = []
-    for trial in dict.fromkeys(trials.tolist()):
-        known = np.flatnonzero((trials == trial) & np.isfinite(values))
-        for part in np.array_split(known, min(PARTS_OVER_TIME, len(known))) if len(known) else ():
-            names.append(trial)
-            rows.append((time_s[part[0]], time_s[min(part[-1] + 1, known[-1])], float(values[part].mean())))
-    columns = zip(("t_start_s", "t_end_s", what), np.array(rows).reshape(-1, 3).T, strict=True)
-    return {"trial": names, **_columns(dict(columns))}
+def _over_time(time_s: Array, values: Array, what: str) -> Columns:
+    """Means of a trial's values over parts of equal length."""
+    known = np.flatnonzero(np.isfinite(values))
+    parts = np.array_split(known, min(PARTS_OVER_TIME, len(known))) if len(known) else []
+    rows = [(time_s[part[0]], time_s[min(part[-1] + 1, known[-1])], float(values[part].mean())) for part in parts]
+    return _columns(dict(zip(("t_start_s", "t_end_s", what), np.array(rows).reshape(-1, 3).T, strict=True)))
 
 
 def _columns(columns: dict[str, Array]) -> Columns:

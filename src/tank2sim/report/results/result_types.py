@@ -36,15 +36,7 @@ class ResultType:
     note: str = ""
 
 
-_GAP_NOTE = (
-    "This gap.json of an older version has no tracks and time histories: they are in report.html, which tank2sim gap "
-    "wrote next to it."
-)
-
-RESULT_TYPES = (
-    ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
-    ResultType("Fleet", "gap", ("fleet", "ships"), ()),
-)
+RESULT_TYPES: tuple[ResultType, ...] = ()
 """The results that are known, those with more particular keys first."""
 
 

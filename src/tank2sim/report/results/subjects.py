@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Section
-from tank2sim.report.gap.fleet_page import fleet_page_of_json
-from tank2sim.report.gap.page import gap_page
 from tank2sim.report.json_values import Json
 
 
@@ -34,16 +32,7 @@ _WAY = ("ahead_m", "starboard_m")
 
 _SECTIONS: Mapping[str, _Sections] = {}
 
-_PAGES: Mapping[str, _Page] = {
-    "The missing effect": _Page(
-        gap_page,
-        {"ship": str, "verdict": str, "effects": list, "alternatives": list, "where": list, "acting": list}
-        | {"equation": str, "misfit": dict, "could_hide": dict, "next_test": dict, "rivals": list, "trials": list}
-        | {"figures": list, "agreement": dict, "missing_force": dict, "missing_signal": dict, "replays": list}
-        | {"cautions": list, "notices": list},
-    ),
-    "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
-}
+_PAGES: Mapping[str, _Page] = {}
 """Subjects whose whole page is made of their JSON."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import altair as alt
@@ -23,10 +23,10 @@ from tank2sim.answer.charts.parts import (
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
 from tank2sim.gap.outcome.export import joined
-from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
-from tank2sim.report.gap.charts import SETS, small
-from tank2sim.report.gap.text import as_percent, or_nan, trial_name
-from tank2sim.report.json_values import Json, as_number
+from tank2sim.gap.outcome.lacking import NORMAL
+from tank2sim.gap.outcome.study import DecidingTest, GapStudy, Lacking, TrialEstimate
+from tank2sim.results.gap_charts import SETS, small
+from tank2sim.results.gap_text import as_percent, trial_name
 from tank2sim.units import in_words
 
 MOST_RIVALS = 12
@@ -49,41 +49,40 @@ _MISSING = {
 
 
 class _Missing(NamedTuple):
-    """What is missing: key of its values in the JSON, words, the shown unit, and what values are divided by."""
+    """What is missing: its words, the shown unit, and what values are divided by."""
 
-    key: str
     words: str
     unit: str
     scale: float
 
 
-def _missing(lacking: Json) -> _Missing:
-    name = lacking["equation"] if "equation" in lacking else lacking["quantity"]
-    key, (words, unit) = MISSING_COLUMNS[name], _MISSING[name]
+def _missing(lacking: Lacking) -> _Missing:
+    words, unit = _MISSING[lacking.name]
     if not unit.startswith("N"):
-        return _Missing(key, words, unit, 1.0)
-    prefix, scale = _prefix(np.array(lacking["points"][key], dtype=float))
-    return _Missing(key, words, prefix + unit, scale)
+        return _Missing(words, unit, 1.0)
+    prefix, scale = _prefix(np.concatenate([columns[lacking.value_column] for columns in lacking.points.values()]))
+    return _Missing(words, prefix + unit, scale)
 
 
-def lacking_chart(lacking: Json, *, title: str = "") -> alt.HConcatChart:
+def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
     """The missing force or signal over the state that explains most of it, and how much of it each state explains.
 
     Points are single instants of all trials, thinned. Squares are means of bins; their bars are 95 % by the spread
     between the trials in the bin, for instants of one trial do not err independently.
     """
-    state = STATE_COLUMNS[lacking["explaining"]]
-    words = _STATE_WORDS.get(lacking["explaining"], lacking["explaining"])
-    what, points, means = _missing(lacking), lacking["points"], lacking["means"]
+    state, value = lacking.state_column, lacking.value_column
+    words = _STATE_WORDS.get(lacking.explaining, lacking.explaining)
+    what, means = _missing(lacking), lacking.means
     cloud_rows: list[ChartRecord] = [
-        {"s": plain(over), "f": plain(value / what.scale), "trial": trial_name(trial)}
-        for trial, over, value in zip(points["trial"], points[state], points[what.key], strict=True)
+        {"s": plain(over), "f": plain(size / what.scale), "trial": trial_name(trial)}
+        for trial, points in lacking.points.items()
+        for over, size in zip(points[state], points[value], strict=True)
     ]
     mean_rows: list[ChartRecord] = [
         {"s": plain(over), "trials": int(trials)}
-        | {key: plain(or_nan(value) / what.scale) for key, value in zip(("f", "low", "high"), values, strict=True)}
-        for over, trials, *values in zip(
-            *(means[key] for key in (state, "trials", what.key, "low_95", "high_95")), strict=True
+        | {key: plain(size / what.scale) for key, size in zip(("f", "low", "high"), sizes, strict=True)}
+        for over, trials, *sizes in zip(
+            *(means[key] for key in (state, "trials", value, "low_95", "high_95")), strict=True
         )
     ]
     across, up = with_unit(words, in_words(state)[1]), with_unit(f"missing {what.words}", what.unit)
@@ -106,14 +105,15 @@ def lacking_chart(lacking: Json, *, title: str = "") -> alt.HConcatChart:
     )
 
 
-def when_chart(lacking: Json, *, title: str = "") -> alt.LayerChart:
+def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
     """What is missing over time, a strip a trial: the colour is its size to either side."""
-    what, parts = _missing(lacking), lacking["over_time"]
-    names = list(dict.fromkeys(map(trial_name, parts["trial"])))
+    what = _missing(lacking)
+    names = [trial_name(trial) for trial in lacking.over_time]
     rows: list[ChartRecord] = [
         {"trial": trial_name(trial), "f": plain(value / what.scale), "t": plain(begin), "to": plain(end)}
-        for trial, begin, end, value in zip(
-            *(parts[key] for key in ("trial", "t_start_s", "t_end_s", what.key)), strict=True
+        for trial, parts in lacking.over_time.items()
+        for begin, end, value in zip(
+            *(parts[key] for key in ("t_start_s", "t_end_s", lacking.value_column)), strict=True
         )
     ]
     largest = float(np.quantile(np.abs([row["f"] or 0.0 for row in rows]), 0.98)) or 1.0 if rows else 1.0
@@ -156,10 +156,10 @@ def _means(rows: Sequence[ChartRecord], across: str, up: str) -> list[alt.Chart]
     ]
 
 
-def _explained(lacking: Json) -> alt.LayerChart:
+def _explained(lacking: Lacking) -> alt.LayerChart:
     rows: list[ChartRecord] = [
         {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
-        for name, share in sorted(lacking["explained"].items(), key=lambda item: -item[1])
+        for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
     ]
     return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
 
@@ -187,17 +187,17 @@ def _bars(
     return alt.layer(bars, texts).properties(width=width, height=(10 + 12 * lines) * max(1, len(rows)))
 
 
-def rival_chart(found: Json, *, title: str = "") -> alt.LayerChart | None:
+def rival_chart(study: GapStudy, *, title: str = "") -> alt.LayerChart | None:
     """Explanations that were compared, with their loss of score to the best; None without any."""
-    ranked = sorted(found["rivals"], key=lambda rival: as_number(rival["loss"]))
-    shown, none = ranked[:MOST_RIVALS], [rival for rival in ranked[MOST_RIVALS:] if not rival["effects"]]
+    ranked = sorted(study.rivals, key=lambda rival: rival.loss)
+    shown, none = ranked[:MOST_RIVALS], [rival for rival in ranked[MOST_RIVALS:] if not rival.effects]
     if not shown:
         return None
     rows: list[ChartRecord] = [
         {
-            "name": joined(rival["effects"]).replace("_", " ") if rival["effects"] else "none (the card as it is)",
-            "v": plain(as_number(rival["loss"])),
-            "text": f"{format_number(as_number(rival['loss']), 3)}  ({as_percent(rival['probability'])})",
+            "name": joined(rival.effects).replace("_", " ") if rival.effects else "none (the card as it is)",
+            "v": plain(rival.loss),
+            "text": f"{format_number(rival.loss, 3)}  ({as_percent(rival.probability)})",
         }
         for rival in (*shown, *none)
     ]
@@ -211,14 +211,14 @@ def rival_chart(found: Json, *, title: str = "") -> alt.LayerChart | None:
 
 _COMPARED = (
     "A longer bar explains the data less well; the best has 0. In brackets: probability that the explanation is right "
-    "as a whole, no more and no less being missing. An effect's own probability is the sum over all that contain it."
+    "as a whole, with nothing more and nothing less missing. The probability of an effect is the sum over all "
+    "explanations that contain it."
 )
 
 
-def expected_chart(test: Json, *, title: str = "") -> alt.LayerChart | None:
+def expected_chart(test: DecidingTest, *, title: str = "") -> alt.LayerChart | None:
     """How far apart the explanations would be in each manoeuvre that was considered; None without any."""
-    scores = {name: or_nan(score) for name, score in test["expected"].items()}
-    best = sorted(scores.items(), key=lambda item: -item[1])[:MOST_RIVALS]
+    best = sorted(test.expected.items(), key=lambda item: -item[1])[:MOST_RIVALS]
     sizes = [(name, math.sqrt(max(score, 0.0))) for name, score in best]  # of a score: a difference in noise units
     rows: list[ChartRecord] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
     if not rows:
@@ -227,14 +227,14 @@ def expected_chart(test: Json, *, title: str = "") -> alt.LayerChart | None:
     return chart.properties(title=title, description="Expected difference in each manoeuvre.")
 
 
-def agreement_chart(found: Json, *, title: str = "") -> alt.HConcatChart | None:
+def agreement_chart(study: GapStudy, *, title: str = "") -> alt.HConcatChart | None:
     """What each trial alone would have each parameter of the effect, with 95 % intervals; None without any.
 
     The grey band is the 95 % interval of all fitting trials together.
     """
     panels = [
-        _agreement_panel(found, name, trials, named=not place)
-        for place, (name, trials) in enumerate(item for item in found["agreement"].items() if item[1])
+        _agreement_panel(study, name, trials, named=not place)
+        for place, (name, trials) in enumerate(item for item in study.agreement.items() if item[1])
     ]
     if not panels:
         return None
@@ -246,17 +246,15 @@ def agreement_chart(found: Json, *, title: str = "") -> alt.HConcatChart | None:
     )
 
 
-def _agreement_panel(found: Json, name: str, trials: Json, *, named: bool) -> alt.LayerChart:
+def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstimate], *, named: bool) -> alt.LayerChart:
     effect, _, parameter = name.rpartition(".")
     words, unit = in_words(parameter)
-    whole = next(
-        (entry for entry in found["effects"] if entry["name"] == effect and parameter in entry["parameters"]), None
-    )
-    middle = or_nan(whole["parameters"][parameter]) if whole else None
-    held = {trial["trial"]: trial["held_out"] for trial in found["trials"]}
+    whole = next((entry for entry in study.effects if entry.name == effect and parameter in entry.parameters), None)
+    middle = whole.parameters[parameter] if whole else None
+    held = {trial.trial: trial.held_out for trial in study.trials}
     rows: list[ChartRecord] = []
     for trial, alone in trials.items():
-        estimate, half = or_nan(alone["value"]), NORMAL * or_nan(alone["standard_error"])
+        estimate, half = alone.value, NORMAL * alone.standard_error
         if parameter == "direction_deg" and middle is not None:
             estimate += 360.0 * round((middle - estimate) / 360.0)
         word = next(word for word, value in SETS.items() if value == held.get(trial, False))
@@ -264,7 +262,7 @@ def _agreement_panel(found: Json, name: str, trials: Json, *, named: bool) -> al
             {"name": trial_name(trial), "run": word}
             | {"v": plain(estimate), "low": plain(estimate - half), "high": plain(estimate + half)}
         )
-    band = NORMAL * or_nan(whole["standard_errors"].get(parameter, 0.0)) if whole else 0.0
+    band = NORMAL * whole.standard_errors.get(parameter, 0.0) if whole else 0.0
     messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
     least = min((row["high"] - row["low"] for row in messages), default=0.0)
     informative = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import altair as alt
 import numpy as np
@@ -21,20 +22,18 @@ from tank2sim.answer.charts.parts import (
     series_look,
     with_unit,
 )
-from tank2sim.arrays import Array
+from tank2sim.gap.outcome.study import GapReplay, GapStudy, TrialMisfit
+from tank2sim.gap.result import MisfitPlace
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
-from tank2sim.identification.trials.study import TrialMotions
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_points
-from tank2sim.report.gap.text import or_nan, trial_name
-from tank2sim.report.json_values import Json, as_number
+from tank2sim.results.gap_text import trial_name
 from tank2sim.results.trial_charts import (
     AFTER,
     BEFORE,
     MEASURED,
     MODEL_SERIES,
     PANELS_PER_ROW,
-    SERIES,
     history_grid,
     track_grid,
 )
@@ -78,88 +77,76 @@ def signal_of(column: str) -> SignalName:
     return SignalName(to_si(column, 1.0)[0])
 
 
-def changes_simulation(found: Json) -> bool:
+def changes_simulation(study: GapStudy) -> bool:
     """Whether anything was added to the card, or found in the records, that changes a simulation."""
-    return any(replay["before"] != replay["found"] for replay in found["replays"])
+    return any(
+        not np.array_equal(values, replay.found[name], equal_nan=True)
+        for replay in study.replays
+        for name, values in replay.before.items()
+    )
 
 
-def shown_models(found: Json) -> tuple[str, ...]:
+def shown_models(study: GapStudy) -> tuple[str, ...]:
     """Which simulations differ: before alone where nothing was added."""
-    return ("before", "after") if changes_simulation(found) else ("before",)
+    return ("before", "after") if changes_simulation(study) else ("before",)
 
 
-def gap_tracks(found: Json, *, held_out: bool, title: str = "") -> alt.ConcatChart | None:
+def gap_tracks(study: GapStudy, *, held_out: bool, title: str = "") -> alt.ConcatChart | None:
     """Tracks as measured, by the card before and by the card found, a panel a trial; None without any.
 
-    Of many trials those are shown whose misfit before was largest.
+    Of many trials those with the largest misfit before are shown.
     """
-    return track_grid(_worst(found, lambda trial: trial["held_out"] == held_out), title=title)
+    return track_grid(_worst(study, lambda trial: trial.held_out == held_out), title=title)
 
 
-def worst_tracks(found: Json, *, title: str = "") -> alt.ConcatChart | None:
-    """Tracks of the few trials whose misfit before was largest, those held out where there are any; None without."""
-    held_out = any(trial["held_out"] for trial in found["trials"])
-    return track_grid(_worst(found, lambda trial: trial["held_out"] == held_out, FEW_TRIALS), title=title)
+def worst_tracks(study: GapStudy, *, title: str = "") -> alt.ConcatChart | None:
+    """Tracks of the few trials with the largest misfit before, held-out ones where there are any; None without."""
+    held_out = any(trial.held_out for trial in study.trials)
+    return track_grid(_worst(study, lambda trial: trial.held_out == held_out, FEW_TRIALS), title=title)
 
 
-def gap_histories(found: Json, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
+def gap_histories(study: GapStudy, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
     """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
 
-    Of many trials those are shown whose misfit before was largest.
+    Of many trials those with the largest misfit before are shown.
     """
-    columns = _worst(
-        found, lambda trial: trial["held_out"] == held_out and not HISTORIES.keys().isdisjoint(trial["signals"])
-    )
+    columns = _worst(study, lambda trial: trial.held_out == held_out and not HISTORIES.keys().isdisjoint(trial.signals))
     sheets = [columns[first : first + _PER_SHEET] for first in range(0, len(columns), _PER_SHEET)]
     return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
 
 
-def _worst(found: Json, chosen: Callable[[Json], bool], most: int = MOST_TRIALS_DRAWN) -> list[TrialMotions]:
-    """Replays of the chosen trials, of many those whose misfit before was largest, by the names of the trials."""
-    misfits = {
-        place: as_number(trial["misfit"].get("before")) for place, trial in enumerate(found["trials"]) if chosen(trial)
-    }
+def _worst(study: GapStudy, chosen: Callable[[TrialMisfit], bool], most: int = MOST_TRIALS_DRAWN) -> list[GapReplay]:
+    """Replays of the chosen trials with the largest misfits before, in the order of the trials."""
+    misfits = {place: trial.misfit.get("before", np.inf) for place, trial in enumerate(study.trials) if chosen(trial)}
     worst = sorted(misfits, key=lambda place: -misfits[place])[:most]
-    return [_motions(found["replays"][place]) for place in sorted(worst)]
+    replays = [study.replays[place] for place in sorted(worst)]
+    return [replace(replay, trial=trial_name(replay.trial)) for replay in replays]
 
 
-def _motions(replay: Json) -> TrialMotions:
-    """A replay of the JSON."""
-    series = {
-        key: {name: np.array(values, dtype=float) for name, values in replay[key].items()} for key in SERIES.values()
-    }
-    return TrialMotions(trial=trial_name(replay["trial"]), **series)
-
-
-def shown_places(found: Json) -> list[Json]:
-    """The worst places, one of each signal of a trial; where none were found, the signals of the largest misfit.
-
-    Each has the keys of an entry of ``where``.
-    """
-    signals = {trial["trial"]: trial["signals"] for trial in found["trials"]}
-    places = [place for place in found["where"] if place["signal"] in signals.get(place["trial"], ())]
+def shown_places(study: GapStudy) -> list[MisfitPlace]:
+    """The worst places, one of each signal of a trial; where none were found, the signals of the largest misfit."""
+    signals = {trial.trial: trial.signals for trial in study.trials}
+    places = [place for place in study.where if place.signal in signals.get(place.trial, ())]
     if not places:
-        times = {replay["trial"]: replay["measured"]["t_s"] for replay in found["replays"]}
+        times = {replay.trial: replay.measured["t_s"] for replay in study.replays}
         whole = [
-            {"trial": trial, "signal": name, "t_start_s": times[trial][0], "t_end_s": times[trial][-1]}
+            MisfitPlace(trial, name, float(times[trial][0]), float(times[trial][-1]), np.nan)
             for trial, names in signals.items()
             for name in names
         ]
-        places = sorted(whole, key=lambda place: -as_number(signals[place["trial"]][place["signal"]]["before"]))
-    first = {(place["trial"], place["signal"]): place for place in reversed(places)}
+        places = sorted(whole, key=lambda place: -signals[place.trial][place.signal]["before"])
+    first = {(place.trial, place.signal): place for place in reversed(places)}
     return sorted(first.values(), key=places.index)[:MOST_PLACES]
 
 
-def place_chart(found: Json, *, title: str = "") -> alt.ConcatChart | None:
+def place_chart(study: GapStudy, *, title: str = "") -> alt.ConcatChart | None:
     """Signals over time where the misfit is worst, above; simulated less measured and the band of the noise, below.
 
     The shaded time is that of the place. None without any measurement.
     """
-    replays = {replay["trial"]: replay for replay in found["replays"]}
-    noise = found["misfit"]["noise"]
-    panels = [
-        _place_panels(replays[place["trial"]], place, noise[place["signal"]]["sigma"]) for place in shown_places(found)
-    ]
+    replays = {replay.trial: replay for replay in study.replays}
+    noise = study.misfit.noise
+    panels = [_place_panels(replays[place.trial], place, noise[place.signal].sigma) for place in shown_places(study)]
     if not panels:
         return None
     grid = alt.concat(*panels, columns=PANELS_PER_ROW, spacing=26, params=switch(list(MODEL_SERIES)))
@@ -170,13 +157,10 @@ def place_chart(found: Json, *, title: str = "") -> alt.ConcatChart | None:
     )
 
 
-def _place_panels(replay: Json, place: Json, sigma: float) -> alt.VConcatChart:
-    name, look = signal_of(place["signal"]), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
-    time_s, measured, before, found = (
-        np.array(replay[key][column], dtype=float)
-        for key, column in (("measured", "t_s"), *((key, name.file) for key in SERIES.values()))
-    )
-    models = {BEFORE: before, AFTER: found}
+def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> alt.VConcatChart:
+    name, look = signal_of(place.signal), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
+    time_s, measured = replay.measured["t_s"], replay.measured[name.file]
+    models = {BEFORE: replay.before[name.file], AFTER: replay.found[name.file]}
     known = np.flatnonzero(np.isfinite(measured))
     points = known[thin_points([measured[known]], SHOWN_POINTS)]
     rows = records(MEASURED, {"t": time_s[points], "v": measured[points]})
@@ -193,7 +177,7 @@ def _place_panels(replay: Json, place: Json, sigma: float) -> alt.VConcatChart:
         residuals, times, with_unit("simulated − measured", name.unit), look, labelled=True, included=(-band, band)
     )
     noise = Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
-    begin, end = or_nan(place["t_start_s"]), or_nan(place["t_end_s"])
+    begin, end = place.t_start_s, place.t_end_s
     spans = Chart(data([{"from": plain(begin), "to": plain(end)}])).mark_rect(style="region", clip=True)
     when = spans.encode(x="from:Q", x2="to:Q")
     behind = [when] if (begin, end) != times else []
@@ -201,7 +185,7 @@ def _place_panels(replay: Json, place: Json, sigma: float) -> alt.VConcatChart:
         alt.layer(*behind, *above).properties(width=200, height=86),
         alt.layer(*behind, noise.encode(y="low:Q", y2="high:Q"), *below).properties(width=200, height=66),
         spacing=16,
-    ).properties(title=small(f"{trial_name(place['trial'])} · {name.words}"))
+    ).properties(title=small(f"{trial_name(place.trial)} · {name.words}"))
 
 
 def _over_time(
@@ -233,37 +217,24 @@ def _over_time(
     return drawn
 
 
-def misfit_chart(found: Json, *, title: str = "") -> alt.VConcatChart:
+def misfit_chart(study: GapStudy, *, title: str = "") -> alt.VConcatChart:
     """Misfit of each signal in each trial in noise units, to switch between before, after and both side by side."""
-    measured = {name for trial in found["trials"] for name in trial["signals"]}
+    measured = {name for trial in study.trials for name in trial.signals}
     ordered = [SignalName(name).file for name in OBSERVED_SIGNALS]
     signals = [name for name in ordered if name in measured] + sorted(measured.difference(ordered))
     rows = [
-        {"group": f"{word} trials", "trial": trial_name(trial["trial"]), "model": model}
-        | {"signal": name.rpartition("_")[0].replace("_", " "), "misfit": as_number(trial["signals"][name][model])}
+        {"group": f"{word} trials", "trial": trial_name(trial.trial), "model": model}
+        | {"signal": name.rpartition("_")[0].replace("_", " "), "misfit": trial.signals[name][model]}
         for word, held in SETS.items()
-        for trial in found["trials"]
-        if trial["held_out"] == held
+        for trial in study.trials
+        if trial.held_out == held
         for name in signals
-        if name in trial["signals"]
-        for model in shown_models(found)
+        if name in trial.signals
+        for model in shown_models(study)
     ]
-    return misfit_maps(rows, shown_models(found), title=title)
+    return misfit_maps(rows, shown_models(study), title=title)
 
 
 def small(text: str) -> alt.Title:
     """Title of one panel among several."""
     return alt.Title(text, fontSize=11, offset=22, limit=260)
-
-
-def signal_misfit(found: Json, model: str, column: str, *, held_out: bool) -> float | None:
-    """Misfit of one signal over all trials of a set that measured it, in noise units; None without any."""
-    trials = [
-        trial["signals"][column]
-        for trial in found["trials"]
-        if trial["held_out"] == held_out and column in trial["signals"]
-    ]
-    if not trials or (model == "black_box" and not all(model in misfits for misfits in trials)):
-        return None
-    squares: Array = np.array([as_number(misfits[model]) ** 2 for misfits in trials])
-    return float(np.sqrt(squares.mean()))

@@ -1,0 +1,169 @@
+"""Result of ``gap`` for a fleet: all ships in one table, each with the way to its own page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import altair as alt
+
+from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.gap.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
+from tank2sim.gap.outcome.study import EffectFound
+from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
+from tank2sim.results.gap_text import effect_in_words, parameter_cells
+
+_SHIPS = (
+    "Misfit is the root mean square of simulated less measured, in standard deviations of the measurement noise: 1 is "
+    "the noise floor. It is counted over the held-out trials, which took no part in naming the effect, or over the "
+    "fitted ones where none was held out. Before is the card as given, after the card with the named effects."
+)
+_CHART = "The line is the noise; the scale is logarithmic. The points coincide where nothing was added."
+_LINKS = f"Each ship has a page of its own, {REPORT_FILE}, in the folder of its name next to fleet.json."
+_BEFORE, _AFTER = "card as given", "card found"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FleetResult(Result[FleetStudy]):
+    """The missing effects of the ships of a fleet.
+
+    Parameters
+    ----------
+    study : FleetStudy
+    linked : bool
+        Whether the page lies in the folder of the results, and leads to the page of each ship.
+    """
+
+    study: FleetStudy
+    linked: bool = False
+    command: ClassVar[str] = "gap"
+
+    @property
+    def title(self) -> str:
+        """The fleet."""
+        return f"Fleet: {self.study.fleet}"
+
+    @property
+    def subtitle(self) -> str:
+        """Number of ships."""
+        return f"Search for the missing effects of {len(self.study.ships)} ships"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Number of ships with each verdict, and without a result."""
+        study = self.study
+        counts = [f"{word}: {study.verdicts[word]}" for word in GAP_VERDICTS if word in study.verdicts]
+        counts += [f"without a result: {len(self._faults)}"] if self._faults else []
+        return (f"{study.fleet}: {len(study.ships)} ships ({', '.join(counts)}).",)
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Number of ships, in all and with each verdict."""
+        counts = self.study.verdicts
+        figures = [KeyFigure(label="Ships", value=str(len(self.study.ships)))]
+        figures += [
+            KeyFigure(label=f"{word[0].upper()}{word[1:]}", value=str(counts[word]))
+            for word in GAP_VERDICTS
+            if word in counts
+        ]
+        if self._faults:
+            count = str(len(self._faults))
+            figures.append(KeyFigure(label="Without a result", value=count, verdict=Verdict.FAILED))
+        return figures
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """The ships, and those without a result."""
+        found = [ship for ship in self.study.ships if not ship.fault]
+        sections = []
+        if found:
+            text = _SHIPS if self.linked else f"{_SHIPS} {_LINKS}"
+            sections.append(
+                Section(heading="Ships", text=text, tables=[_ships(found, self.linked)], charts=_misfits(found))
+            )
+        if self._faults:
+            rows = [[ship.folder, ship.fault] for ship in self._faults]
+            faults = table("Ships that could not be judged", ("ship", "reason"), rows)
+            sections.append(Section(heading="Without a result", tables=[faults]))
+        return sections
+
+    @property
+    def _faults(self) -> list[ShipSummary]:
+        return [ship for ship in self.study.ships if ship.fault]
+
+
+def _ships(found: Sequence[ShipSummary], linked: bool) -> Table:
+    rows: list[list[Cell]] = [
+        [
+            Link(text=ship.folder, path=ship.report) if linked else ship.folder,
+            ship.name,
+            ship.verdict,
+            _effects(ship),
+            *map(_hundredths, ship.misfits),
+            "held out" if ship.held_out else "fitted",
+        ]
+        for ship in found
+    ]
+    # Misfits are rounded to hundredths: seven digits cut nothing off.
+    heads = [Column(title=head, digits=7) for head in ("misfit before", "misfit after")]
+    columns = ["ship", "name", "verdict", "missing effect", *heads, "set of trials"]
+    return table("Findings", columns, rows)
+
+
+def _effects(ship: ShipSummary) -> str:
+    """Effects with their parameters, ± one standard error; or all that it may be."""
+    named = "; ".join(map(_effect, ship.effects))
+    if ship.verdict == AMBIGUOUS:
+        return " or ".join([named, *map(effect_in_words, ship.alternatives)])
+    return named if ship.verdict == MISSING else ""
+
+
+def _effect(effect: EffectFound) -> str:
+    values = []
+    for parameter in effect.parameters:
+        words, shown, unit, _ = parameter_cells(effect, parameter)
+        values.append(f"{words} {shown}" if unit == "-" else f"{words} {shown} {unit}")
+    return f"{effect_in_words(effect.name)} ({', '.join(values)})" if values else effect_in_words(effect.name)
+
+
+def _hundredths(misfit: float | None) -> float | None:
+    return None if misfit is None else round(misfit, 2)
+
+
+def _misfits(found: Sequence[ShipSummary]) -> list[Illustration]:
+    """Misfit of each ship before and after, a row each; empty where no simulation came to its end."""
+    rows = [
+        {"ship": ship.folder, "run": label, "misfit": _hundredths(misfit)}
+        for ship in found
+        for label, misfit in zip((_BEFORE, _AFTER), ship.misfits, strict=True)
+        if misfit
+    ]
+    if not rows:
+        return []
+    look = series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER])
+    points = (
+        Chart(data(rows))
+        .mark_point(filled=True, size=70)
+        .encode(
+            x=alt.X("misfit:Q", title="misfit (standard deviations of the noise)", scale=alt.Scale(type="log")),
+            y=alt.Y("ship:N", sort=[ship.folder for ship in found], title=None),
+            color=look.colour,
+            shape=look.shape,
+            tooltip=[
+                alt.Tooltip("ship:N", title="ship"),
+                alt.Tooltip("run:N", title="model"),
+                alt.Tooltip("misfit:Q", title="misfit", format=NUMBER),
+            ],
+        )
+    )
+    noise = Chart(data([{"misfit": 1.0}])).mark_rule(style="limit").encode(x="misfit:Q")
+    chart = alt.layer(noise, points).properties(
+        title="Misfit before and after",
+        width=620,
+        height=alt.Step(22),
+        description=f"Misfit of {len(found)} ships by the cards as given and by those found.",
+    )
+    return [Illustration(chart=chart, caption=_CHART, name="misfit")]

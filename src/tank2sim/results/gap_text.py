@@ -1,0 +1,272 @@
+"""The study of a gap in words: the verdict, its probability, objections to it, sizes with their errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import PurePath
+
+from tank2sim.answer.numbers import format_column, format_number
+from tank2sim.answer.parts import Cell
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.outcome.study import EffectFound, GapStudy
+from tank2sim.gap.proof.cross_check import MUCH
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
+from tank2sim.units import in_words, to_si
+
+GOOD = 1.5
+"""Misfit in noise units up to which a model is said to follow the measurements (project choice): its own error is
+then about as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+
+AS_LIKELY_AS_NOT = 0.5
+"""Probability from which an effect that is not named is mentioned (project choice)."""
+
+MOVED = 3
+"""Coefficients that are named in the verdict: the largest changes (project choice)."""
+
+
+def effect_in_words(name: str) -> str:
+    """Name of an effect for a reader: ``rudder_bias`` is "rudder bias"."""
+    return name.replace("_", " ")
+
+
+def trial_name(file: str) -> str:
+    """Name of a trial from its file."""
+    return PurePath(file).stem
+
+
+def effects_of(explanation: str) -> list[str]:
+    """Effects of one of ``alternatives``: ``current + wind``; none of ``none``."""
+    return [] if explanation == "none" else explanation.split(" + ")
+
+
+def capital(text: str) -> str:
+    """A sentence with a capital letter and a full stop."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."
+
+
+def verdict_in_words(study: GapStudy) -> str:
+    """The finding in a sentence or two, and the objections to it."""
+    return " ".join([found_in_words(study), *(f"Caution: {caution}." for caution in study.cautions)])
+
+
+def probabilities_in_words(study: GapStudy) -> list[str]:
+    """Probability of each effect, in any company, and of the explanation as a whole.
+
+    The last is left out where the trials are still missed by far, or where an unnamed effect is as probable as not:
+    something more may be missing then.
+    """
+    if not study.effects:
+        return []
+    each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in study.effects)
+    sentences = [f"Probability that the effect is there, alone or with another one: {each}."]
+    more = _unnamed(study)
+    if more:
+        likely = ", ".join(map(effect_in_words, more))
+        sentences.append(f"These fit a little better, without the evidence that a name needs: {likely}.")
+    names = [effect.name for effect in study.effects]
+    whole = next((rival for rival in study.rivals if set(rival.effects) == set(names)), None)
+    after = study.set_misfit("after", held_out=False)
+    if whole is not None and not more and (after is None or after <= MUCH):
+        alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _together(names)
+        sentences.append(
+            f"Probability that {alone} is all that is missing, among the explanations compared: "
+            f"{as_percent(whole.probability)}."
+        )
+    return sentences
+
+
+def sizes_of_candidates(study: GapStudy) -> list[EffectFound]:
+    """Effects of the other explanations of an ambiguous verdict, each of the size that it would have."""
+    sizes = study.next_test.candidates if study.next_test else {}
+    known = {effect.name for effect in study.effects}
+    unknown = dict.fromkeys(name for text in study.alternatives for name in effects_of(text) if name not in known)
+    return [
+        EffectFound(
+            name=name,
+            parameters=sizes[name].parameters,
+            standard_errors=sizes[name].standard_errors,
+            confidence=_probability(study, name),
+        )
+        for name in unknown
+        if name in sizes
+    ]
+
+
+def _unnamed(study: GapStudy) -> list[str]:
+    """Effects that are neither named nor candidates, and that the scores find as probable as not."""
+    known = {effect.name for effect in study.effects}
+    known |= {name for text in study.alternatives for name in effects_of(text)}
+    others = dict.fromkeys(name for rival in study.rivals for name in rival.effects if name not in known)
+    return [name for name in others if _probability(study, name) >= AS_LIKELY_AS_NOT]
+
+
+def _probability(study: GapStudy, name: str) -> float:
+    return min(sum(rival.probability for rival in study.rivals if name in rival.effects), 1.0)
+
+
+def _together(names: Sequence[str]) -> str:
+    return " with ".join(map(effect_in_words, names)) or "nothing"
+
+
+def as_percent(probability: float) -> str:
+    """A probability in words of %, never 0 and 99 at most: an effect that was not tried may look the same."""
+    if not math.isfinite(probability):
+        return "unknown"
+    percent = 100 * probability
+    return "< 1 %" if percent < 1 else f"{min(percent, 99.0):.0f} %"
+
+
+def found_in_words(study: GapStudy) -> str:
+    """The finding, in a sentence or two."""
+    verdict, effects = study.verdict, study.effects
+    after = study.set_misfit("after", held_out=False)
+    if verdict == MISSING and effects:
+        names = " and ".join(_with_values(effect) for effect in effects)
+        known = [EFFECTS[effect.name] for effect in effects if effect.name in EFFECTS]
+        text = " ".join(effect.description for effect in known)
+        if len(known) == len(effects) and all(effect.acts_on == "sensor" for effect in known):
+            return f"A sensor is at fault, not the model: {names}. {text}".strip()
+        sentences = [f"The model lacks {'an effect' if len(effects) == 1 else 'effects'}: {names}.", text]
+        return " ".join([*filter(None, sentences), *_refitted(study)])
+    if verdict == AMBIGUOUS:
+        named = [[effect.name for effect in effects]] if effects else []
+        candidates = [*named, *map(effects_of, study.alternatives)]
+        names = ", or ".join(dict.fromkeys(map(_together, candidates)))
+        missing = "Something is" if all(candidates) else "Something may be"
+        sentence = f"{missing} missing, but these data do not distinguish several explanations: {names}."
+        first = [f"The improved card has {_together(named[0])}."] if named and len(candidates) > 1 else []
+        return " ".join([sentence, *first, *_refitted(study)])
+    if verdict == COEFFICIENTS:
+        return " ".join(["The coefficients of the card explain the gap: no effect is missing.", *_refitted(study)])
+    if verdict == NO_EFFECT_MISSING:
+        if after is None:
+            return "No missing effect shows in these data."
+        remainder = "" if after <= GOOD else ", which is more than noise, but no effect explains the rest"
+        follows = f"the card as given follows the fitting trials to {noises(after)}{remainder}"
+        return f"No missing effect shows in these data: {follows}."
+    sentence = "Something is missing that no tried effect explains: the remaining misfit has a pattern, but no name."
+    return " ".join([sentence, *([f"The cause acts most in {place_of_cause(study)}."] if study.acting else [])])
+
+
+EQUATION_WORDS = {
+    "surge": "the force ahead",
+    "sway": "the force to the side",
+    "yaw": "the turning moment",
+    "track": "the motion over the ground",
+    "heading": "heading against yaw rate",
+}
+"""Words of the equations in which a model is wrong."""
+
+
+def place_of_cause(study: GapStudy) -> str:
+    """The equation, time and trial in which the cause acts most, and its size; for a study that has one."""
+    first = study.acting[0]
+    sizes = [
+        f"{format_number(size / 1e3, 3)} {unit}"
+        for size, unit in ((first.force_N, "kN"), (first.moment_Nm, "kN m"))
+        if size is not None
+    ]
+    sizes.append(f"{first.standard_errors:.2g} standard errors")
+    words = EQUATION_WORDS.get(first.equation, first.equation)
+    when = f"from {first.t_start_s:.0f} s to {first.t_end_s:.0f} s of {trial_name(first.trial)}"
+    return f"{words}, {when} (rms {', '.join(sizes)})"
+
+
+def _refitted(study: GapStudy) -> list[str]:
+    """The fitted coefficients that moved most, and the misfit by the effect without them."""
+    if not study.coefficients:
+        return []
+    several = len(study.effects) > 1
+    company = (" with them" if several else " with it") if study.effects else ""
+    most = sorted(study.coefficients, key=lambda entry: entry.moved, reverse=True)[:MOVED]
+    moved = ", ".join(f"{entry.name} by {entry.moved:.1f}" for entry in most)
+    words = f"{len(study.coefficients)} coefficients of the card were fitted{company}: "
+    words += f"most moved {moved} of their standard errors"
+    if alone := study.misfit.effect_alone:
+        group, misfit = ("fitting", alone.fit) if alone.holdout is None else ("held-out", alone.holdout)
+        effects = "effects" if several else "effect"
+        size = noises(math.inf if misfit is None else misfit)
+        words += f"; with the {effects} alone the misfit of the {group} trials would be {size}"
+    return [f"{words}."]
+
+
+def _with_values(effect: EffectFound) -> str:
+    values = [
+        f"{words} {value}{'' if unit == '-' else f' {unit}'}"
+        for words, value, unit, _ in (parameter_cells(effect, name) for name in effect.parameters)
+    ]
+    if effect.by_trial:
+        speeds = [row.speed_mps for row in effect.by_trial]
+        values.insert(0, f"of each trial its own, {min(speeds):.2g} to {max(speeds):.2g} m/s")
+    words = effect_in_words(effect.name)
+    return f"{words} ({', '.join(values)})" if values else words
+
+
+def verdict_context(study: GapStudy) -> list[str]:
+    """Probabilities, other explanations and place, a paragraph each."""
+    sentences = probabilities_in_words(study)
+    if study.alternatives and study.verdict != AMBIGUOUS:
+        sentences.append(others_in_words(study))
+    elif study.effects and study.verdict == MISSING:
+        company = "it" if len(study.effects) == 1 else "each of them"
+        sentences.append(f"No explanation without {company} comes near.")
+    if study.verdict != NO_EFFECT_MISSING and study.equation:
+        sentences.append(f"The gap is in {_EQUATIONS.get(study.equation, study.equation)}.")
+    return sentences
+
+
+def others_in_words(study: GapStudy) -> str:
+    """The explanations that these data cannot distinguish."""
+    names = "; ".join(_together(effects_of(text)) for text in study.alternatives)
+    return f"These data cannot distinguish it from: {names}."
+
+
+_EQUATIONS = {
+    "surge": "surge: the force ahead",
+    "sway": "sway: the force to the side",
+    "yaw": "yaw: the turning moment",
+    "actuator": "the steering gear or the propeller: how they follow the orders",
+    "kinematics": "the motion over the ground",
+    "sensor": "the measurements",
+}
+
+
+def parameter_cells(effect: EffectFound, key: str) -> list[Cell]:
+    """Words, value with its standard error, unit and meaning of one of an effect's parameters."""
+    words, unit = parameter_in_words(effect.name, key)
+    text = f"{meaning(effect.name, key)}{'' if key in effect.standard_errors else ' (held)'}"
+    shown = with_error(effect.parameters[key], effect.standard_errors.get(key, math.nan))
+    return [words, shown, unit or "-", text]
+
+
+def parameter_in_words(effect: str, key: str) -> tuple[str, str]:
+    """Words and unit of a parameter by its name in a file; a direction says whether it is from or towards."""
+    words, unit = in_words(key)
+    description = meaning(effect, key)
+    way = next((word for word in ("from", "towards") if f"direction {word} which" in description), "")
+    return f"{words} {way}".strip(), unit
+
+
+def with_error(value: float, error: float) -> str:
+    """A value and its standard error with two figures of the error: ``121.3 ± 2.1``; the value alone without one."""
+    if not math.isfinite(value):
+        return "?"
+    if not (math.isfinite(error) and error > 0):
+        return format_number(value, 4)
+    digits = 2
+    if value and abs(value) > error:
+        digits += math.floor(math.log10(abs(value))) - math.floor(math.log10(error))
+    return " ± ".join(format_column([float(value), float(error)], digits))
+
+
+def meaning(effect: str, key: str) -> str:
+    """Description of a parameter of an effect, by its name in a file."""
+    known = EFFECTS[effect].parameters if effect in EFFECTS else ()
+    name = to_si(key, 0.0)[0]
+    return next((parameter.description for parameter in known if parameter.name == name), "")
+
+
+def noises(misfit: float) -> str:
+    """A misfit as a multiple of the noise."""
+    return f"{format_number(misfit, 3)} times the noise" if math.isfinite(misfit) else "no end: the simulation ran away"
