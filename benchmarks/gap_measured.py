@@ -265,7 +265,8 @@ def _show(gap: Gap, seconds: float) -> None:
     if gap.where:
         place = gap.where[0]
         when = f"{place.t_start_s:.0f} to {place.t_end_s:.0f} s"
-        print(f"   most of the misfit: {place.signal} of {place.trial}, {when} ({place.share_of_misfit:.0%}); {gap.equation}")
+        print(f"   most of the misfit: {place.signal} of {place.trial}, {when} ({place.share_of_misfit:.0%})")
+        print(f"   {gap.equation}")
     for notice in gap.notices:
         if "no tried effect" in notice or "do not agree" in notice or "worse" in notice:
             print(f"   {notice}")

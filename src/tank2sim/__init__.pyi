@@ -24,9 +24,8 @@ from .api.identification import identify as identify
 from .api.log import log as log
 from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
 from .api.reduction import reduce as reduce
-from .api.report import ReportResult as ReportResult
 from .api.report import make_report as make_report
-from .api.schemas import json_schema as json_schema
+from .api.results import json_schema as json_schema
 from .api.ship import Ship as Ship
 from .api.ship import load as load
 from .api.ship import ships as ships

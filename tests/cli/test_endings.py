@@ -119,7 +119,6 @@ def test_results_refuse_the_ending_of_another_kind(tmp_path: Path) -> None:
         lambda: ship.save(tmp_path / "x.json"),
         lambda: ship.pilot_card(tmp_path / "x.pdf"),
         lambda: t2s.convert(ship, "mss").save(tmp_path / "x.py"),
-        lambda: t2s.make_report(run, tmp_path / "x.png"),
     ):
         with pytest.raises(t2s.InputError, match="ends in"):
             write()

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from tank2sim.api.bounds import AngleArgument, SpeedArgument, checked
+from tank2sim.arguments import AngleArgument, SpeedArgument, checked
 from tank2sim.errors import InputError, close_name
 from tank2sim.identification.captive.single_runs import study_runs
 from tank2sim.records.campaign_form import RUN_TYPES, CampaignFile, FilesSection, RunSheet, RunType, TankTest

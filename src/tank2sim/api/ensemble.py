@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from tank2sim.api.bounds import ENSEMBLE
+from tank2sim.arguments import ENSEMBLE
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.memory import refuse_beyond_memory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tank2sim.api.bounds import checked
+from tank2sim.arguments import checked
 from tank2sim.identification.captive_mmg.regression import fit_mmg
 from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
 from tank2sim.identification.captive_mmg.study import mmg_card, study_mmg

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from tank2sim.api.bounds import checked
+from tank2sim.arguments import checked
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign

@@ -8,6 +8,7 @@ from typing import Any
 
 from tank2sim.answer.result import Result
 from tank2sim.answer.study import study_schema
+from tank2sim.arguments import checked
 from tank2sim.errors import InputError
 from tank2sim.files import schema_command, schema_name
 
@@ -59,14 +60,28 @@ def result_classes(command: str) -> list[type[Result[Any]]]:
     return found
 
 
-def result_schema(command: str) -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of the JSON that a command writes.
+@checked
+def json_schema(command: str) -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of the JSON that a command writes.
 
     Parameters
     ----------
     command : str
         A key of :data:`RESULT_CLASSES`.
+
+    Raises
+    ------
+    KeyError
+        The command has no schema.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> t2s.json_schema("simulate")["properties"]["schema"]
+    {'const': 'tank2sim/simulate/1'}
     """
+    if command not in RESULT_CLASSES:
+        raise KeyError(command)
     shapes, parts = [], {}
     for kind in result_classes(command):
         shape = study_schema(kind.study_type())

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
 import numpy as np
 
 from tank2sim.api.autopilot import autopilot
-from tank2sim.api.bounds import (
+from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.arguments import (
     AngleArgument,
     EnsembleSize,
     NumberArgument,
@@ -21,7 +22,6 @@ from tank2sim.api.bounds import (
     TuningRange,
     checked,
 )
-from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
 from tank2sim.cards.card import manoeuvring_card

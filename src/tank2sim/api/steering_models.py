@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tank2sim.analysis.catalogue.comparison import compare_steering_models
-from tank2sim.api.bounds import AngleArgument, checked
+from tank2sim.arguments import AngleArgument, checked
 from tank2sim.cards.steering_card import read_steering_card
 from tank2sim.results.steering_models import SteeringModelsResult
 

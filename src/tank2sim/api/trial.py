@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tank2sim.api.bounds import checked
+from tank2sim.arguments import checked
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.records.reading import READERS, looks_like_a_trial

@@ -9,10 +9,10 @@ import click
 
 from tank2sim.analysis.influence.figures import forms
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN
-from tank2sim.api.bounds import TuningRange
 from tank2sim.api.ship import Ship, load
 from tank2sim.api.steering_models import steering_models
 from tank2sim.api.turn_tuning import THROUGH_OPTION, THROUGH_REMEDY
+from tank2sim.arguments import TuningRange
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.joint_variation import parse_agreed, parse_bounds

@@ -33,7 +33,7 @@ set_option = click.option(
 
 
 def number(kind: Any) -> click.IntRange | click.FloatRange:
-    """The type of an option that has the bounds of a type of :mod:`tank2sim.api.bounds`."""
+    """The type of an option that has the bounds of a type of :mod:`tank2sim.arguments`."""
     bounds = bounds_of(kind)
     assert bounds is not None
     if bounds.whole:

@@ -7,8 +7,8 @@ from typing import get_args
 
 import click
 
-from tank2sim.api.bounds import SpeedArgument
 from tank2sim.api.captive_run import TYPE_NAMES, ForceConvention, reduce_runs
+from tank2sim.arguments import SpeedArgument
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.files import TABLE

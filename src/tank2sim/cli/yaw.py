@@ -8,10 +8,10 @@ from typing import get_args
 
 import click
 
-from tank2sim.api.bounds import NonNegativeArgument, Percent, PositiveArgument
 from tank2sim.api.ship import load
 from tank2sim.api.yaw import CONTROLLERS, simulate_yaw
 from tank2sim.api.yaw import yaw as identify_yaw
+from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.errors import InputError

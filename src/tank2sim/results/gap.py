@@ -541,7 +541,7 @@ def _hundredths(misfit: float | None) -> float | None:
 
 def _place_of_the_gap(study: GapStudy) -> Section:
     """Where and when the gap arises, and the missing force or signal."""
-    places = [
+    places: list[list[Cell]] = [
         [
             trial_name(place.trial),
             signal_of(place.signal).words,
@@ -551,7 +551,7 @@ def _place_of_the_gap(study: GapStudy) -> Section:
         ]
         for place in study.where
     ]
-    passages = [
+    passages: list[list[Cell]] = [
         [
             trial_name(passage.trial),
             EQUATION_WORDS.get(passage.equation, passage.equation),

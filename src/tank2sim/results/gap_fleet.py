@@ -109,7 +109,7 @@ def _ships(found: Sequence[ShipSummary], linked: bool) -> Table:
     ]
     # Misfits are rounded to hundredths: seven digits cut nothing off.
     heads = [Column(title=head, digits=7) for head in ("misfit before", "misfit after")]
-    columns = ["ship", "name", "verdict", "missing effect", *heads, "set of trials"]
+    columns: list[str | Column] = ["ship", "name", "verdict", "missing effect", *heads, "set of trials"]
     return table("Findings", columns, rows)
 
 

@@ -1,1 +1,0 @@
-"""One page of any result that a command wrote as JSON."""
