@@ -240,6 +240,7 @@ def test_the_screen_gets_no_orders_to_the_terminal(made: Made, tmp_path: Path) -
 
 def test_pictures_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tank2sim.api.result import OldResult
+
     from tank2sim.cli.console import write_result
 
     class Drawn(OldResult):

@@ -22,8 +22,8 @@ from .api.gap import find_gap as find_gap
 from .api.guess import guess as guess
 from .api.identification import identify as identify
 from .api.log import log as log
-from .api.mmg_reduction import reduce_to_mmg as reduce_to_mmg
 from .api.reduction import reduce as reduce
+from .api.reduction import reduce_to_mmg as reduce_to_mmg
 from .api.report import make_report as make_report
 from .api.results import json_schema as json_schema
 from .api.ship import Ship as Ship

@@ -6,9 +6,9 @@ import tomllib
 
 import pytest
 from click.testing import CliRunner
+from tank2sim.cli.reduce import command
 
 from tank2sim.cards import read_card
-from tank2sim.cli.reduce import command
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn

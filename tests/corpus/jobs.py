@@ -29,7 +29,7 @@ RECIPES: dict[str, list[Recipe]] = {
         (["tank/campaign.toml", "-o", "out.toml"], ["tank/campaign.toml", "tank/*.csv"]),
         (["tank/campaign.toml", "--keep-going", "--json", "out.json"], ["tank/*.csv"]),
         (["arm/campaign.toml", "-o", "out.toml"], ["arm/campaign.toml", "arm/runs.csv"]),
-        (["mmg/campaign.toml", "--model", "mmg", "-o", "out.toml"],
+        (["mmg/campaign.toml", "--mmg", "-o", "out.toml"],
          ["mmg/campaign.toml", "mmg/runs.csv", "mmg/water.csv"]),
     ],
     "tow": [

@@ -9,9 +9,9 @@ import fmpy
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from tank2sim.cli.export import command
 
 import tank2sim as t2s
-from tank2sim.cli.export import command
 from tank2sim.dynamics import build
 
 pytestmark = pytest.mark.slow

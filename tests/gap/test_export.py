@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tank2sim.report.gap.text import place_of_cause, verdict_in_words
 
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.outcome.export import (
@@ -17,7 +18,6 @@ from tank2sim.gap.outcome.export import (
     signal_display_name,
 )
 from tank2sim.gap.result import Acting, Named, Refitted
-from tank2sim.report.gap.text import place_of_cause, verdict_in_words
 from tank2sim.units import to_si
 from tests.gap import made_up
 

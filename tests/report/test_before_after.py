@@ -8,14 +8,14 @@ from dataclasses import replace
 from html import unescape
 
 import pytest
+from tank2sim.report.gap.charts import gap_histories, gap_tracks, misfit_chart, place_chart
+from tank2sim.report.gap.page import gap_page
 
 from tank2sim.answer.charts.before_after import ALL, BOTH, before_after_switch, switch
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.charts.theme import DARK, DARK_TONE
 from tank2sim.answer.page import render_page
 from tank2sim.gap.outcome.export import gap_as_json
-from tank2sim.report.gap.charts import gap_histories, gap_tracks, misfit_chart, place_chart
-from tank2sim.report.gap.page import gap_page
 from tests.gap import made_up
 from tests.report.opened_page import CHROMIUM, opened
 

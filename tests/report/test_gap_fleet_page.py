@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from tank2sim.report.gap.fleet_page import fleet_page
+
 from tank2sim.answer.page import render_page
 from tank2sim.answer.parts import Link
 from tank2sim.gap.fleet.summary import FleetSummary, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
-from tank2sim.report.gap.fleet_page import fleet_page
 
 CURRENT = {
     "name": "current",

@@ -7,6 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tank2sim.report.gap.cause_charts import agreement_chart, rival_chart
+from tank2sim.report.gap.charts import gap_tracks, misfit_chart, shown_places, signal_misfit
+from tank2sim.report.gap.page import gap_charts, gap_page
+from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words, with_error
 
 from tank2sim.answer.charts.before_after import in_noise
 from tank2sim.answer.charts.picture import chart_specification
@@ -14,10 +18,6 @@ from tank2sim.answer.page import render_page
 from tank2sim.answer.parts import Verdict
 from tank2sim.gap.outcome.export import gap_as_json
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap, Passed, Rival
-from tank2sim.report.gap.cause_charts import agreement_chart, rival_chart
-from tank2sim.report.gap.charts import gap_tracks, misfit_chart, shown_places, signal_misfit
-from tank2sim.report.gap.page import gap_charts, gap_page
-from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words, with_error
 from tests.gap import made_up
 from tests.marks import first_fast
 

@@ -59,6 +59,11 @@ class Result(ABC, Generic[_S]):
         return tuple(notices)
 
     @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Files that were read because other files name them; the command does not overwrite them."""
+        return ()
+
+    @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Cards at the top of the page."""
         return ()

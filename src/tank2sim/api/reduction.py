@@ -1,25 +1,69 @@
-"""Captive tests reduced to hydrodynamic derivatives, as a result with its card."""
+"""Captive tests reduced to hydrodynamic derivatives, or to the coefficients of the MMG method."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
-from tank2sim.arguments import checked
-from tank2sim.errors import InputError
-from tank2sim.identification.captive.findings import reduction_findings
-from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign
-from tank2sim.identification.captive.result_card import FILLS, Contents, card_contents, reynolds_ratio
-from tank2sim.identification.captive.study import study_reduction, terms_of_heel
-from tank2sim.records.campaigns import Campaign, read_campaign
-from tank2sim.results.reduction import ReductionResult
+from tank2sim.api.verbs import Output, verb
+from tank2sim.files import CARD, TABLE
+
+if TYPE_CHECKING:
+    from tank2sim.results.mmg_reduction import MmgReductionResult
+    from tank2sim.results.reduction import ReductionResult
 
 
-@checked
+def _budget(result: ReductionResult, path: Path) -> dict[Path, str | bytes]:
+    return {path: result.budget.to_csv(float_format="%.6g", lineterminator="\n")}
+
+
+@verb(
+    "coefficients of the MMG method, from steady tests with thrust and normal force of the rudder",
+    Output("-o", CARD, "Write the ship card.", lambda result, path: result.card.files(path), "CARD.toml"),
+)
+def reduce_to_mmg(campaign: str | Path) -> MmgReductionResult:
+    """Reduce steady captive tests with thrust and rudder normal force to the coefficients of the MMG method.
+
+    One weighted regression of X, Y, N, thrust and normal force of all conditions, with the open-water points, gives the
+    hull (R_0' to N_rrr'), t_P, w_P0, C_1, C_2+-, t_R, a_H, x_H', eps, kappa, l_R' and gamma_R+- with standard errors
+    (Yasukawa and Yoshimura 2015; :mod:`tank2sim.identification.captive_mmg.regression`).
+
+    Parameters
+    ----------
+    campaign : path
+        ``campaign.toml`` with ``[averages]``, ``[open_water]``, ``[propeller]`` and ``[rudder]``.
+
+    Raises
+    ------
+    InputError
+        A file is missing or at fault, the tests do not show hull or rudder, or the method does not describe a channel.
+    """
+    from tank2sim.identification.captive_mmg.regression import fit_mmg
+    from tank2sim.identification.captive_mmg.steady_tests import read_steady_tests
+    from tank2sim.identification.captive_mmg.study import mmg_card, study_mmg
+    from tank2sim.results.mmg_reduction import MmgReductionResult
+
+    fit = fit_mmg(read_steady_tests(Path(campaign)))
+    return MmgReductionResult(study_mmg(fit), fit, mmg_card(fit))
+
+
+@verb(
+    "captive tests to derivatives",
+    Output("-o", CARD, "Write the ship card.", lambda result, path: result.card.files(path), "CARD.toml"),
+    Output(
+        "--budget",
+        TABLE,
+        "Write the uncertainty budget (ITTC 7.5-02-06-04): shares of the variance, combined and expanded.",
+        _budget,
+        "FILE.csv",
+    ),
+    variants={"mmg": reduce_to_mmg},
+)
 def reduce(
     campaign: str | Path,
     *,
-    fill: str | None = None,
+    fill: Literal["clarke1983"] | None = None,
     scale: float | str | None = None,
     keep_going: bool = False,
     keep_fast: bool = False,
@@ -36,7 +80,7 @@ def reduce(
     fill : str, optional
         Published estimate of derivatives that the campaign cannot give; they are marked and have a wide uncertainty.
     scale : float or str, optional
-        Make the card of a ship so many times as long as the model; ``"ship"``: as the campaign says.
+        Make the card of a ship so many times as long as the model; ``ship``: as the campaign says.
     keep_going : bool
         Leave out runs at fault and reduce the rest.
     keep_fast : bool
@@ -53,10 +97,16 @@ def reduce(
     InputError
         A file is missing or at fault, or the runs do not determine the derivatives.
     """
-    if fill is not None and fill not in FILLS:
-        raise InputError("fill", "", f"{fill!r} is not a published estimate here", f"there are: {', '.join(FILLS)}")
+    from tank2sim.identification.captive.card_notices import fill_notices, heel_notices, length_ratio
+    from tank2sim.identification.captive.findings import reduction_findings
+    from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
+    from tank2sim.identification.captive.result_card import card_contents
+    from tank2sim.identification.captive.study import study_reduction
+    from tank2sim.records.campaigns import read_campaign
+    from tank2sim.results.reduction import ReductionResult
+
     read = read_campaign(Path(campaign), keep_going=keep_going)
-    ratio = _ratio(read, scale)
+    ratio = length_ratio(read, scale)
     if ratio is not None:
         read = replace(read, model=read.model.model_copy(update={"scale": ratio}))
     options = ReductionOptions(
@@ -68,57 +118,6 @@ def reduce(
     )
     reduction = reduce_campaign(read, options)
     contents = card_contents(reduction, fill)
-    fillings = _fill_notices(contents, fill, ratio, read)
-    warnings = (*reduction_findings(reduction), *fillings, *_heel_notices(reduction))
+    fillings = fill_notices(contents, fill, ratio, read)
+    warnings = (*reduction_findings(reduction), *fillings, *heel_notices(reduction))
     return ReductionResult(study_reduction(reduction, contents, warnings, ratio), reduction, contents)
-
-
-def _ratio(campaign: Campaign, given: float | str | None) -> float | None:
-    """The ratio of lengths: a number, or ``ship`` for the ratio of the campaign; None if none was given."""
-    if given is None:
-        return None
-    if given == "ship":
-        if campaign.model.scale is None:
-            raise InputError(campaign.path, "model.scale", "is missing", "add it, or give --scale a number")
-        return campaign.model.scale
-    try:
-        ratio = float(given)
-    except ValueError:
-        ratio = 0.0
-    if not 1.0 <= ratio < 1e4:
-        raise InputError("--scale", "", f"{given} is not a ratio of lengths", "give a number such as 46.4, or 'ship'")
-    return ratio
-
-
-def _heel_notices(reduction: Reduction) -> list[str]:
-    names = terms_of_heel(reduction)
-    if not names:
-        return []
-    return [
-        f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with [roll], "
-        "a metacentric height and terms of K takes them."
-    ]
-
-
-def _fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[str]:
-    notices = []
-    if card.estimated:
-        notices.append(
-            f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
-        )
-    if card.missing:
-        remedy = "" if fill else f" --fill {next(iter(FILLS))} takes some of them from a published estimate."
-        notices.append(
-            f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
-            f"wrong as that.{remedy}"
-        )
-    if {"Yr", "Nr"} & set(card.estimated) and not {"Nvvr", "Nrrr"} & set(card.entries):
-        notices.append(
-            "No term of third order in the yaw rate was measured or estimated: hard turns come out too tight."
-        )
-    if ratio:
-        notices.append(
-            f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
-            f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
-        )
-    return notices

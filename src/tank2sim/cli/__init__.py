@@ -76,6 +76,7 @@ COMMANDS = {name: words for group in GROUPS.values() for name, words in group.it
 VERBS = {
     "audit": "api.audit:audit",
     "compare": "api.comparison:compare",
+    "reduce": "api.reduction:reduce",
     "report": "api.report:make_report",
     "signals": "api.signals:signals",
     "validate": "api.validation:validate",

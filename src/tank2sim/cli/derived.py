@@ -265,7 +265,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
                 result, made = made, made.files
             contents |= made
     given_files = {name: values[name] for name in ("page", "plot", "json")}
-    written = write_outputs(result, contents, inputs, **given_files)
+    written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
     show_result(result, written, quiet=values["quiet"], verbose=values["verbose"])
     return verb.exit_code(result)
 

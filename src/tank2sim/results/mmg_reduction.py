@@ -1,9 +1,10 @@
-"""Result of ``reduce --model mmg``: coefficients of the MMG method from steady captive tests."""
+"""Result of ``reduce --mmg``: coefficients of the MMG method from steady captive tests."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import altair as alt
@@ -48,6 +49,16 @@ class MmgReductionResult(Result[MmgStudy]):
     fit: MmgFit | None = None
     card: Card | None = None
     command: ClassVar[str] = "reduce"
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Tables and runs of the campaign."""
+        if self.fit is None:
+            return ()
+        form = self.fit.tests.form
+        named = [section.file for section in (form.averages, form.open_water) if section and section.file]
+        named += [run.file for run in form.runs if form.averages is None]
+        return tuple(Path(self.study.campaign).parent / name for name in named)
 
     @property
     def coefficients(self) -> dict[str, MmgCoefficient]:

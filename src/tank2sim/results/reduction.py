@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import altair as alt
@@ -59,6 +60,13 @@ class ReductionResult(Result[ReductionStudy]):
     reduction: Reduction | None = None
     contents: Contents | None = None
     command: ClassVar[str] = "reduce"
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Files of the runs."""
+        folder = Path(self.study.campaign).parent
+        runs = self.reduction.campaign.runs if self.reduction else ()
+        return tuple(folder / run.name.partition(" line ")[0] for run in runs)
 
     @cached_property
     def card(self) -> Card:

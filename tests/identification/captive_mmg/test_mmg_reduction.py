@@ -321,11 +321,11 @@ def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(
 @pytest.mark.slow
 def test_the_command_writes_card_page_and_json(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
-    options = ("--model", "mmg", "-o", "ship.toml", "--page", "p.html", "--json", "r.json")
+    options = ("--mmg", "-o", "ship.toml", "--page", "p.html", "--json", "r.json")
     assert tank2sim("reduce", str(path), *options, cwd=tmp_path).returncode == 0
     assert t2s.load(tmp_path / "ship.toml").card.interaction("w_P0") == pytest.approx(0.40, abs=0.02)
     assert {"p.html", "r.json", "ship.covariance.json"} <= {file.name for file in tmp_path.iterdir()}
-    refused(tank2sim("reduce", str(path), "--model", "mmg", "--fill", "clarke1983", cwd=tmp_path), "--fill")
+    refused(tank2sim("reduce", str(path), "--mmg", "--fill", "clarke1983", cwd=tmp_path), "--fill")
 
 
 def test_the_tests_of_hmri_give_the_kvlcc2_of_another_tank(tmp_path, data) -> None:

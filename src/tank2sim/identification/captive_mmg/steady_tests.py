@@ -101,7 +101,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
         first = next(condition.name for condition in conditions if condition.torque_Nm is None)
         raise InputError(path, "runs", f"{first} has no torque, and others have", "record it in all runs, or in none")
     if heeled := next((condition.name for condition in conditions if condition.heel_rad), ""):
-        remedy = "reduce such tests to a polynomial, without --model mmg"
+        remedy = "reduce such tests to a polynomial, without --mmg"
         raise InputError(
             path, "averages.columns.heel_rad", f"{heeled} has a heel; the method is of an upright hull", remedy
         )

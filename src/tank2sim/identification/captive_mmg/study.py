@@ -259,7 +259,7 @@ def mmg_card(fit: MmgFit) -> Card:
     )
     path = fit.tests.path
     source = f"{path.resolve().parent.name}/{path.name}"
-    note = f"tank2sim reduce --model mmg {source}: {len(fit.tests.names)} steady conditions"
+    note = f"tank2sim reduce --mmg {source}: {len(fit.tests.names)} steady conditions"
     card = tested_card(fit.tests, values, errors, note)
     kept = [i for i, name in enumerate(fit.names) if name != "rudder_offset"]
     keys = [_card_key(fit.names[i]) for i in kept]
