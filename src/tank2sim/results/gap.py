@@ -516,7 +516,10 @@ def _trials(study: GapStudy) -> Table:
         if words.count(word) > 1
     ]
     heads = ("trial", "set", *(model.replace("_", " ") for model in models))
-    return replace(table("Misfit of each trial in units of the noise", heads, rows, digits=_ALL_DIGITS), wide=True)
+    lost = any(cell == math.inf for row in rows for cell in row)
+    notes = ["Infinite: the simulation left all bounds."] if lost else []
+    caption = "Misfit of each trial in units of the noise"
+    return replace(table(caption, heads, rows, *notes, digits=_ALL_DIGITS), wide=True)
 
 
 def _signals(study: GapStudy) -> Table:
