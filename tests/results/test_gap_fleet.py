@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from tank2sim.answer.parts import Link
 from tank2sim.gap.fleet.summary import BeforeAfter, ShipSummary, TrialCounts, fleet_study
-from tank2sim.gap.outcome.study import EffectFound, SetMisfit
+from tank2sim.gap.outcome.study import EffectFound, MisfitBySet
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
 from tank2sim.results.gap_fleet import FleetResult
 
@@ -22,7 +22,7 @@ ONE = ShipSummary(
     name="Mariner <b>",
     verdict=MISSING,
     effects=(CURRENT,),
-    misfit=BeforeAfter(before=SetMisfit(fit=8.123, holdout=9.0), after=SetMisfit(fit=1.0, holdout=1.2345)),
+    misfit=BeforeAfter(before=MisfitBySet(fit=8.123, holdout=9.0), after=MisfitBySet(fit=1.0, holdout=1.2345)),
     trials=TrialCounts(fit=2, holdout=1),
     report="gamma ray #1/report.html",
 )
