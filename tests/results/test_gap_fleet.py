@@ -38,14 +38,12 @@ def fleet(*ships: ShipSummary, linked: bool = True) -> FleetResult:
 def test_ships_stand_in_a_table_with_what_they_lack() -> None:
     result = fleet(BAD, LOST, ONE)
     ships, without = result.sections
-    (table,) = ships.tables
-    beta, gamma = table.rows
-    assert gamma[2:] == [
-        MISSING,
-        "current (speed 0.4512 ± 0.0021 m/s, direction towards 90 deg)",
-        9.0,
-        1.23,
-        "held out",
+    findings, sizes = ships.tables
+    beta, gamma = findings.rows
+    assert gamma[2:] == [MISSING, "current", 9.0, 1.23, "held out"]
+    assert [row[:5] for row in sizes.rows] == [
+        ["gamma ray #1", "current", "speed", "0.4512 ± 0.0021", "m/s"],
+        ["gamma ray #1", "current", "direction towards", "90", "deg"],
     ]
     assert beta[2:] == [NO_EFFECT_MISSING, "", None, None, "fitted"]
     assert without.tables[0].rows == [["bad", BAD.fault]]

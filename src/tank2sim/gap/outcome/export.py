@@ -19,6 +19,7 @@ from tank2sim.gap.outcome.study import (
     DecidingTest,
     EffectFound,
     EffectSize,
+    FoundSurroundings,
     GapFigure,
     GapMisfit,
     GapReplay,
@@ -27,7 +28,6 @@ from tank2sim.gap.outcome.study import (
     MisfitNoise,
     TrialEstimate,
     TrialMisfit,
-    FoundSurroundings,
     WaveMotion,
 )
 from tank2sim.gap.proof.cross_check import proof_cautions
