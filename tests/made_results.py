@@ -14,18 +14,16 @@ from _pytest.mark import ParameterSet
 import tank2sim as t2s
 from tank2sim.answer.result import Result
 from tank2sim.api.bundled_ships import list_ships
-from tank2sim.api.gap import GapResult
+from tank2sim.api.gap import gap_result
 from tank2sim.bundled import bundled
 from tank2sim.gap.result import Gap
-from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.native import cross
 from tank2sim.report.steering import ship as page_ship
+from tank2sim.results.gap import NO_TRIALS
 from tests.gap import made_up
 from tests.identification.captive.made_runs import oscillation
 from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
 from tests.yaw_truth import Truth, record, written
-
-NO_TRIALS = Measured((), "angle", ())
 
 
 def _trials(folder: Path) -> Path:
@@ -86,7 +84,7 @@ def _identify(folder: Path) -> Result:
 
 
 def _gap(found: Callable[[], Gap]) -> Result:
-    return GapResult(found(), NO_TRIALS, NO_TRIALS)
+    return gap_result(found(), NO_TRIALS, NO_TRIALS)
 
 
 RESULTS: dict[str, Callable[[Path], Result]] = {

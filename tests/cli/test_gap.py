@@ -119,9 +119,9 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     assert "</html>" in page and make_report(out / "gap.json").page() == page
 
     words = " ".join(result.stdout.split())
-    for reported in ("The model lacks an effect: current", "0.45", "250", "m/s", "turn-35", "held out", "8.00", "1.00"):
+    for reported in ("The model lacks an effect: current", "0.45 ± 0.02", "250", "m/s", "turn-35", "held out"):
         assert reported in words, reported
-    assert "next test: turn:35. A turn tells most." in words
+    assert "Next test: turn:35. A turn tells most." in words
     again = tank2sim("simulate", str(out / "improved.toml"), "--manoeuvre", "turn:20", "--duration", "60", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
 
@@ -197,10 +197,8 @@ def test_lines_on_the_screen_are_not_broken_and_what_is_no_number_is_a_dash(
     finding((fouling,))
     result = tank2sim("gap", "mariner", long, "-o", "out", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    assert any(long.removesuffix(".csv") in line and "8.00" in line for line in result.stdout.splitlines())
-    (row,) = (line for line in result.stdout.splitlines() if "hull_fouling" in line and "X prime" in line)
-    assert [cell.strip() for cell in row.strip("│ ").split("│")] == ["hull_fouling", "X prime", "-0.0002", "-", "-"]
-    assert "Misfit in units of the noise (1 is noise)" in result.stdout.splitlines()
+    (row,) = (line for line in result.stdout.splitlines() if long.removesuffix(".csv") in line)
+    assert [cell.strip() for cell in row.strip("│ ").split("│")][1:4] == ["fitting", "8", "1"]
     assert "nan" not in result.stdout
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tank2sim.api.gap import improved_files
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text
+from tank2sim.results.gap import improved_files
 
 NAMES = ("derivatives.Yv", "derivatives.Nv")
 

@@ -57,7 +57,7 @@ def ships(tmp_path: Path) -> Path:
 @pytest.fixture
 def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
     """Lets each ship lack a current; gives the ships that were sought. Pages are left out: they take seconds."""
-    for place in ("api.gap.GapResult.page", "cli.gap_fleet.render_page"):
+    for place in ("results.gap.GapResult.page", "results.gap_fleet.FleetResult.page"):
         monkeypatch.setattr(f"tank2sim.{place}", lambda reported: f"<html>{type(reported).__name__}</html>")
 
     def set_up(fails: dict[str, BaseException] | None = None) -> list[str]:
@@ -121,9 +121,8 @@ def test_a_fleet_has_for_each_ship_what_the_ship_alone_has(ships: Path, tmp_path
     assert alpha["name"] == "Mariner alpha" and alpha["trials"] == {"fit": 2, "holdout": 1}
     assert alpha["effects"][0]["parameters"]["speed_mps"] == 0.45 and alpha["report"] == "alpha/report.html"
     assert alpha["misfit"]["before"]["holdout"] == pytest.approx(8.0) and beta["misfit"]["before"]["holdout"] is None
-    (row,) = (line for line in result.stdout.splitlines() if "gamma ray #1" in line)
-    cells = [cell.strip() for cell in row.strip("│ ").split("│")]
-    assert cells == ["gamma ray #1", "missing effect", "current", "8.00", "1.00", "computed"]
+    assert "gamma ray #1: computed" in result.stdout.splitlines()
+    assert "ships: 3 ships (missing effect: 3)." in result.stdout.splitlines()
 
 
 @pytest.mark.slow
@@ -204,7 +203,7 @@ def test_bad_ships_are_reported_at_the_end_and_the_others_are_kept(ships: Path, 
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"alpha", "fleet.json", "fleet.html"}
     reported = json.loads((tmp_path / "out/fleet.json").read_text())
     assert reported["verdicts"] == {"missing effect": 1}
-    assert {one["folder"] for one in reported["ships"] if "fault" in one} == {"beta", "gamma ray #1"}
+    assert {one["folder"] for one in reported["ships"] if one["fault"]} == {"beta", "gamma ray #1"}
     torn.write_text(straight(7.0))
     calls = finding()
     assert tank2sim("gap", "ships", "-o", "out", *ONE, cwd=tmp_path).returncode == 2 and calls == ["gamma ray #1"]

@@ -7,23 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tank2sim.report.gap.text import place_of_cause, verdict_in_words
 
+from tank2sim.answer.study import study_values
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.outcome.export import (
     effect_parameter_name,
     estimate_in_file,
-    gap_as_json,
+    gap_study,
     in_file_units,
     signal_display_name,
 )
 from tank2sim.gap.result import Acting, Named, Refitted
+from tank2sim.results.gap_text import place_of_cause, verdict_in_words
 from tank2sim.units import to_si
 from tests.gap import made_up
 
 
 def written(gap, **options):
-    return json.loads(json.dumps(gap_as_json(gap, **options), allow_nan=False))
+    return json.loads(json.dumps(study_values(gap_study(gap, **options)), allow_nan=False))
 
 
 @pytest.mark.parametrize("verdict", made_up.EVERY)
@@ -165,13 +166,14 @@ def test_no_force_is_told_of_where_none_is_missing() -> None:
 def test_what_no_effect_explains_has_its_place_and_size_in_newton() -> None:
     passages = (Acting("turn35", "yaw", 10.0, 20.0, 5.0, 3e6), Acting("zigzag", "sway", 0.0, 9.0, 4.0, 2e4))
     gap = replace(made_up.outside(), missing_force=replace(made_up.force(), passages=passages))
-    found = written(gap)
-    forces = [interval for interval in found["acting"] if interval["equation"] in {"yaw", "sway"}]
+    study = gap_study(gap)
+    forces = tuple(interval for interval in study.acting if interval.equation in {"yaw", "sway"})
     moment, force = forces
-    assert moment["moment_Nm"] == 3e6 and force["force_N"] == 2e4
-    said = place_of_cause({**found, "acting": forces})
+    assert (moment.moment_Nm, moment.force_N, force.force_N) == (3e6, None, 2e4)
+    forced = replace(study, acting=forces)
+    said = place_of_cause(forced)
     assert "from 10 s to 20 s of turn35" in said and "3000 kN m" in said
-    assert said in verdict_in_words({**found, "acting": forces})
+    assert said in verdict_in_words(forced)
 
 
 def test_cautions_are_among_the_notices() -> None:

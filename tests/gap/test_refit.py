@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.api.gap import identified_from, improved_files
+from tank2sim.api.gap import identified_from
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text
@@ -18,6 +18,7 @@ from tank2sim.gap.outcome.refit import effects_like, refit_coefficients
 from tank2sim.gap.result import Refitted
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.results.gap import improved_files
 from tests.records.motions import motion, trial
 
 ESTIMATES = CoefficientEstimates(

@@ -13,7 +13,7 @@ import tomlkit
 from gap_truth import Made, Setting, make, sampled, write
 from identify_esso_osaka import spans
 
-from tank2sim.api.gap import GapResult
+from tank2sim.api.gap import gap_result
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import surroundings_by_trial
@@ -265,7 +265,7 @@ def test_a_wind_that_differs_between_trials_is_named_with_its_size_in_each(windy
     check_by_trial(gap, made)
     before, after = (gap.misfit(version, held_out=True) for version in ("before", "after"))
     assert before is not None and after is not None and after < 0.1 * before
-    result = GapResult(gap, fitted, held)
+    result = gap_result(gap, fitted, held)
     assert set(result.surroundings["trial"]) == {*TRIALS, *HELD}
     files, _ = result.files(Path("out"))
     assert {path.name for path in files if path.parent.name == "surroundings"} == {f"{n}.csv" for n in (*TRIALS, *HELD)}

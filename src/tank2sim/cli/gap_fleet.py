@@ -196,7 +196,7 @@ def _written(folder: Path) -> GapStudy:
     remedy = "let one run at a time write there, and run it again"
     try:
         return GapResult.read(parsed_json(read_text(folder / GAP), folder / GAP, remedy), str(folder / GAP)).study
-    except (InputError, AttributeError):  # the latter of JSON that is no object
+    except (InputError, AttributeError):  # the second for JSON without keys
         raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None
 
 

@@ -516,7 +516,10 @@ def _trials(study: GapStudy) -> Table:
         if words.count(word) > 1
     ]
     heads = ("trial", "set", *(model.replace("_", " ") for model in models))
-    return replace(table("Misfit of each trial in units of the noise", heads, rows, digits=_ALL_DIGITS), wide=True)
+    lost = any(cell == math.inf for row in rows for cell in row)
+    notes = ["Infinite: the simulation left all bounds."] if lost else []
+    caption = "Misfit of each trial in units of the noise"
+    return replace(table(caption, heads, rows, *notes, digits=_ALL_DIGITS), wide=True)
 
 
 def _signals(study: GapStudy) -> Table:
@@ -592,8 +595,8 @@ def _place_text(study: GapStudy) -> str:
     return (
         f"The largest part of the misfit beyond the noise, {100 * first.share_of_misfit:.0f} %, arises in "
         f"{signal_of(first.signal).words} ({first.signal}) of {trial_name(first.trial)}, from {first.t_start_s:.0f} s "
-        f"to {first.t_end_s:.0f} s. Positions and headings count while their difference grows: a lasting offset of the "
-        "track is no new misfit."
+        f"to {first.t_end_s:.0f} s. Positions and headings count while their difference grows: the offset of a "
+        "track that was left once does not count again."
     )
 
 

@@ -12,7 +12,6 @@ from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.gap.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
-from tank2sim.gap.outcome.study import EffectFound
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.results.gap_text import effect_in_words, parameter_cells
 
@@ -81,9 +80,8 @@ class FleetResult(Result[FleetStudy]):
         sections = []
         if found:
             text = _SHIPS if self.linked else f"{_SHIPS} {_LINKS}"
-            sections.append(
-                Section(heading="Ships", text=text, tables=[_ships(found, self.linked)], charts=_misfits(found))
-            )
+            tables = [_ships(found, self.linked), *_sizes(found)]
+            sections.append(Section(heading="Ships", text=text, tables=tables, charts=_misfits(found)))
         if self._faults:
             rows = [[ship.folder, ship.fault] for ship in self._faults]
             faults = table("Ships that could not be judged", ("ship", "reason"), rows)
@@ -108,25 +106,28 @@ def _ships(found: Sequence[ShipSummary], linked: bool) -> Table:
         for ship in found
     ]
     # Misfits are rounded to hundredths: seven digits cut nothing off.
-    heads = [Column(title=head, digits=7) for head in ("misfit before", "misfit after")]
-    columns: list[str | Column] = ["ship", "name", "verdict", "missing effect", *heads, "set of trials"]
-    return table("Findings", columns, rows)
+    heads = [Column(title=head, digits=7) for head in ("before", "after")]
+    columns: list[str | Column] = ["ship", "name", "verdict", "missing effect", *heads, "trials"]
+    return table("Findings, and the misfit before and after in units of the noise", columns, rows)
+
+
+def _sizes(found: Sequence[ShipSummary]) -> list[Table]:
+    rows = [
+        [ship.folder, effect_in_words(effect.name), *parameter_cells(effect, parameter)]
+        for ship in found
+        for effect in ship.effects
+        for parameter in effect.parameters
+    ]
+    heads = ("ship", "effect", "parameter", "value", "unit", "meaning")
+    return [table("Sizes of the effects, ± one standard error", heads, rows, on_screen=False)] if rows else []
 
 
 def _effects(ship: ShipSummary) -> str:
-    """Effects with their parameters, ± one standard error; or all that it may be."""
-    named = "; ".join(map(_effect, ship.effects))
+    """The effects, or all that it may be."""
+    named = "; ".join(effect_in_words(effect.name) for effect in ship.effects)
     if ship.verdict == AMBIGUOUS:
         return " or ".join([named, *map(effect_in_words, ship.alternatives)])
     return named if ship.verdict == MISSING else ""
-
-
-def _effect(effect: EffectFound) -> str:
-    values = []
-    for parameter in effect.parameters:
-        words, shown, unit, _ = parameter_cells(effect, parameter)
-        values.append(f"{words} {shown}" if unit == "-" else f"{words} {shown} {unit}")
-    return f"{effect_in_words(effect.name)} ({', '.join(values)})" if values else effect_in_words(effect.name)
 
 
 def _hundredths(misfit: float | None) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from tank2sim.gap.outcome.study import EffectFound, GapStudy, SetMisfit
+from tank2sim.gap.outcome.study import EffectFound, GapStudy, MisfitBySet
 
 REPORT_FILE = "report.html"
 """Page of a ship, next to its ``gap.json``."""
@@ -15,8 +15,8 @@ REPORT_FILE = "report.html"
 class BeforeAfter:
     """Misfits by the card as given and by the card found."""
 
-    before: SetMisfit
-    after: SetMisfit
+    before: MisfitBySet
+    after: MisfitBySet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +96,16 @@ class FleetStudy:
 
 
 def fleet_study(fleet: str, ships: Iterable[ShipSummary], notices: Iterable[str] = ()) -> FleetStudy:
-    """Return the study of the ships of a folder."""
+    """Return the study of a fleet.
+
+    Parameters
+    ----------
+    fleet : str
+        Name of the folder.
+    ships : iterable of ShipSummary
+        In any order.
+    notices : iterable of str
+    """
     ordered = tuple(sorted(ships, key=lambda ship: ship.folder))
     words = [ship.verdict for ship in ordered if not ship.fault]
     verdicts = {word: words.count(word) for word in sorted(set(words))}
@@ -104,7 +113,14 @@ def fleet_study(fleet: str, ships: Iterable[ShipSummary], notices: Iterable[str]
 
 
 def ship_summary(folder: str, study: GapStudy) -> ShipSummary:
-    """Return the summary of a ship with results in the folder of this name."""
+    """Return the summary of a ship.
+
+    Parameters
+    ----------
+    folder : str
+        Name of the folder of its results.
+    study : GapStudy
+    """
     held = [trial.held_out for trial in study.trials]
     return ShipSummary(
         folder=folder,

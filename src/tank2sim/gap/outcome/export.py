@@ -19,15 +19,15 @@ from tank2sim.gap.outcome.study import (
     DecidingTest,
     EffectFound,
     EffectSize,
+    FoundSurroundings,
     GapFigure,
     GapMisfit,
     GapReplay,
     GapStudy,
-    SetMisfit,
-    SignalNoise,
+    MisfitBySet,
+    MisfitNoise,
     TrialEstimate,
     TrialMisfit,
-    TrialSurroundings,
     WaveMotion,
 )
 from tank2sim.gap.proof.cross_check import proof_cautions
@@ -211,7 +211,7 @@ def _figures(gap: Gap, names: Mapping[str, str]) -> tuple[GapFigure, ...]:
 
 def _effect(effect: Named, held_out: set[str]) -> EffectFound:
     by_trial = [
-        TrialSurroundings(
+        FoundSurroundings(
             trial=trial,
             held_out=trial in held_out,
             speed_mps=found.speed_mps,
@@ -239,20 +239,20 @@ def _in_file(
 def _misfit(gap: Gap) -> GapMisfit:
     alone = {key: _finite(value) for key, value in gap.effect_alone.items()}
 
-    def of(version: str) -> SetMisfit:
+    def of(version: str) -> MisfitBySet:
         fit, held = (_finite(gap.misfit(version, held_out=held_out)) for held_out in (False, True))
-        return SetMisfit(fit=fit, holdout=held)
+        return MisfitBySet(fit=fit, holdout=held)
 
     return GapMisfit(
         noise={
-            name.file: SignalNoise(sigma=name.factor * sigma, origin=origin)
+            name.file: MisfitNoise(sigma=name.factor * sigma, origin=origin)
             for name, (sigma, origin) in ((signal_display_name(key), noise) for key, noise in gap.noise.items())
         },
         before=of("before"),
         after=of("after"),
         black_box=of("black_box"),
         in_waves=_waves(gap.waves) if gap.waves else None,
-        effect_alone=SetMisfit(fit=alone.get("fit"), holdout=alone.get("holdout")) if alone else None,
+        effect_alone=MisfitBySet(fit=alone.get("fit"), holdout=alone.get("holdout")) if alone else None,
         noise_floor=NOISE_FLOOR,
     )
 

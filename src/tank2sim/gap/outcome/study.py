@@ -41,7 +41,7 @@ class EffectSize:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrialSurroundings:
+class FoundSurroundings:
     """Wind or current of one trial with standard errors.
 
     Directions are from 0 to 360 deg: from which a wind comes, towards which a current sets.
@@ -64,7 +64,7 @@ class EffectFound:
     parameters: dict[str, Number]
     standard_errors: dict[str, Number]
     confidence: Number
-    by_trial: tuple[TrialSurroundings, ...] = ()
+    by_trial: tuple[FoundSurroundings, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,7 @@ class ActingInterval:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SignalNoise:
+class MisfitNoise:
     """Standard deviation of a measurement in the unit of its column, and whether it is ``stated`` or ``estimated``."""
 
     sigma: Number
@@ -102,7 +102,7 @@ class SignalNoise:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SetMisfit:
+class MisfitBySet:
     """Misfit of the fitting and of the held-out trials, noise units; None without such trials or without bounds."""
 
     fit: float | None
@@ -125,20 +125,20 @@ class GapMisfit:
     ----------
     noise : dict
         By column of a trial file.
-    before, after, black_box : SetMisfit
+    before, after, black_box : MisfitBySet
     in_waves : WaveMotion or None
-    effect_alone : SetMisfit or None
+    effect_alone : MisfitBySet or None
         With the effects and the given coefficients, where coefficients were refitted.
     noise_floor : float
         Misfit of a perfect model.
     """
 
-    noise: dict[str, SignalNoise]
-    before: SetMisfit
-    after: SetMisfit
-    black_box: SetMisfit
+    noise: dict[str, MisfitNoise]
+    before: MisfitBySet
+    after: MisfitBySet
+    black_box: MisfitBySet
     in_waves: WaveMotion | None
-    effect_alone: SetMisfit | None
+    effect_alone: MisfitBySet | None
     noise_floor: float = 1.0
 
 

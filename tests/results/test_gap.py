@@ -1,4 +1,4 @@
-"""The page of a gap says what was found in words and shows it, whatever the verdict."""
+"""The result of a gap: its words, tables and charts hold the numbers of the study, whatever the verdict."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tank2sim.report.gap.cause_charts import agreement_chart, rival_chart
-from tank2sim.report.gap.charts import gap_tracks, misfit_chart, shown_places, signal_misfit
-from tank2sim.report.gap.page import gap_charts, gap_page
-from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words, with_error
 
 from tank2sim.answer.charts.before_after import in_noise
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.answer.page import render_page
 from tank2sim.answer.parts import Verdict
-from tank2sim.gap.outcome.export import gap_as_json
+from tank2sim.api.gap import gap_result
+from tank2sim.gap.outcome.export import gap_study
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap, Passed, Rival
+from tank2sim.results.gap import NO_TRIALS, GapResult
+from tank2sim.results.gap_cause_charts import agreement_chart, rival_chart
+from tank2sim.results.gap_charts import gap_tracks, misfit_chart, shown_places
+from tank2sim.results.gap_text import probabilities_in_words, verdict_in_words, with_error
 from tests.gap import made_up
 from tests.marks import first_fast
 
 
+def result_of(gap):
+    return gap_result(gap, NO_TRIALS, NO_TRIALS)
+
+
 def charts_of(gap):
-    return gap_charts(gap_as_json(gap))
-
-
-def page_of(gap):
-    return gap_page(gap_as_json(gap))
+    return result_of(gap).charts()
 
 
 def words_of(gap):
-    return verdict_in_words(gap_as_json(gap))
+    return verdict_in_words(gap_study(gap))
 
 
 @pytest.fixture(scope="module")
@@ -43,29 +43,39 @@ def rows_of(chart):
     return [row for rows in chart_specification(chart)["datasets"].values() for row in rows]
 
 
-def tables_of(page):
-    return {table.caption: table for section in page.sections for table in section.tables}
+def tables_of(gap):
+    return {table.caption: table for table in result_of(gap).tables}
 
 
 @first_fast("verdict", made_up.EVERY)
-def test_every_verdict_has_a_whole_page(verdict) -> None:
-    gap = made_up.EVERY[verdict]()
-    drawn = charts_of(gap)
-    page = page_of(gap)
-    html = render_page(page)
+def test_every_verdict_has_a_whole_page_which_its_json_gives_again(verdict) -> None:
+    result = result_of(made_up.EVERY[verdict]())
+    html = result.page()
     assert verdict in html and "nan" not in html.partition("<script")[0].lower()
-    assert sum(len(section.charts) for section in page.sections) == len(drawn)
-    assert all(section.text or section.tables or section.charts for section in page.sections)
-    first = page.figures[0]
+    assert sum(len(section.charts) for section in result.sections) == len(result.charts())
+    assert all(section.text or section.tables or section.charts for section in result.sections)
+    first = result.key_figures[0]
     assert (first.value, first.note) == ("current", verdict) if verdict == MISSING else first.value == verdict
-    assert (page.figures[0].verdict is Verdict.CAUTION) == (verdict in (AMBIGUOUS, OUTSIDE_LIBRARY))
+    assert (first.verdict is Verdict.CAUTION) == (verdict in (AMBIGUOUS, OUTSIDE_LIBRARY))
+    read = GapResult.read(json.loads(result.to_json()), "gap.json")
+    assert read.page() == html and read.card is None
+    with pytest.raises(LookupError):
+        _ = read.improved
+
+
+def test_frames_hold_the_effect_with_its_parameters_and_the_misfit_of_each_trial() -> None:
+    result = result_of(made_up.missing())
+    assert result.effects["value"].to_list() == pytest.approx([0.45, 270.0])
+    assert result.effects["standard_error"].to_list() == pytest.approx([0.02, 1.5])
+    assert result.misfit.loc["turn20"].to_list() == [True, pytest.approx(9.0), pytest.approx(1.5)]
+    assert result.coefficients.empty and result.surroundings.empty
 
 
 def test_a_named_effect_is_reported_in_words_and_in_a_mariners_units() -> None:
     words = words_of(made_up.missing())
     assert "current (speed 0.45 ± 0.02 m/s, direction towards 270.0 ± 1.5 deg)" in words
     assert "The water moves over the ground" in words
-    (row,) = (row for row in tables_of(page_of(made_up.missing()))["What was found, ± one standard error"].rows[1:])
+    (row,) = (row for row in tables_of(made_up.missing())["What was found, ± one standard error"].rows[1:])
     assert row[:4] == ["current", "direction towards", "270.0 ± 1.5", "deg"]
 
 
@@ -81,14 +91,14 @@ def test_ambiguity_names_each_explanation_once() -> None:
     candidates = "do not distinguish several explanations: current, or wind with rudder bias."
     assert candidates in words_of(gap)
     assert "The improved card has current." in words_of(gap)
-    reported = tables_of(page_of(gap))["Effects that these data cannot distinguish"].rows
+    reported = tables_of(gap)["Effects that these data cannot distinguish"].rows
     assert [row[0] for row in reported] == ["current", "wind", "rudder bias"]
 
 
 @pytest.mark.parametrize(("after", "whole"), [(1.0, True), (16.0, False)])
 def test_an_explanation_is_all_that_is_missing_only_where_the_trials_are_followed(after: float, whole: bool) -> None:
     gap = replace(made_up.missing(), passed=(made_up.passed("turn35", 90.0, after),))
-    lines = probabilities_in_words(json.loads(json.dumps(gap_as_json(gap))))
+    lines = probabilities_in_words(gap_study(gap))
     assert sum("all that is missing" in line for line in lines) == whole
 
 
@@ -97,7 +107,7 @@ def test_an_effect_that_only_scores_better_is_mentioned_without_a_probability() 
     named = tuple(effect.name for effect in gap.effects)
     first = replace(gap.rivals[0], effects=(*named, "rudder_lag"), probability=0.98)
     second = replace(gap.rivals[0], effects=named, loss=40.0, probability=0.02)
-    lines = probabilities_in_words(json.loads(json.dumps(gap_as_json(replace(gap, rivals=(first, second))))))
+    lines = probabilities_in_words(gap_study(replace(gap, rivals=(first, second))))
     (mentioned,) = [line for line in lines if "rudder lag" in line]
     assert "%" not in mentioned and not any("all that is missing" in line for line in lines)
 
@@ -105,8 +115,8 @@ def test_an_effect_that_only_scores_better_is_mentioned_without_a_probability() 
 def test_nothing_missing_says_how_well_the_card_follows() -> None:
     gap = made_up.nothing()
     assert "follows the fitting trials to 1.02 times the noise" in words_of(gap)
-    page = page_of(gap)
-    heads = [column.title for column in tables_of(page)["Misfit of each trial, noise units"].columns]
+    page = result_of(gap)
+    heads = [column.title for column in tables_of(gap)["Misfit of each trial in units of the noise"].columns]
     assert heads == ["trial", "set", "before"]
     assert "How well the card follows" in [section.heading for section in page.sections]
     worse = replace(gap, passed=tuple(made_up.passed(one.name, 4.0, 4.0) for one in gap.passed))
@@ -114,8 +124,8 @@ def test_nothing_missing_says_how_well_the_card_follows() -> None:
 
 
 def test_misfits_stand_before_and_after_next_to_the_black_box() -> None:
-    tables = tables_of(page_of(made_up.missing()))
-    signals = tables["Misfit of each signal, noise units"]
+    tables = tables_of(made_up.missing())
+    signals = tables["Misfit of each signal in units of the noise"]
     assert [column.title for column in signals.columns[1:4]] == [
         "held out, before",
         "held out, after",
@@ -123,24 +133,24 @@ def test_misfits_stand_before_and_after_next_to_the_black_box() -> None:
     ]
     assert signals.rows[0] == ["north", 9.0, 1.5, 3.0, pytest.approx(7.07), 1.0, 3.0]
     assert signals.rows[-1] == ["all", 9.0, 1.5, 3.0, pytest.approx(7.07), 1.0, 3.0]
-    assert tables["Misfit of each trial, noise units"].rows[0] == ["turn20", "held out", 9.0, 1.5, 3.0]
+    assert tables["Misfit of each trial in units of the noise"].rows[0] == ["turn20", "held out", 9.0, 1.5, 3.0]
     assert tables["Figures in m"].rows == [
         ["turn35", "fitting", "advance", 500.0, pytest.approx(550), pytest.approx(505)]
     ]
 
 
 def test_the_map_has_a_cell_for_each_signal_and_trial_before_and_after() -> None:
-    cells = [row for row in rows_of(misfit_chart(gap_as_json(made_up.missing()))) if "misfit" in row]
+    cells = [row for row in rows_of(misfit_chart(gap_study(made_up.missing()))) if "misfit" in row]
     assert len(cells) == 2 * 3 * 5
     held = [row for row in cells if row["trial"] == "turn20" and row["signal"] == "psi"]
     assert {row["text"] for row in held} == {"9.0", "1.5"}
 
 
 def test_what_left_all_bounds_is_darkest_and_infinite() -> None:
-    cells = [row for row in rows_of(misfit_chart(gap_as_json(made_up.outside()))) if row.get("trial") == "turn35"]
+    cells = [row for row in rows_of(misfit_chart(gap_study(made_up.outside()))) if row.get("trial") == "turn35"]
     lost = [row for row in cells if row["signal"] != "psi"]  # of which nothing is measured where the motion is lost
     assert {row["text"] for row in lost} == {"∞"} and {row["misfit"] for row in lost} == {100.0}
-    assert signal_misfit(gap_as_json(made_up.outside()), "before", "x_m", held_out=False) == np.inf
+    assert gap_study(made_up.outside()).set_misfit("before", held_out=False, signal="x_m") == np.inf
 
 
 def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
@@ -159,11 +169,11 @@ def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
 def test_without_places_the_largest_misfits_are_shown() -> None:
     gap = made_up.nothing()
     worse = replace(gap, passed=(*gap.passed, made_up.passed("worst", 5.0, 5.0)))
-    assert {place["trial"] for place in shown_places(gap_as_json(worse))[:5]} == {"worst.csv"}
+    assert {place.trial for place in shown_places(gap_study(worse))[:5]} == {"worst.csv"}
 
 
 def test_tracks_are_of_their_own_set() -> None:
-    found = gap_as_json(made_up.missing())
+    found = gap_study(made_up.missing())
     tracks = [chart_specification(gap_tracks(found, held_out=held))["concat"] for held in (True, False)]
     assert [[panel["title"]["text"] for panel in panels] for panels in tracks] == [["turn20"], ["turn35", "zigzag"]]
 
@@ -189,14 +199,14 @@ def test_across_north_too() -> None:
     gap = made_up.missing()
     north = replace(gap.effects[0], parameters={"direction_rad": np.deg2rad(-1.0)})
     alone = {"current.direction": {"turn35": (np.deg2rad(1.0), 0.01)}}
-    rows = rows_of(agreement_chart(gap_as_json(replace(gap, effects=(north,), agreement=alone))))
+    rows = rows_of(agreement_chart(gap_study(replace(gap, effects=(north,), agreement=alone))))
     assert [row["v"] for row in rows if row.get("name") == "turn35"] == [pytest.approx(361)]
 
 
 def test_rivals_are_ranked_and_none_is_always_among_them() -> None:
     gap = made_up.missing()
     many = tuple(Rival((f"effect_{place}",), 10.0 + place, 0.0) for place in range(20))
-    rows = rows_of(rival_chart(gap_as_json(replace(gap, rivals=(*many, *gap.rivals)))))
+    rows = rows_of(rival_chart(gap_study(replace(gap, rivals=(*many, *gap.rivals)))))
     names = [row["name"] for row in rows]
     assert names[:2] == ["current", "effect 0"] and names[-1] == "none (the card as it is)" and len(names) == 13
 
@@ -233,9 +243,9 @@ def test_what_was_found_but_not_measured_does_not_break_the_page() -> None:
     turn = gap.passed[0]
     gone = {name: np.full(100, np.nan) for name in turn.measured}
     blind = replace(turn, measured={**gone, "motion.psi": turn.measured["motion.psi"]})
-    page = page_of(replace(gap, passed=(blind,), where=(), verdict=NO_EFFECT_MISSING, effects=()))
-    assert len(tables_of(page)["Misfit of each signal, noise units"].rows) == 2
-    assert words_of(replace(gap, verdict=MISSING))
+    blind_gap = replace(gap, passed=(blind,), where=(), verdict=NO_EFFECT_MISSING, effects=())
+    assert len(tables_of(blind_gap)["Misfit of each signal in units of the noise"].rows) == 2
+    assert words_of(replace(blind_gap, verdict=MISSING))
 
 
 def carried() -> Gap:
@@ -270,7 +280,7 @@ def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None
     means = [row["f"] for row in rows_of(drawn["signal"]) if row.get("trials") == 2]
     assert np.mean(means) == pytest.approx(0.5, abs=0.02)
     assert "missing velocity to east (m/s)" in json.dumps(drawn["when_signal"].to_dict(validate=False))
-    (where,) = (section for section in page_of(gap).sections if section.heading == "Where the gap is")
+    (where,) = (section for section in result_of(gap).sections if section.heading == "Where the gap is")
     assert "No force is missing" in where.text and "the motion over the ground" in where.text
     forced = replace(gap.effects[0], name="rudder_bias", parameters={}, standard_errors={})
     both = charts_of(replace(gap, effects=(*gap.effects, forced)))
@@ -280,13 +290,13 @@ def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None
 def test_each_probability_says_of_what_it_is() -> None:
     gap = made_up.missing()
     some = (Rival(("current",), 0.0, 0.55), Rival(("current", "wind"), 3.0, 0.4), Rival((), 50.0, 0.0))
-    page = page_of(replace(gap, rivals=some))
+    page = result_of(replace(gap, rivals=some))
     text = page.sections[1].text
     assert "Probability that the effect is there, alone or with another one: current 97 %." in text
     assert "Probability that current alone is all that is missing, among the explanations compared: 55 %." in text
-    (card,) = (figure for figure in page.figures if figure.label.startswith("Probability"))
+    (card,) = (figure for figure in page.key_figures if figure.label.startswith("Probability"))
     assert card.note == "alone or with another effect"
-    assert "as a whole" in json.dumps(rival_chart(gap_as_json(gap)).to_dict(validate=False))
+    assert "as a whole" in json.dumps(rival_chart(gap_study(gap)).to_dict(validate=False))
 
 
 def test_what_the_others_would_be_is_reported_and_they_do_not_hide() -> None:
@@ -294,7 +304,7 @@ def test_what_the_others_would_be_is_reported_and_they_do_not_hide() -> None:
     test = gap.next_test
     assert test is not None
     sizes = {"wind": ({"speed_mps": 11.0}, {"speed_mps": 2.0}), "current": ({"speed_mps": 0.5}, {})}
-    tables = tables_of(page_of(replace(gap, next_test=replace(test, sizes=sizes))))
+    tables = tables_of(replace(gap, next_test=replace(test, sizes=sizes)))
     (row,) = tables["What the others would be, ± one standard error"].rows
     assert row[:4] == ["wind", "speed", "11 ± 2", "m/s"]
     assert [row[0] for row in tables["Sizes that these data cannot show"].rows] == ["linear yaw damping"]
@@ -302,7 +312,7 @@ def test_what_the_others_would_be_is_reported_and_they_do_not_hide() -> None:
 
 def test_what_replaces_something_of_the_card_has_no_up_to() -> None:
     gap = replace(made_up.missing(), could_hide={"rudder_lag": {"time_constant_s": 1.04}, "trim": {"by_stern_m": 0.1}})
-    lag, trim = tables_of(page_of(gap))["Sizes that these data cannot show"].rows
+    lag, trim = tables_of(gap)["Sizes that these data cannot show"].rows
     assert lag[2] == "1 in place of the card's" and trim[2] == "up to 0.1"
 
 
@@ -313,5 +323,5 @@ def test_a_name_that_leaves_much_of_the_gap_is_reported_with_caution() -> None:
     # sqrt((5^2 - 1)/(9^2 - 1)) = 0.55; a black box of 3 is better
     assert "Caution: named, but 55 % of the gap of the held-out trials remains" in words
     assert "a linear black box with as many coefficients follows the held-out trials better" in words
-    assert page_of(poor).figures[0].verdict is Verdict.CAUTION
+    assert result_of(poor).key_figures[0].verdict is Verdict.CAUTION
     assert "Caution" not in words_of(gap)
