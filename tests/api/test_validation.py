@@ -26,7 +26,7 @@ def test_a_ship_agrees_with_its_trial(found, folder):
         assert rows.loc[name, "measured"] == pytest.approx(truth[name], rel=0.01)
         assert rows.loc[name, "error"] == pytest.approx(rows.loc[name, "simulated"] - rows.loc[name, "measured"])
         assert rows.loc[name, "outcome"] == "validated"
-    assert found.verdict.startswith("4 figures: 4 validated")
+    assert found.verdict.startswith("4 of 4 figures validated")
     assert found.ship.name == t2s.load("mariner").name
     numerical = found.verification.set_index(["trial", "figure"])["numerical"]
     assert 0 < numerical[("zigzag 20/20", "overshoot_1_deg")] < 0.01

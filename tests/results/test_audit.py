@@ -7,7 +7,7 @@ import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.records.audit.finding import ColumnFinding
-from tank2sim.records.audit.study import AuditedTrial, AuditStudy, SignalNoise
+from tank2sim.records.audit.study import AuditedTrial, AuditStudy, ColumnNoise
 from tank2sim.results.audit import AuditResult
 
 STUDY = AuditStudy(
@@ -40,7 +40,7 @@ STUDY = AuditStudy(
             step_s=1.0,
             rows=4,
             columns=("psi [deg]", "u_mps"),
-            noise={"u_mps": SignalNoise(column="u_mps", sigma=0.02, stated=False)},
+            noise={"u_mps": ColumnNoise(column="u_mps", sigma=0.02, stated=False)},
             notices=("a column is left out",),
             histories={
                 "t_s": np.arange(4.0),

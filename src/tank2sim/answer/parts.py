@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import urllib.parse
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -270,9 +271,11 @@ def records_table(
 
 
 def cell_text(value: object, digits: int = 5) -> str:
-    """A value as the screen shows it: numbers with `digits` significant digits, ``-`` for None."""
+    """A value as the screen shows it: numbers with `digits` significant digits, ``-`` for None and NaN."""
     match value:
         case None:
+            return "-"
+        case float() if math.isnan(value):
             return "-"
         case bool():
             return "yes" if value else "no"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow, Difference
 from tank2sim.analysis.validation.comparison import CardComparison, CardSummary, ComparedFigure, TrialComparison
 from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
@@ -176,7 +177,7 @@ class ComparisonResult(Result[CardComparison]):
     def _percents(self) -> list[FigurePercent]:
         """Differences of the figures that both cards show."""
         return [
-            (label, trial.name.replace(" deg to", ""), in_words(name)[0], 100 * apart / abs(first), z)
+            (label, trial.name, in_words(name)[0], 100 * apart / abs(first), z)
             for trial in self.study.trials
             for name, row in trial.figures.items()
             for first in [row.values[0]]
@@ -206,7 +207,7 @@ class ComparisonResult(Result[CardComparison]):
     def _main_figures(self) -> Table:
         shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
         rows: list[list[Cell]] = [
-            [trial.name, " ".join(part for part in in_words(name) if part), *_with_deviations(row)]
+            [trial.name, with_unit(*in_words(name)), *_with_deviations(row)]
             for trial in self.study.trials
             for name, row in trial.figures.items()
             if name in shown

@@ -46,7 +46,8 @@ def percent_chart(percents: Sequence[FigurePercent], labels: Sequence[str], assu
     each card. `assumed` is added to the title."""
     panels: dict[str, list[ChartRecord]] = {}
     ends = []
-    for label, trial, figure, percent, z in percents:
+    for label, name, figure, percent, z in percents:
+        trial = name.replace(" deg to", "")
         row: ChartRecord = {"run": label, "name": f"{trial}: {figure}", "figure": figure, "percent": plain(percent)}
         if z:
             row |= {"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))}

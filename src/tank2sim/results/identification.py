@@ -349,7 +349,8 @@ class IdentificationResult(Result[IdentificationStudy]):
             ]
             if rows:
                 heads = [f"{name} ({unit})" for name in ("measured", "before", "now")]
-                tables.append(table(caption, ["trial", "set", "figure", *heads, "error", f"95 % ({unit})"], rows))
+                every = ["trial", "set", "figure", *heads, "error", f"95 % ({unit})"]
+                tables.append(replace(table(caption, every, rows), wide=True))
         chart = figure_chart(self._sets(self.study.figures), title="Figures of turns and zigzags, in closed loop")
         charts = [Illustration(chart=chart, caption=_FIGURE_CHART, name="figures")] if chart else []
         return [Section(heading="Figures of manoeuvres", text=_FIGURES, tables=tables, charts=charts)] if tables else []

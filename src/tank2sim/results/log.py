@@ -17,7 +17,7 @@ from tank2sim.files import writable_folder, write_together
 from tank2sim.logs.channels import CHANNELS_FILE, channels_text
 from tank2sim.logs.current import DriftCurrent
 from tank2sim.logs.stretches import Stretch
-from tank2sim.logs.study import ChannelStudy, LogStudy, StretchStudy
+from tank2sim.logs.study import LogStudy, StretchStudy
 from tank2sim.logs.trial_files import TrialCut, remove_earlier_trials
 from tank2sim.logs.voyage import Voyage
 from tank2sim.results.craft_identification import CraftIdentificationResult, craft_sections
@@ -237,13 +237,14 @@ class LogResult(Result[LogStudy]):
         return [Section(heading="Time line", charts=[Illustration(chart=chart, caption=caption)])]
 
     def _channel_tables(self) -> list[Table]:
-        """Channels in use, and the others."""
-        used, others = ([one for one in self.study.channels if one.use is use] for use in (True, False))
-        unsure = [one for one in others if one.confidence < _UNSURE]
+        """Channels in use, and all with the reasons of their confidence."""
+        channels, fields = self.study.channels, ("quantity", "stream", "unit", "sign", "confidence")
+        unsure = [one for one in channels if not one.use and one.confidence < _UNSURE]
         notes = [f"not used: {one.quantity}: {one.stream}: {one.why}" for one in unsure]
-        fields = ("quantity", "stream", "unit", "sign", "confidence", "why")
-        tables = [replace(records_table("Channels in use", used, fields=fields, digits=3), notes=notes)]
-        return [*tables, *_others_table(others)]
+        used = records_table("Channels in use", [one for one in channels if one.use], fields=fields, digits=3)
+        caption = f"All channels, to be confirmed or corrected in {CHANNELS_FILE}"
+        every = records_table(caption, channels, fields=(*fields, "use", "why"), digits=3, folded=True, on_screen=False)
+        return [replace(used, notes=notes), every]
 
     def _stretch_table(self) -> Table:
         rows: list[list[Cell]] = [
@@ -274,15 +275,6 @@ class LogResult(Result[LogStudy]):
             for log in self.study.logs
         ]
         return table("Logs", ("file", "format", "streams", "read and lost"), rows, on_screen=False)
-
-
-def _others_table(channels: Sequence[ChannelStudy]) -> list[Table]:
-    """Table of the channels that are not used; to be confirmed in the channels file."""
-    if not channels:
-        return []
-    fields = ("quantity", "stream", "unit", "sign", "confidence", "why")
-    caption = f"Channels not used; name them in {CHANNELS_FILE} to use them"
-    return [records_table(caption, channels, fields=fields, digits=3, on_screen=False)]
 
 
 def _cut_in_words(cut: Sequence[StretchStudy]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -287,7 +287,7 @@ def _statistics(label: str, trial: TrialSignals) -> Table:
     if trial.rudder_to_yaw_rate:
         notes.append(_steering_text(trial.rudder_to_yaw_rate))
     heads = ("column", "mean", "std", "corr. (s)", "stationarity", "normal", "peak (Hz)")
-    return table(label, heads, rows, *notes)
+    return replace(table(label, heads, rows, *notes), wide=True)
 
 
 def _steering_text(steering: Steering) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, Verified
 from tank2sim.answer.charts.columns import motions
+from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Verdict, table
 from tank2sim.answer.result import Result
@@ -255,7 +256,7 @@ class ValidationResult(Result[ValidationStudy]):
         numbers = {trial: number for number, trial in enumerate(manoeuvres, start=1)}
         rows: list[list[Cell]] = [
             [
-                f"{numbers[one.trial]}: {_with_unit(one.name)}",
+                f"{numbers[one.trial]}: {with_unit(*in_words(one.name))}",
                 *map(_digits, (one.measured, one.simulated, one.error)),
                 *(_digits(value, 3) for value in (one.inputs, one.data, one.uncertainty)),
                 one.level_percent,
@@ -270,7 +271,7 @@ class ValidationResult(Result[ValidationStudy]):
             heading="Validation",
             tables=[
                 table("Trials", ("no.", "trial", "manoeuvre, as recognised"), benchmark, folded=False),
-                table(caption, [*heads, "verdict"], rows, folded=True),
+                replace(table(caption, [*heads, "verdict"], rows, folded=True), wide=True),
             ],
             charts=[
                 Illustration(
@@ -305,7 +306,7 @@ class ValidationResult(Result[ValidationStudy]):
         rows: list[list[Cell]] = [
             [
                 row.trial,
-                _with_unit(row.name),
+                with_unit(*in_words(row.name)),
                 _digits(row.value),
                 *(_digits(value, 2) for value in (row.halving, row.U_num)),
                 _digits(row.deviation, 3),
@@ -360,8 +361,3 @@ def _method(figures: Sequence[Validated]) -> Section:
 def _digits(value: float | None, digits: int = 4) -> str | None:
     """A number for a column of many units, whose numbers share no decimals."""
     return None if value is None else format_number(value, digits)
-
-
-def _with_unit(name: str) -> str:
-    words, unit = in_words(name)
-    return f"{words} ({unit})" if unit else words

@@ -193,9 +193,11 @@ class Validation:
     def verdict(self) -> str:
         """Summary in words."""
         if not self.figures:
-            return "not validated: no trial can be compared"
-        found = ", ".join(f"{count} {outcome}" for outcome, count in self.counts.items() if count)
-        return f"{len(self.figures)} figures: {found}"
+            return "not validated, for no trial can be compared"
+        counts = self.counts
+        validated = f"{counts.pop(ComparisonOutcome.VALIDATED.value)} of {len(self.figures)} figures validated"
+        others = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
+        return f"{validated}; {others}" if others else validated
 
 
 def validate_card(

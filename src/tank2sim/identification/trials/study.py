@@ -104,7 +104,7 @@ class EstimatedCurrent:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SetMisfit:
+class CardMisfit:
     """Misfit of the fitted trials, and of those held out (None without any): 1 is noise."""
 
     fit: Number
@@ -112,11 +112,11 @@ class SetMisfit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentificationMisfit(SetMisfit):
+class IdentificationMisfit(CardMisfit):
     """Misfit of the card found, and `before` of the card given; noise by signal of the model, SI."""
 
     noise: dict[str, Number]
-    before: SetMisfit
+    before: CardMisfit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -472,7 +472,7 @@ def _misfit(result: Identification) -> IdentificationMisfit:
         fit=misfit(result.fit, result.noise),
         holdout=held_out(result.holdout),
         noise=dict(result.noise),
-        before=SetMisfit(fit=misfit(result.before, result.noise), holdout=held_out(result.before_holdout)),
+        before=CardMisfit(fit=misfit(result.before, result.noise), holdout=held_out(result.before_holdout)),
     )
 
 

@@ -14,7 +14,7 @@ from tank2sim.records.trials import Trial, sampling_step
 
 
 @dataclass(frozen=True, kw_only=True)
-class SignalNoise:
+class ColumnNoise:
     """White noise of a signal.
 
     Parameters
@@ -55,7 +55,7 @@ class AuditedTrial:
     step_s: Number
     rows: int
     columns: tuple[str, ...]
-    noise: dict[str, SignalNoise]
+    noise: dict[str, ColumnNoise]
     notices: tuple[str, ...]
     histories: Columns
 
@@ -85,7 +85,7 @@ def _audited(trial: Trial) -> AuditedTrial:
         rows=len(trial.time_s),
         columns=tuple(trial.heading(name) for name in trial.signals),
         noise={
-            name: SignalNoise(column=trial.heading(name), sigma=sigma, stated=name in trial.noise)
+            name: ColumnNoise(column=trial.heading(name), sigma=sigma, stated=name in trial.noise)
             for name, sigma in record_noise(trial).items()
         },
         notices=tuple(trial.notices),
