@@ -59,6 +59,15 @@ def drawings(html):
     return json.loads(re.search(r'<script type="application/json" id="drawings">(.*?)</script>', html, re.DOTALL)[1])
 
 
+def test_notes_of_a_table_are_below_it_and_those_that_mark_the_page_at_its_top() -> None:
+    mark = "advance: EXTRAPOLATED beyond what the card was measured in"
+    notes = ("advance: the larger side", mark)
+    criteria = Table(caption="Criteria", columns=[Column(title="criterion")], rows=[["advance"]], notes=notes)
+    found = render_page(Page(title="A ship", sections=[Section(heading="IMO", tables=[criteria])]))
+    assert found.count(mark) == 1 and found.index(mark) < found.index("<main")
+    assert found.index("</table>") < found.index(notes[0])
+
+
 def test_the_page_fetches_nothing(html, reader):
     for tag, attributes in reader.elements:
         assert tag not in {"link", "img", "iframe", "object", "embed", "base"}

@@ -53,7 +53,8 @@ def test_the_chart_shows_bands_and_figures_given_over_the_median_found() -> None
 
 def test_the_tables_hold_figures_numbers_and_the_next_figure() -> None:
     result = GuessResult(STUDY)
-    figures, numbers, further = (each.df for each in result.tables)
+    figures, prior, numbers, further = (each.df for each in result.tables)
+    assert prior["95 %"].to_list() == [1400.0, 16.0]
     assert figures["given"].to_list()[0] == 980.0 and figures["50 %"].to_list() == [980.0, 9.0]
     assert numbers["found"].to_list() == [-1.1e-3] and further["variance removed (%)"].to_list() == [60.0]
     assert result.figures.loc["overshoot_1@zigzag10", "by_dimensions_p95"] == 16.0

@@ -83,10 +83,11 @@ def _has_content(section: dict[str, Any]) -> bool:
 
 
 def _messages(page: Page) -> Iterable[str]:
-    """The notes of all sections, and the cells of their tables that are text."""
+    """The notes of all sections and tables, and the cells of tables that are text."""
     for section in page.sections:
         yield from section.notes
         for table in section.tables:
+            yield from table.notes
             yield from (cell for row in table.rows for cell in row if isinstance(cell, str))
 
 
@@ -115,12 +116,12 @@ def _section(section: Section, counter: _Counter, marks: Sequence[str]) -> dict[
     return {
         "content": section,
         "notes": [note for note in section.notes if note not in marks],
-        "tables": [_table(table, counter.next_table()) for table in section.tables],
+        "tables": [_table(table, counter.next_table(), marks) for table in section.tables],
         "charts": [_chart(illustration, counter.next_chart()) for illustration in section.charts],
     }
 
 
-def _table(table: Table, number: int) -> dict[str, Any]:
+def _table(table: Table, number: int, marks: Sequence[str]) -> dict[str, Any]:
     columns = [_column(column, [row[place] for row in table.rows]) for place, column in enumerate(table.columns)]
     return {
         "number": number,
@@ -128,6 +129,7 @@ def _table(table: Table, number: int) -> dict[str, Any]:
         "folded": len(table.rows) > _LONG if table.folded is None else table.folded,
         "columns": columns,
         "rows": [[column["cells"][place] for column in columns] for place in range(len(table.rows))],
+        "notes": [note for note in table.notes if note not in marks],
     }
 
 

@@ -72,7 +72,7 @@ class GuessResult(Result[GuessStudy]):
         study, given, settled = self.study, self._given, self._settled
         if not given:
             return (f"{study.ship}: no figures were given, so the dimensions alone define the intervals.",)
-        words = f"the {given} figures given settle {', '.join(settled) or 'no number of the card'}"
+        words = f"the given figures ({given}) settle {', '.join(settled) or 'no number of the card'}"
         others = [figure for figure in study.figures.values() if figure.given is None]
         narrower = [1 - _width(figure) for figure in others if figure.by_dimensions.p95 > figure.by_dimensions.p5]
         if not narrower:
@@ -107,19 +107,24 @@ class GuessResult(Result[GuessStudy]):
         return [self._figures(), self._numbers(), *([self._next()] if self.study.next_figures else [])]
 
     def _figures(self) -> Section:
-        rows: list[list[Cell]] = []
+        found: list[list[Cell]] = []
+        prior: list[list[Cell]] = []
         for key, figure in self.study.figures.items():
             before, after = figure.by_dimensions, figure.found
             given = figure.given, figure.standard_error
-            rows.append([_named(key), figure.unit, *given, before.p5, before.p95, after.p5, after.p50, after.p95])
-        heads = ("figure", "unit", "given", "standard error", "prior 5 %", "prior 95 %", "5 %", "50 %", "95 %")
-        caption = "Figures: nine of ten ships lie between 5 and 95 % (prior: by the dimensions alone)"
+            found.append([_named(key), figure.unit, *given, after.p5, after.p50, after.p95])
+            prior.append([_named(key), figure.unit, before.p5, before.p50, before.p95])
+        heads = ("figure", "unit", "given", "standard error", "5 %", "50 %", "95 %")
+        prior_heads = ("figure", "unit", "5 %", "50 %", "95 %")
         return Section(
             heading="Figures",
             text="Nine of ten ships lie in each interval. Intervals are wide for the dimensions alone, and narrower "
             "for ships that also have the figures given. Figures that were not given are predictions.",
             charts=[Illustration(chart=figures_chart(self.study))],
-            tables=[table(caption, heads, rows)],
+            tables=[
+                table("Figures: nine of ten ships lie between 5 and 95 %", heads, found),
+                table("The same by the dimensions alone", prior_heads, prior),
+            ],
         )
 
     def _numbers(self) -> Section:
