@@ -239,17 +239,22 @@ def test_the_screen_gets_no_orders_to_the_terminal(made: Made, tmp_path: Path) -
 
 
 def test_pictures_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tank2sim.api.result import OldResult
+    from dataclasses import dataclass
 
-    from tank2sim.cli.console import write_result
+    from tank2sim.answer.result import Result
+    from tank2sim.cli.console import write_outputs
 
-    class Drawn(OldResult):
+    @dataclass(frozen=True)
+    class Nothing:
+        notices: tuple[str, ...] = ()
+
+    @dataclass(frozen=True, eq=False, repr=False)
+    class Drawn(Result[Nothing]):
         """A result whose charts have names from outside."""
 
-        notices, headline, tables = (), (), ()
-
-        def content(self) -> dict[str, object]:
-            return {}
+        study: Nothing
+        title = ""
+        headline, sections = (), ()
 
         def charts(self) -> dict[str, object]:
             return dict.fromkeys(["../../MARK", "/MARK", "10/10 zigzag", "a\nb", ".."])
@@ -262,6 +267,6 @@ def test_pictures_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.Monke
 
     folder = tmp_path / "a" / "b"
     folder.parent.mkdir()
-    write_result(Drawn(), [], plots=folder)
+    write_outputs(Drawn(Nothing()), {}, [], page=None, plot=folder, json=None)
     assert [path for path in tmp_path.rglob("*") if path.is_file() and path.parent != folder] == []
     assert len(list(folder.iterdir())) == 6

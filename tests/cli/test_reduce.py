@@ -6,9 +6,10 @@ import tomllib
 
 import pytest
 from click.testing import CliRunner
-from tank2sim.cli.reduce import command
 
+from tank2sim.api.reduction import reduce
 from tank2sim.cards import read_card
+from tank2sim.cli.derived import command_of
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn
@@ -22,7 +23,7 @@ def path(tmp_path_factory):
 
 
 def run(*arguments):
-    result = CliRunner().invoke(command, [str(argument) for argument in arguments])
+    result = CliRunner().invoke(command_of("reduce", reduce.verb), [str(argument) for argument in arguments])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

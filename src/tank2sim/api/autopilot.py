@@ -68,7 +68,7 @@ def autopilot(
     wind_mps: NonNegativeArgument | None = None,
     wave_yaw_deg: NonNegativeArgument | None = None,
     seed: Seed | None = None,
-    track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
+    track: pd.DataFrame | Sequence[Sequence[Any]] | Array | str | Path | None = None,
 ) -> AutopilotResult | CraftAutopilotResult:
     """Design a heading controller for a ship, judge its loop and try it.
 

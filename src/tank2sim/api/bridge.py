@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
@@ -35,11 +36,11 @@ def _parsed_orders(given: Sequence[str]) -> dict[str, float]:
     return found
 
 
-@verb("a wheelhouse poster (A3)", texts={"order": _parsed_orders})
+@verb("a wheelhouse poster (A3)", page_required=True, texts={"order": _parsed_orders})
 def make_poster(
     ship: Ship,
     *,
-    ballast: Ship | None = None,
+    ballast: Ship | str | Path | None = None,
     order: Mapping[str, float] | None = None,
 ) -> PosterResult:
     """Draw the wheelhouse poster of a ship (IMO A.601(15), A3); unknown values stay blank.
@@ -63,11 +64,11 @@ def make_poster(
     return PosterResult(*_bridges(ship, ballast, order or {}))
 
 
-@verb("a pilot card (A4)", texts={"order": _parsed_orders})
+@verb("a pilot card (A4)", page_required=True, texts={"order": _parsed_orders})
 def make_pilot_card(
     ship: Ship,
     *,
-    ballast: Ship | None = None,
+    ballast: Ship | str | Path | None = None,
     order: Mapping[str, float] | None = None,
 ) -> PilotCardResult:
     """Draw the pilot card of a ship (IMO A.601(15), A4); unknown values stay blank.
@@ -92,7 +93,7 @@ def make_pilot_card(
 
 
 def _bridges(
-    ship: Ship, ballast: Ship | None, orders: Mapping[str, float]
+    ship: Ship, ballast: Ship | str | Path | None, orders: Mapping[str, float]
 ) -> tuple[BridgeStudy, Bridge, Bridge | None]:
     """Data of a sheet in both conditions."""
     from tank2sim.analysis.validation.bridge_data import bridge_of

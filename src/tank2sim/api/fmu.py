@@ -94,7 +94,7 @@ def make_fmu_file(
 
 
 @verb("an FMU validated, and compared with its reference", exit_code=lambda result: 0 if result.passed else 1)
-def check_fmu(fmu: str | Path, card: Ship | None = None) -> CheckResult:
+def check_fmu(fmu: str | Path, card: Ship | str | Path | None = None) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
 
     It runs the FMU's own code with your rights: check only files from sources that you trust. The command ends with
@@ -112,6 +112,7 @@ def check_fmu(fmu: str | Path, card: Ship | None = None) -> CheckResult:
     InputError
         The file is missing, not an FMU, of another version of FMI, or has no library for this machine.
     """
+    from tank2sim.api.ship import as_ship
     from tank2sim.cards import parse_card
     from tank2sim.dynamics import build
     from tank2sim.dynamics.simulator_interface import with_simulator_interface
@@ -123,7 +124,7 @@ def check_fmu(fmu: str | Path, card: Ship | None = None) -> CheckResult:
     path = Path(fmu)
     text = embedded_card(path) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
-    model = inside if card is None else card.model
+    model = inside if card is None else as_ship(card).model
     report = compare_with_model(path, model=model and with_simulator_interface(model))
     lacking = "the FMU carries no card: only its description was validated; give --card to compare"
     doubts = marked(model.notices) if model else ()

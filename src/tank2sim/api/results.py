@@ -101,7 +101,10 @@ def read_result(values: Mapping[str, Any], source: str) -> Result[Any]:
     InputError
         They are not the result of a command of this version, or a value is not as the command writes it.
     """
-    schema = values.get("schema")
+    if "schema" not in values:
+        remedy = "give what a command wrote with --json"
+        raise InputError(source, "", "is not a result of a tank2sim command", remedy)
+    schema = values["schema"]
     kinds = result_classes(schema_command(schema) or "")
     if not kinds:
         remedy = "give what this version of tank2sim wrote with --json"

@@ -260,7 +260,7 @@ class Ship:
     @checked
     def steer(
         self,
-        orders: pd.DataFrame | Mapping[str, Sequence[float]] | str | Path,
+        orders: pd.DataFrame | Mapping[str, Sequence[Any]] | str | Path,
         **options: Unpack[SimulationOptions],
     ) -> ManoeuvreResult:
         """Simulate orders over time.

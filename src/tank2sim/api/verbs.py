@@ -77,6 +77,8 @@ class Verb:
         Argument to the words of its choices.
     variants : mapping
         Flag to another verb, which the command calls with this flag in place of the function.
+    page_required : bool
+        Whether the page is the result itself, and must be written.
     exit_code : callable
         Of the result: the code with which the command ends.
     """
@@ -87,6 +89,7 @@ class Verb:
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
     choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     variants: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    page_required: bool = False
     exit_code: Callable[[Any], int] = lambda _: 0
 
 

@@ -68,7 +68,8 @@ def command_of(name: str, verb: Verb) -> click.Command:
     documented, _ = _documented(verb.function)
     main = [] if any("-o" in parameter.opts for parameter in own.values()) else ["-o"]
     shared = [
-        _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page."),
+        _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page.",
+                required=verb.page_required),
         _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, .pdf),"
                 " or each chart and the page into a folder."),
         _option(["--json"], type=OutputFile(JSON), metavar="FILE", help="Write the full result; - is standard output."),

@@ -77,8 +77,8 @@ def test_thrusters_that_cannot_steer_by_their_difference_are_refused(otter: t2s.
 
 @pytest.mark.parametrize(
     ("options", "place"),
-    [({"design": "lqr"}, "--design"), ({"wind_mps": 3.0}, "--wind"), ({"speed_mps": -1.0}, "speed_mps"),
-     ({"course_change_deg": 0.0}, "--course-change")],
+    [({"design": "lqr"}, "design"), ({"wind_mps": 3.0}, "wind_mps"), ({"speed_mps": -1.0}, "speed_mps"),
+     ({"course_change_deg": 0.0}, "course_change_deg")],
 )  # fmt: skip
 def test_what_the_autopilot_of_a_craft_does_not_take_is_refused(otter: t2s.Ship, options, place) -> None:
     with pytest.raises(t2s.InputError) as raised:

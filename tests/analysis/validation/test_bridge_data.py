@@ -43,7 +43,7 @@ def test_circles_lie_on_their_sides_and_show_the_figures(bridge) -> None:
     assert mark.starboard_m == pytest.approx(starboard.figures["transfer_m"], abs=1.0)
     half = quarter(port, 180)
     assert half.starboard_m == pytest.approx(-port.figures["tactical_diameter_m"], abs=1.0)
-    assert 180 <= port.as_json()["marks"][1]["heading_change_deg"] < 181  # to her side: it is no heading
+    assert 180 <= port.study.marks[1].heading_change_deg < 181  # to her side: it is no heading
     assert half.time_s == pytest.approx(port.figures["time_180_s"], abs=0.2)
     assert quarter(starboard, 360).speed_mps == pytest.approx(starboard.figures["steady_speed_mps"], rel=1e-3)
 
@@ -107,9 +107,9 @@ def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
 def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
     found = bridge_of(mariner_card)
     assert all(one.range_exit is None and one.inside == len(one.ahead_m) for one in found.deep)
-    assert found.as_json()["turning_circles_deep"][0]["outside_card_range"] == []
+    assert found.study.turning_circles_deep[0].outside_card_range == ()
     tanker = bridge_of(read_card("kvlcc2-captive", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
-    assert tanker.as_json()["turning_circles_deep"][0]["left_card_range_s"] == pytest.approx(91.6, abs=1)
+    assert tanker.study.turning_circles_deep[0].left_card_range_s == pytest.approx(91.6, abs=1)
     assert any("60° of heading" in one for one in tanker.notices)
 
 

@@ -25,16 +25,11 @@ from .ships import TYPICAL, mariner_text, ship, state, values
 SOURCE = Path(tank2sim.__file__).parent
 
 OTHER_MEANINGS = {
-    '"trim": self.trim.as_json()': "key of the JSON of stability",
-    '"trim": dict': "the same key",
-    'found["trim"]': "the same key",
     '"trim" in function': "part of the name of a generated function",
     'lacking("trim"': "caution on the trim of a towed model",
     '"trim",': "the same caution",
     'name="current"': "current of a motor",
     '"current": "current_A"': "the same",
-    '"current": None if': "key of the JSON of a log: the current found in it",
-    '"current": _current(result)': "key of the JSON of identify: the current found with the coefficients",
     '"wind" if true else': "part of the name of a quantity of a log",
     'quantity.startswith("wind")': "the same",
     'startswith(("wind", "current"))': "beginnings of the names of columns",

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.analysis.turning.diagram import steady_turning
 from tank2sim.cards import parse_card
 from tank2sim.cards.card import MmgCard
 from tank2sim.dynamics import build
@@ -255,7 +256,7 @@ def test_a_table_of_thrust_gives_what_its_polynomial_gives(ship: t2s.Ship) -> No
 
 def test_steady_turns_are_found_to_both_sides_of_the_kink(ship: t2s.Ship) -> None:
     """The side of gamma_R_minus is unstable, the other stable: the loop ends in a corner at the straight course."""
-    turning = ship.stability().study.turning
+    turning = steady_turning(ship.model)
     assert turning.rudder_rad[0] == pytest.approx(-math.radians(35))
     assert turning.rudder_rad[-1] == pytest.approx(math.radians(35))
     (fold,) = [fold for fold in turning.folds if fold.place != turning.straight]
