@@ -45,7 +45,7 @@ def test_ships_stand_in_a_table_with_what_they_lack() -> None:
         ["gamma ray #1", "current", "speed", "0.4512 ± 0.0021", "m/s"],
         ["gamma ray #1", "current", "direction towards", "90", "deg"],
     ]
-    assert beta[2:] == [NO_EFFECT_MISSING, "", None, None, "fitted"]
+    assert beta[2:] == [NO_EFFECT_MISSING, "", None, None, "fitting"]
     assert without.tables[0].rows == [["bad", BAD.fault]]
     assert {one.label: one.value for one in result.key_figures} == {
         "Ships": "3",

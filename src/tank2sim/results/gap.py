@@ -463,7 +463,7 @@ def _by_trial(study: GapStudy) -> list[Table]:
                 [
                     [
                         row.trial,
-                        "held out" if row.held_out else "fitted",
+                        "held out" if row.held_out else "fitting",
                         with_error(row.speed_mps, row.speed_error_mps),
                         with_error(row.direction_deg, row.direction_error_deg),
                     ]

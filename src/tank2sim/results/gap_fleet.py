@@ -18,7 +18,7 @@ from tank2sim.results.gap_text import effect_in_words, parameter_cells
 _SHIPS = (
     "Misfit is the root mean square of simulated less measured, in standard deviations of the measurement noise: 1 is "
     "the noise floor. It is counted over the held-out trials, which took no part in naming the effect, or over the "
-    "fitted ones where none was held out. Before is the card as given, after the card with the named effects."
+    "fitting ones where none was held out. Before is the card as given, after the card with the named effects."
 )
 _CHART = "The line is the noise; the scale is logarithmic. The points coincide where nothing was added."
 _LINKS = f"Each ship has a page of its own, {REPORT_FILE}, in the folder of its name next to fleet.json."
@@ -101,7 +101,7 @@ def _ships(found: Sequence[ShipSummary], linked: bool) -> Table:
             ship.verdict,
             _effects(ship),
             *map(_hundredths, ship.misfits),
-            "held out" if ship.held_out else "fitted",
+            "held out" if ship.held_out else "fitting",
         ]
         for ship in found
     ]
