@@ -23,11 +23,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tank2sim.analysis.influence.study import Study
-from tank2sim.api.design import design_campaign
+from tank2sim.apps.design.captive_runs import PlannedRun
+from tank2sim.apps.design.command import design_campaign
+from tank2sim.apps.design.figure_slopes import both_sides, figure_of_text
+from tank2sim.apps.design.tank_form import TankFile
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.design.captive_runs import PlannedRun
-from tank2sim.design.figure_slopes import both_sides, figure_of_text
-from tank2sim.design.tank_form import TankFile
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.records.campaigns import read_campaign

@@ -17,7 +17,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 import tank2sim as t2s
-from tank2sim.results.convention import same_in_practice
+from tank2sim.apps.programs.convention_result import same_in_practice
 
 HERE = Path(__file__).resolve().parent / "published_coefficients"
 

@@ -19,14 +19,14 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.apps.steering.members import PAGE_MEMBERS
+from tank2sim.apps.steering.ship import TOKEN, WEB
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.fmu.interface import interface
 from tank2sim.fmu.sources import c_sources
 from tank2sim.native.cross import CompileTarget, cross_compiled
 from tank2sim.native.lanes import VECTORS, lane_function
-from tank2sim.report.steering.members import PAGE_MEMBERS
-from tank2sim.report.steering.ship import TOKEN, WEB
 from tank2sim.simulation.scheme import step_and_constants
 
 FLEET = """

@@ -11,9 +11,11 @@ import time
 
 from paper_numbers import PaperNumbers
 
-from tank2sim.analysis.glide.path import GlidePath, fly
-from tank2sim.analysis.glide.quasi_steady_error import swing_errors
-from tank2sim.analysis.glide.steady import (
+from tank2sim.apps.rigs.glider.card import GliderCard
+from tank2sim.apps.rigs.glider.path import GlidePath, fly
+from tank2sim.apps.rigs.glider.programme import read_programme
+from tank2sim.apps.rigs.glider.quasi_steady_error import swing_errors
+from tank2sim.apps.rigs.glider.steady import (
     SteadyGlide,
     force_residual,
     glide_as_printed,
@@ -21,12 +23,11 @@ from tank2sim.analysis.glide.steady import (
     smallest_angle,
     steady_glide,
 )
-from tank2sim.analysis.glide.study import best_glide, fastest_glide
-from tank2sim.analysis.glide.transient import compare_with_steady, equilibrium, quasi_steady_error
+from tank2sim.apps.rigs.glider.study import best_glide, fastest_glide
+from tank2sim.apps.rigs.glider.transient import compare_with_steady, equilibrium, quasi_steady_error
 from tank2sim.bundled import bundled
-from tank2sim.cards import GliderCard, read_card
+from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.simulation.glide_programme import read_programme
 from tank2sim.simulation.integrator import Integrator
 
 GLIDES = {

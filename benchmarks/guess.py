@@ -17,7 +17,7 @@ import sys
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.guess.conditioning import (
+from tank2sim.apps.guess.conditioning import (
     FIGURE_KEYS,
     FIGURES,
     POSTER_MANOEUVRES,
@@ -25,8 +25,8 @@ from tank2sim.analysis.guess.conditioning import (
     PosterFigures,
     conditioned,
 )
-from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
-from tank2sim.analysis.guess.study import default_error
+from tank2sim.apps.guess.prior import ShipDimensions, prior_card
+from tank2sim.apps.guess.study import default_error
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError

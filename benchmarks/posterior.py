@@ -24,7 +24,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from scipy.stats import chisquare, kstest
 
-from tank2sim.api.ship import load
 from tank2sim.identification.trials.identify import estimate_parameters
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior_sampling import SAMPLERS, sample_posterior
@@ -32,6 +31,7 @@ from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.ship import load
 from tests.identification.trials.made_up_ship import TRUTH, problem, trial, turn, zigzag
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"

@@ -13,17 +13,17 @@ from dataclasses import asdict
 
 from paper_numbers import PaperNumbers
 
-from tank2sim.analysis.catalogue.comparison import missing_of, tuned
-from tank2sim.analysis.catalogue.tables import (
+from tank2sim.analysis.influence.percent import change_percent
+from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
+from tank2sim.apps.steering_cards.comparison import missing_of, tuned
+from tank2sim.apps.steering_cards.tables import (
     agreed_variation,
     combined_prediction,
     draught_polynomials,
     influence_of,
     turns_of,
 )
-from tank2sim.analysis.influence.percent import change_percent
-from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
-from tank2sim.cards.steering_card import SteeringCard, read_steering_card
+from tank2sim.apps.steering_cards.two_point_tuning import TwoPointTuning
 
 RUDDERS = (5, 10, 15, 20, 25, 30, 35)
 TABLE_1 = {

@@ -25,8 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.api.ship import load
-from tank2sim.api.steering_page import make_steering_page
+from tank2sim.apps.steering.command import make_steering_page
+from tank2sim.ship import load
 
 SECONDS = 12
 PACES = (5, 50)

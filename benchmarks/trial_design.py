@@ -22,11 +22,11 @@ import numpy as np
 
 import tank2sim as t2s
 from tank2sim.analysis.influence.study import Study
+from tank2sim.apps.design.figure_slopes import both_sides, figure_of_text
+from tank2sim.apps.design.trial_design import TrialManoeuvre
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import not_referring
 from tank2sim.cards.reading import revised
-from tank2sim.design.figure_slopes import both_sides, figure_of_text
-from tank2sim.design.trial_design import TrialManoeuvre
 from tank2sim.errors import InputError
 
 SHIPS = ("mariner", "esso-osaka", "kvlcc2-captive")

@@ -15,16 +15,16 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from paper_numbers import PaperNumbers
 
+from tank2sim.apps.rigs.tow import paper
+from tank2sim.apps.rigs.tow.equation_error import discretise, fit_mean_speed, solve_normal_equations
+from tank2sim.apps.rigs.tow.identify import identify_tow
+from tank2sim.apps.rigs.tow.output_error import simulated_speeds
+from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.study import TowStudy, speed_polynomials, study_tows, towed_body
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
+from tank2sim.apps.rigs.tow.theory import TowedBody, drag_polynomial, mass_by_theory, masses_by_theory
 from tank2sim.bundled import bundled
-from tank2sim.dynamics.surge import SurgeCoefficients
-from tank2sim.dynamics.surge_theory import TowedBody, drag_polynomial, mass_by_theory, masses_by_theory
 from tank2sim.identification.conditioning import scaled_condition
-from tank2sim.identification.tow import paper
-from tank2sim.identification.tow.equation_error import discretise, fit_mean_speed, solve_normal_equations
-from tank2sim.identification.tow.identify import identify_tow
-from tank2sim.identification.tow.output_error import simulated_speeds
-from tank2sim.identification.tow.study import TowStudy, speed_polynomials, study_tows, towed_body
-from tank2sim.records.tows import Tows, read_tows
 
 TERMS = ("B1", "B2", "B3")
 EXACT = (2775.71, 13033.2, -4553.94, 557.27)

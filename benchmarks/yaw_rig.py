@@ -18,15 +18,14 @@ from typing import get_args
 import numpy as np
 from paper_numbers import PaperNumbers
 
-from tank2sim.cards import YawRigCard, read_card
-from tank2sim.cards.form import YawRig
-from tank2sim.dynamics import yaw_theory as theory
-from tank2sim.dynamics.yaw_rig import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
-from tank2sim.identification.yaw.energy import energy_balance, fit_energy
-from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
-from tank2sim.identification.yaw.intervals import Speeds, intervals
-from tank2sim.records.yaw import Medium, YawRecord, read_yaw_record, yaw_record_text
-from tank2sim.records.yaw_programme import (
+from tank2sim.apps.rigs.yaw import theory
+from tank2sim.apps.rigs.yaw.card import YawRig, YawRigCard
+from tank2sim.apps.rigs.yaw.control import AdaptiveController, Controller, TunedController
+from tank2sim.apps.rigs.yaw.energy import energy_balance, fit_energy
+from tank2sim.apps.rigs.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
+from tank2sim.apps.rigs.yaw.intervals import Speeds, intervals
+from tank2sim.apps.rigs.yaw.model import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
+from tank2sim.apps.rigs.yaw.programme import (
     PAPER_PROGRAMME,
     Similarity,
     YawProgramme,
@@ -34,8 +33,9 @@ from tank2sim.records.yaw_programme import (
     full_turns,
     inertia_from_work,
 )
-from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig, simulated_record, yaw_record
-from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller, TunedController
+from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, read_yaw_record, yaw_record_text
+from tank2sim.apps.rigs.yaw.simulation import Measuring, YawRun, run_yaw_rig, simulated_record, yaw_record
+from tank2sim.cards import read_card
 
 TOP = PAPER_PROGRAMME.max_rate_radps
 BODIES = {"ellipsoid T1": ELLIPSOID_T1, "ship T1": SHIP_T1, "ship T2": SHIP_T2}

@@ -26,10 +26,10 @@ from sphinx.util import logging
 
 import tank2sim
 from tank2sim.api.results import RESULT_CLASSES, json_schema
+from tank2sim.apps.design import tank_form
 from tank2sim.cards import form, read_card
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as program
-from tank2sim.design import tank_form
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
 from tank2sim.dynamics.simulator_interface import with_simulator_interface

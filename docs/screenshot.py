@@ -19,7 +19,7 @@ from pathlib import Path
 PICTURE = Path(__file__).parent / "static" / "steering_page.png"
 UNTIL = 1300  # s
 COURSES = {0: 0, 340: 22, 600: 35, 900: 34, 1100: 12}  # deg, by the time (s) of the order
-# The attempt as a link has it (src/tank2sim/report/steering/attempt.js), opened and sailed to its end.
+# The attempt as a link has it (src/tank2sim/apps/steering/attempt.js), opened and sailed to its end.
 STEERED = """<script>
 const waiting = setInterval(() => {
   if (document.documentElement.dataset.ship !== "ready") return;

@@ -15,14 +15,14 @@ from xml.etree import ElementTree
 import pytest
 
 import tank2sim as t2s
-from tank2sim.analysis.conversion.robotics import gazebo_text, vrx_text
+from tank2sim.apps.programs.robotics import gazebo_text, vrx_text
+from tank2sim.apps.steering.page import PageShip, steering_page
 from tank2sim.bundled import bundled
 from tank2sim.cards import Card
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.escaping import json_in_html
 from tank2sim.fmu.export import description_text
 from tank2sim.fmu.osp import osp_system
-from tank2sim.report.steering.page import PageShip, steering_page
 from tests.cli.command_line import tank2sim
 from tests.hostile_text import HOSTILE, TOGETHER, Outline, hostile_card
 from tests.marks import first_fast

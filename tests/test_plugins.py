@@ -483,7 +483,9 @@ def test_a_reader_that_fails_names_its_package_and_does_not_stop_others(
 ) -> None:
     places = {"misreading": "MISREADING", "broken": "BROKEN"}
     entries(monkeypatch, *(("readers", name, f"{__name__}:{place}") for name, place in places.items()))
-    registry = Registry("tank2sim.trial_readers", reading.READERS.builtin.values(), TrialReader)
+    registry = Registry(
+        "tank2sim.trial_readers", [reading.READERS[name] for name in ("trial_csv", "esso_osaka", "simman")], TrialReader
+    )
     monkeypatch.setattr(reading, "READERS", registry)
     (tmp_path / "a.xyz").write_text("XYZ\n")
     with pytest.raises(InputError) as refusal:

@@ -1,4 +1,4 @@
-"""Effects, trial readers and structures of other packages, found by entry points.
+"""Effects, commands, kinds of cards, readers and structures of apps and other packages, found by entry points.
 
 Each kind has a :class:`Registry`: a mapping from name to value that holds the built-in values and, read once when it is
 first used, those of installed packages. An entry point has the name of its value::
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import difflib
 import functools
+import importlib
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -86,6 +87,10 @@ def _no_fault(value: Any) -> str:
     return ""
 
 
+def _itself(value: Any) -> Any:
+    return value
+
+
 class Registry(Mapping[str, _Value]):
     """Built-in values and those of installed packages, by name, the built-in ones first.
 
@@ -93,8 +98,8 @@ class Registry(Mapping[str, _Value]):
     ----------
     group : str
         Of the entry points, ``tank2sim.effects``.
-    builtin : iterable
-        In their order.
+    builtin : iterable or mapping
+        Values in their order, or ``module:attribute`` by name, which is loaded when its value is asked for.
     kind : type
         What an entry point must give: a frozen dataclass. What its functions raise, in the value itself and in the
         parts that its tuples hold, is turned into an InputError that names the package.
@@ -102,6 +107,8 @@ class Registry(Mapping[str, _Value]):
         Names that no package may take, in addition to those of `builtin`.
     fault : callable, optional
         ``fault(value) -> str``: what is wrong with the value of a package, "" if nothing.
+    value_of : callable, optional
+        Converts a loaded entry point to a value; by default it is the value.
 
     Notes
     -----
@@ -112,22 +119,29 @@ class Registry(Mapping[str, _Value]):
     def __init__(
         self,
         group: str,
-        builtin: Iterable[_Value],
+        builtin: Iterable[_Value] | Mapping[str, str],
         kind: type[_Value],
         *,
         reserved: Iterable[str] = (),
         fault: Callable[[_Value], str] = _no_fault,
+        value_of: Callable[[Any], Any] = _itself,
     ):
-        self.group, self.kind, self.fault = group, kind, fault
-        self.builtin: Mapping[str, _Value] = {value.name: value for value in builtin}
-        self.reserved = frozenset(reserved) | set(self.builtin)
+        self.group, self.kind, self.fault, self.value_of = group, kind, fault, value_of
+        self._builtin: dict[str, _Value | str] = (
+            dict(builtin) if isinstance(builtin, Mapping) else {value.name: value for value in builtin}
+        )
+        self.reserved = frozenset(reserved) | set(self._builtin)
         self._origins: dict[str, Origin] = {}
         self._found: Mapping[str, _Value | InputError] | None = None
         self._warned: set[str] = set()
 
     def __getitem__(self, name: str) -> _Value:
-        if name in self.builtin:
-            return self.builtin[name]
+        if name in self._builtin:
+            value = self._builtin[name]
+            if isinstance(value, str):
+                module, _, attribute = value.partition(":")
+                value = self._builtin[name] = self.value_of(getattr(importlib.import_module(module), attribute))
+            return value
         self._warned.add(name)  # the error says it
         found = self._plugins()[name]
         if isinstance(found, InputError):
@@ -135,10 +149,10 @@ class Registry(Mapping[str, _Value]):
         return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self.builtin or isinstance(self._plugins().get(str(name)), self.kind)
+        return name in self._builtin or isinstance(self._plugins().get(str(name)), self.kind)
 
     def __iter__(self) -> Iterator[str]:
-        yield from self.builtin
+        yield from self._builtin
         for name, found in self._plugins().items():
             if not isinstance(found, InputError):
                 yield name
@@ -148,7 +162,7 @@ class Registry(Mapping[str, _Value]):
 
     def names(self) -> tuple[str, ...]:
         """All names, with those of entry points that cannot be used: asking for such a value says why."""
-        return (*self.builtin, *(name for name in self._plugins() if name not in self.reserved))
+        return (*self._builtin, *(name for name in self._plugins() if name not in self.reserved))
 
     def remedy(self, name: str) -> str:
         """What to do about a name that is not there: the nearest one, or all that there are."""
@@ -158,18 +172,24 @@ class Registry(Mapping[str, _Value]):
 
     def origin(self, name: str) -> Origin | None:
         """The package that a value is from; None if it is built in."""
-        return None if name in self.builtin else self._origins[name]
+        return self._origins.get(name)
 
     def _plugins(self) -> Mapping[str, _Value | InputError]:
-        """Values of packages by name, or why they cannot be used."""
+        """Values of packages by name, or why they cannot be used; tank2sim's own apps come first."""
         if self._found is None:
             found: dict[str, _Value | InputError] = {}
-            for entry in entry_points(self.group):
+            entries = list(entry_points(self.group))
+            for entry in filter(_is_own, entries):
+                found[entry.name] = self.value_of(entry.load())
+            taken = self.reserved | set(found)
+            for entry in (entry for entry in entries if not _is_own(entry)):
                 distribution = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
                 origin = Origin(distribution, f"entry point {self.group}: {entry.name}")
                 other = self._origins.setdefault(entry.name, origin)
-                if entry.name in self.reserved:
-                    found[entry.name] = origin.fault("its name is built in, and that one is used", "give it another")
+                if entry.name in taken:
+                    found.setdefault(
+                        entry.name, origin.fault("its name is built in, and that one is used", "give it another")
+                    )
                 elif other != origin:
                     problem = f"{other.distribution} has an entry point of this name, too"
                     found[entry.name] = origin.fault(problem, "uninstall one of the two")
@@ -184,7 +204,7 @@ class Registry(Mapping[str, _Value]):
 
     def _loaded(self, entry: EntryPoint, origin: Origin) -> _Value | InputError:
         try:
-            value = entry.load()
+            value = self.value_of(entry.load())
         except Exception as error:
             return origin.fault(f"cannot be loaded: {_in_short(error)}")
         kind = f"tank2sim {self.kind.__name__}"
@@ -200,6 +220,11 @@ class Registry(Mapping[str, _Value]):
         return origin.fault(f"gives a faulty {kind}: {problem}") if problem else _guarded(value, origin)
 
 
+def _is_own(entry: EntryPoint) -> bool:
+    """Whether an entry point is one of tank2sim's own apps."""
+    return entry.value.startswith("tank2sim.")
+
+
 def entry_points(group: str) -> Iterable[EntryPoint]:
     """Entry points of installed packages."""
     from importlib import metadata  # takes as long as all of the rest: not for a command that asks for no plugin
@@ -209,6 +234,8 @@ def entry_points(group: str) -> Iterable[EntryPoint]:
 
 def _guarded(value: Any, origin: Origin) -> Any:
     """A value whose functions are :meth:`Origin.guarded`, and those of the values in it."""
+    if isinstance(value, type):
+        return value
     if isinstance(value, tuple):
         return tuple(_guarded(each, origin) for each in value)
     if is_dataclass(value) and not isinstance(value, type):

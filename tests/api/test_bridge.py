@@ -8,7 +8,7 @@ from unittest import mock
 import pytest
 
 import tank2sim as t2s
-from tank2sim.report.steering import ship as page_ship
+from tank2sim.apps.steering import ship as page_ship
 from tests.made_results import without_wasm
 
 
@@ -105,4 +105,4 @@ def test_only_a_ship_can_be_steered(name: str) -> None:
 def test_a_steering_card_is_not_a_ship() -> None:
     with pytest.raises(t2s.InputError) as refusal:
         t2s.load("poznyakov-yudin")
-    assert refusal.value.source == "poznyakov-yudin" and "steering card" in refusal.value.problem
+    assert refusal.value.source == "poznyakov-yudin" and "steering.toml" in refusal.value.problem

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api import signals as module
+from tank2sim.apps.signals import command as module
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api import tow as module
+from tank2sim.apps.rigs.tow import command as module
 
 FORCE_N, MASS_KG, TOTAL_KG, B3 = 12.0, 2000.0, 2500.0, 90.0
 

@@ -7,7 +7,7 @@ import doctest
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api import yaw as module
+from tank2sim.apps.rigs.yaw import command as module
 from tests.yaw_truth import Truth, record, written
 
 BODY_KGM2, ADDED_KGM2 = 0.0204, 0.03

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tank2sim.cards import GliderCard, parse_card, read_card
+from tank2sim.apps.rigs.glider.card import GliderCard
+from tank2sim.cards import parse_card, read_card
 from tank2sim.errors import InputError
 
 PROBE = read_card("kulikovsky-velikanov")

@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
+from tank2sim.apps.rigs.yaw import found_card as yaw_card
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import parse_card, revised
 from tank2sim.cards.card import MmgCard
@@ -15,7 +16,6 @@ from tank2sim.cards.mmg import fujii, open_water_fit
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters
 from tank2sim.errors import InputError
-from tank2sim.identification.yaw import card as yaw_card
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
 

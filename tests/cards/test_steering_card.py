@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tank2sim.apps.steering_cards.card import find_steering_card, parse_steering_card, read_steering_card
 from tank2sim.bundled import bundled
-from tank2sim.cards.steering_card import find_steering_card, parse_steering_card, read_steering_card
 from tank2sim.errors import InputError
 
 TEXT = bundled("models", "poznyakov-yudin", "steering.toml").read_text(encoding="utf-8")

@@ -83,7 +83,7 @@ def test_bad_options_are_refused_in_a_line(tmp_path, arguments, words):
 
 @pytest.mark.parametrize("option", ["--campaign", "--json"])
 def test_one_file_for_two_outputs_is_refused_before_the_work(tmp_path, option, monkeypatch):
-    monkeypatch.setattr("tank2sim.design.planning.planned_campaign", None)
+    monkeypatch.setattr("tank2sim.apps.design.planning.planned_campaign", None)
     result = tank2sim("design", "esso-osaka", *FAST, "--hours", "2", "-o", "p", option, "p", cwd=tmp_path)
     refused(result, "p:", "two outputs")
     assert list(tmp_path.iterdir()) == []

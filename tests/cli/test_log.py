@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
-from tank2sim.logs.channels import channels_text, read_channels
-from tank2sim.results.log import LogResult
+from tank2sim.apps.logs.channels import channels_text, read_channels
+from tank2sim.apps.logs.result import LogResult
 from tests.cli.command_line import refused, tank2sim
 from tests.logs.made_logs import T0, frame, nmea_lines
 from tests.marks import first_fast

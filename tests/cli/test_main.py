@@ -96,7 +96,8 @@ def test_a_name_that_resembles_a_known_one_is_suggested(arguments, meant, tmp_pa
 
 
 def test_every_command_is_in_one_group_of_the_help(tmp_path) -> None:
-    from tank2sim.cli import COMMANDS, GROUPS, VERBS
+    from tank2sim.api.commands import VERBS
+    from tank2sim.cli import COMMANDS, GROUPS
 
     modules = set(VERBS) | {path.stem for path in (MODELS.parent / "src/tank2sim/cli").glob("*.py")}
     assert set(COMMANDS) <= modules and sum(map(len, GROUPS.values())) == len(COMMANDS)

@@ -9,7 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from tank2sim.report.steering import ship as steer_ship
+from tank2sim.apps.steering import ship as steer_ship
 from tests.cli.command_line import refused, tank2sim
 
 

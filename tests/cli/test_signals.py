@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tank2sim.api.signals import signals
+from tank2sim.apps.signals.command import signals
 from tank2sim.cli.derived import command_of
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file

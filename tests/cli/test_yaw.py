@@ -8,9 +8,10 @@ import re
 
 import pytest
 
+from tank2sim.apps.rigs.yaw.card import YawRigCard
+from tank2sim.apps.rigs.yaw.records import read_yaw_record
 from tank2sim.bundled import bundled
-from tank2sim.cards import ManoeuvringCard, YawRigCard, read_card
-from tank2sim.records.yaw import read_yaw_record
+from tank2sim.cards import ManoeuvringCard, read_card
 from tests.cli.command_line import refused, tank2sim
 from tests.yaw_truth import Truth, record, written
 

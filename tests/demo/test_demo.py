@@ -10,9 +10,9 @@ import jsonschema
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.demo import DemoResult
-from tank2sim.demo import DEMO_STEPS, PAGE
-from tank2sim.demo.run import write_demo
+from tank2sim.apps.demo import DEMO_STEPS, PAGE
+from tank2sim.apps.demo.command import DemoResult
+from tank2sim.apps.demo.run import write_demo
 
 pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too
 
@@ -72,7 +72,7 @@ def test_the_result_has_the_page_and_fits_a_screen(demo) -> None:
     folder, values, _ = demo
     found = DemoResult(folder, values)
     assert found.page() == (folder / PAGE).read_text(encoding="utf-8") and len(repr(found).splitlines()) <= 24
-    assert values["schema"] == "tank2sim/demo/1" and found.path == folder / PAGE
+    assert values["schema"] == "tank2sim/apps/demo/1" and found.path == folder / PAGE
 
 
 @pytest.mark.long

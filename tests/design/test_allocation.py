@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from tank2sim.design.allocation import Allocation, InformationBlock, target_matrices
+from tank2sim.apps.design.allocation import Allocation, InformationBlock, target_matrices
 
 LITTLE = 1e-9
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.design import design_campaign
-from tank2sim.cards import read_card
-from tank2sim.design.figure_slopes import (
+from tank2sim.apps.design.command import design_campaign
+from tank2sim.apps.design.figure_slopes import (
     both_sides,
     figure_of_text,
     figure_slopes,
     hydrodynamic_derivatives,
     range_of_figures,
 )
-from tank2sim.design.planning import _assumptions
-from tank2sim.design.tank_form import TankFile
+from tank2sim.apps.design.planning import _assumptions
+from tank2sim.apps.design.tank_form import TankFile
+from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 from tank2sim.marks import CHECK, marked
 from tank2sim.records.campaigns import read_campaign_form

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.design.captive_information import GaugeErrors, PlannedCampaign
-from tank2sim.design.captive_runs import PlannedRun
+from tank2sim.apps.design.captive_information import GaugeErrors, PlannedCampaign
+from tank2sim.apps.design.captive_runs import PlannedRun
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.records.campaign_form import ModelSection
 from tank2sim.records.campaigns import FORCE_COLUMNS, read_campaign

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from tank2sim.apps.design.captive_runs import TankRuns, time_of
+from tank2sim.apps.design.tank_form import TankFile, read_tank
 from tank2sim.cards.writing import TestedRange
-from tank2sim.design.captive_runs import TankRuns, time_of
-from tank2sim.design.tank_form import TankFile, read_tank
 from tank2sim.errors import InputError
 
 LARGEST = TestedRange(math.radians(12.0), math.radians(35.0), 0.6)

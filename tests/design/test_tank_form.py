@@ -3,7 +3,7 @@
 import pytest
 
 import tank2sim as t2s
-from tank2sim.design.tank_form import TankFile, refuse_contradictions
+from tank2sim.apps.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.errors import InputError
 
 

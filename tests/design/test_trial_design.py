@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.design import design_trial
+from tank2sim.apps.design.command import design_trial
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import cumulative_simpson, solve_ivp
 
+from tank2sim.apps.rigs.glider.model import glider_warnings
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.glider import glider_warnings
 from tank2sim.simulation.integrator import Integrator
 
 PROBE = read_card("kulikovsky-velikanov")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tank2sim.dynamics.surge import SurgeCoefficients, drag, surge_model
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients, drag, surge_model
 from tank2sim.simulation.scheme import runge_kutta_step
 
 FORCE_N = 11.63

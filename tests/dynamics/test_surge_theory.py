@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from tank2sim.dynamics.surge import SurgeCoefficients, drag
-from tank2sim.dynamics.surge_theory import TowedBody, drag_polynomial, mass_by_theory, masses_by_theory
-from tank2sim.identification.tow import paper as tow_paper
+from tank2sim.apps.rigs.tow import paper as tow_paper
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients, drag
+from tank2sim.apps.rigs.tow.theory import TowedBody, drag_polynomial, mass_by_theory, masses_by_theory
 
 BODY = TowedBody(length_m=3.8, beam_m=0.9, volume_m3=2.243)
 

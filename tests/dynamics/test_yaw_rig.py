@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tank2sim.cards import YawRigCard, read_card
-from tank2sim.cards.form import TankWalls, YawRig
+from tank2sim.apps.rigs.yaw.card import TankWalls, YawRig, YawRigCard
+from tank2sim.apps.rigs.yaw.model import ELLIPSOID_T1, SHIP_T1, wall_nearness, yaw_rig_model
+from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, wall_nearness, yaw_rig_model
 from tank2sim.errors import InputError
 from tests.yaw_truth import Truth
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tank2sim.dynamics import yaw_theory as theory
+from tank2sim.apps.rigs.yaw import theory
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
 from tests.dynamics.ellipsoid_quadrature import by_quadrature, turning
 

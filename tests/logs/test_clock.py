@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tank2sim.logs.clock import board_start, continued_clock, full_year, gaps_of, rollover_s, tidied, utc_text
-from tank2sim.logs.streams import LogStream
+from tank2sim.apps.logs.clock import board_start, continued_clock, full_year, gaps_of, rollover_s, tidied, utc_text
+from tank2sim.apps.logs.streams import LogStream
 
 TRUE = 1_700_000_000.0 + np.arange(100.0)
 

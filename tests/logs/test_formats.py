@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.logs.reading import read_log
-from tank2sim.logs.voyage import Voyage, make_voyage
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.voyage import Voyage, make_voyage
 from tests.conftest import DATA
 from tests.marks import first_fast
 

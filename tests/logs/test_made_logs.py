@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.api.log import log
+from tank2sim.apps.logs.clock import utc_text
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.nmea0183 import read_nmea0183
+from tank2sim.apps.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name, unit_of_signal_k
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.reference import local_metres
+from tank2sim.apps.logs.table import read_table_log
 from tank2sim.errors import InputError
-from tank2sim.logs.clock import utc_text
-from tank2sim.logs.nmea0183 import read_nmea0183
-from tank2sim.logs.quantities import QUANTITIES, quantity_of_name, sign_of_name, unit_of_signal_k
-from tank2sim.logs.reading import read_log
-from tank2sim.logs.reference import local_metres
-from tank2sim.logs.table import read_table_log
 from tank2sim.records.spelt_units import split_unit
 from tests.logs.made_logs import T0, candump_lines, frame, nmea_lines, rmc, sentence, voyage
 from tests.marks import first_fast

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.api.log import log
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.reading import read_log
 from tank2sim.errors import InputError
-from tank2sim.logs.reading import read_log
 from tests.logs.made_logs import T0, can_frame, candump_lines, frame, voyage
 from tests.logs.recorders import dataflash
 from tests.marks import first_fast

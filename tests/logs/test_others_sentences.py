@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.api.log import log
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.reading import read_log
 from tank2sim.errors import InputError
-from tank2sim.logs.reading import read_log
 from tests.logs.made_logs import T0, frame, nmea_lines, sentence
 
 pytest.importorskip("pynmea2")

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.api.log import log
+from tank2sim.apps.logs.channel_search import find_channels
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.missing import without_missing
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.errors import InputError
-from tank2sim.logs.channel_search import find_channels
-from tank2sim.logs.missing import without_missing
-from tank2sim.logs.reading import read_log
-from tank2sim.logs.streams import LogStream
 from tests.logs.made_logs import T0, frame, voyage
 from tests.marks import first_fast
 

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tank2sim.api.log import log
-from tank2sim.logs import px4
-from tank2sim.logs.pulses import pulses_of
-from tank2sim.logs.reading import read_log
-from tank2sim.logs.streams import LogStream
+from tank2sim.apps.logs import px4
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.pulses import pulses_of
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.streams import LogStream
 from tests.logs.made_logs import T0, craft, frame, motion, voyage
 from tests.marks import first_fast
 

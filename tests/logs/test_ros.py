@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.api.log import log
-from tank2sim.logs.reading import read_log
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.reading import read_log
 from tests.logs.made_logs import T0, degrees, voyage
 from tests.marks import first_fast
 

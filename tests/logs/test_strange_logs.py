@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.api.log import log
-from tank2sim.logs.channels import LogChannel
-from tank2sim.logs.content import AGREES, direction_evidence
-from tank2sim.logs.quantities import quantity_of_name
-from tank2sim.logs.reading import read_log
-from tank2sim.logs.reference import ReferenceMotion
+from tank2sim.apps.logs.channels import LogChannel
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.content import AGREES, direction_evidence
+from tank2sim.apps.logs.quantities import quantity_of_name
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.reference import ReferenceMotion
 from tests.logs.made_logs import T0, craft, frame, motion, nmea_lines, sentence, voyage
 
 DAY = 86400.0

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.log import log
-from tank2sim.logs.clock import utc_text
+from tank2sim.apps.logs.clock import utc_text
+from tank2sim.apps.logs.command import log
 from tank2sim.records.reading import read_trial_file
 from tests.logs.made_logs import T0, frame, steered, truth_manoeuvres, voyage
 from tests.marks import first_fast

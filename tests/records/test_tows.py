@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
+from tank2sim.apps.rigs.tow.records import read_tows
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
-from tank2sim.records.tows import read_tows
 
 GOOD = "t_s,speed_1_mps,speed_2_mps\n0,0,0\n5,0.01,0.02\n10,0.03,\n15,0.04,0.06\n20,0.05,0.07\n"
 

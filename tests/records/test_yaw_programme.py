@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tank2sim.records.yaw_programme import PAPER_PROGRAMME, Similarity, YawProgramme, full_turns
+from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, Similarity, YawProgramme, full_turns
 from tests.yaw_truth import Truth
 
 PROGRAMMES = st.builds(

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.analysis.glide.study import GlideQuestion, study_glider
 from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.apps.rigs.glider.charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
+from tank2sim.apps.rigs.glider.programme import read_programme
+from tank2sim.apps.rigs.glider.result import GlideResult
+from tank2sim.apps.rigs.glider.study import GlideQuestion, study_glider
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
-from tank2sim.results.glide import GlideResult
-from tank2sim.results.glide_charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
-from tank2sim.simulation.glide_programme import read_programme
 from tests.report.drawn import line
 
 PROBE = read_card("kulikovsky-velikanov")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tank2sim.analysis.guess.study import GuessedFigure, GuessedNumber, GuessStudy
-from tank2sim.results.guess import GuessResult
+from tank2sim.apps.guess.result import GuessResult
+from tank2sim.apps.guess.study import GuessedFigure, GuessedNumber, GuessStudy
 from tank2sim.simulation.bands import Band
 
 STUDY = GuessStudy(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import tank2sim as t2s
-from tank2sim.results.log import LogResult
+from tank2sim.apps.logs.result import LogResult
 from tests.logs.made_logs import frame
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.records.signals.analysis import SignalSettings, SignalsStudy, analyse, filtered
+from tank2sim.apps.signals.result import SignalsResult
+from tank2sim.apps.signals.study import SignalSettings, SignalsStudy, analyse, filtered
 from tank2sim.records.signals.filtering import savitzky_golay
 from tank2sim.records.signals.sampling import even_series
-from tank2sim.results.signals import SignalsResult
 from tests.records.signals.made import first_order, nomoto, trial
 
 

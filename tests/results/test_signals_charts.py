@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.records.signals.analysis import SignalSettings, analyse
-from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.correlation import autocorrelation, cross_correlation
-from tank2sim.records.signals.filtering import FilterType, butterworth
-from tank2sim.records.signals.spectra import spectrum, transfer_function
-from tank2sim.results.signals_charts import (
+from tank2sim.apps.signals.charts import (
     autocorrelation_chart,
     cross_correlation_chart,
     density_chart,
@@ -15,6 +10,11 @@ from tank2sim.results.signals_charts import (
     spectrum_chart,
     transfer_chart,
 )
+from tank2sim.apps.signals.study import SignalSettings, analyse
+from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.signals.correlation import autocorrelation, cross_correlation
+from tank2sim.records.signals.filtering import FilterType, butterworth
+from tank2sim.records.signals.spectra import spectrum, transfer_function
 from tests.records.signals.made import first_order, nomoto, series, trial
 
 YAW, RUDDER = SignalName("r_radps"), SignalName("delta_rad")

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tank2sim.apps.rigs.tow import paper as tow_paper
+from tank2sim.apps.rigs.tow.charts import drag_chart, tow_speed_chart
+from tank2sim.apps.rigs.tow.identify import identify_tow
+from tank2sim.apps.rigs.tow.records import read_tows
+from tank2sim.apps.rigs.tow.result import TowResult
+from tank2sim.apps.rigs.tow.study import TowSpeeds, study_tows, towed_body
 from tank2sim.bundled import bundled
-from tank2sim.identification.tow import paper as tow_paper
-from tank2sim.identification.tow.identify import identify_tow
-from tank2sim.identification.tow.study import TowSpeeds, study_tows, towed_body
-from tank2sim.records.tows import read_tows
-from tank2sim.results.tow import TowResult
-from tank2sim.results.tow_charts import drag_chart, tow_speed_chart
 from tests.report.drawn import panels, rows_of, whole_panel
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
-from tank2sim.identification.yaw.study import study_yaw
-from tank2sim.records.yaw import read_yaw_record
-from tank2sim.results.yaw import YawResult
+from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw
+from tank2sim.apps.rigs.yaw.records import read_yaw_record
+from tank2sim.apps.rigs.yaw.result import YawResult
+from tank2sim.apps.rigs.yaw.study import study_yaw
 from tests.report.drawn import rows_of
 from tests.yaw_truth import Truth, record, written
 

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
+from tank2sim.apps.rigs.glider.programme import follow_programme, read_programme
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.simulation.glide_programme import follow_programme, read_programme
 from tank2sim.simulation.integrator import Integrator
 
 MODEL = build(read_card("kulikovsky-velikanov"))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, SHIP_T2
+from tank2sim.apps.rigs.yaw.control import AdaptiveController, TunedController
+from tank2sim.apps.rigs.yaw.model import ELLIPSOID_T1, SHIP_T1, SHIP_T2
+from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, dissipation_from_work, inertia_from_work
+from tank2sim.apps.rigs.yaw.simulation import Measuring, run_yaw_rig
 from tank2sim.errors import InputError
-from tank2sim.records.yaw_programme import PAPER_PROGRAMME, dissipation_from_work, inertia_from_work
-from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig
-from tank2sim.simulation.yaw_rig_control import AdaptiveController, TunedController
 
 EXACT = Measuring(encoder=False)
 START = TunedController(inertia_kgm2=0.0505)

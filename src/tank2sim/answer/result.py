@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import importlib
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -98,7 +97,9 @@ class Result(ABC, Generic[_S]):
         """`ship`: the :class:`tank2sim.Ship` of the card found, of a result that has a `card`."""
         if name != "ship" or (card := getattr(self, "card", None)) is None:
             raise AttributeError(f"{type(self).__name__} has no {name}")
-        return importlib.import_module("tank2sim.api.ship").Ship(card)  # the API is above this room
+        from tank2sim import Ship  # the front page is above all rooms
+
+        return Ship(card)
 
     def __dir__(self) -> list[str]:
         found_on_demand = getattr(type(self), "card", None) is not None

@@ -16,8 +16,8 @@ from tank2sim.files import FMU
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tank2sim.api.ship import Ship
     from tank2sim.arrays import Array
+    from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
 
 LARGEST_CHANGE_DEG = 170.0
@@ -56,7 +56,7 @@ def write_controller(
     Output("--export", FMU, "Write the controller as an FMU.", write_controller, "AP.fmu"),
 )
 def autopilot(
-    ship: Ship,
+    ship: Vessel,
     design: Literal["pd", "pid", "lqr", "robust"] = "pid",
     *,
     speed_mps: SpeedArgument | None = None,
@@ -76,7 +76,7 @@ def autopilot(
 
     Parameters
     ----------
-    ship : Ship
+    ship : Vessel
         A ship with a rudder, or a craft with thrusters. A craft takes the speed and the change of course alone.
     design : str
         Way of design.
@@ -147,7 +147,7 @@ def autopilot(
 
 
 def _pilot_craft(
-    ship: Ship, speed_mps: float | None, course_change_deg: float, rest: dict[str, Any]
+    ship: Vessel, speed_mps: float | None, course_change_deg: float, rest: dict[str, Any]
 ) -> CraftAutopilotResult:
     """The autopilot of a craft; `rest` are the arguments that only a ship takes."""
     from tank2sim.analysis.heading.craft import study_craft_autopilot

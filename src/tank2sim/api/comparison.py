@@ -10,14 +10,14 @@ from tank2sim.api.verbs import verb
 from tank2sim.arguments import VALIDATION_MEMBERS, SmallEnsemble
 
 if TYPE_CHECKING:
-    from tank2sim.api.ship import Ship
     from tank2sim.cards import Card
+    from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.comparison import ComparisonResult
 
 
 @verb("cards of one ship side by side")
 def compare(
-    cards: Sequence[Ship | Card | str | Path], *, members: SmallEnsemble = VALIDATION_MEMBERS
+    cards: Sequence[Vessel | Card | str | Path], *, members: SmallEnsemble = VALIDATION_MEMBERS
 ) -> ComparisonResult:
     """Compare cards of one ship, or of ships and models of one form; the first is the reference, whose size is taken.
 
@@ -25,7 +25,7 @@ def compare(
 
     Parameters
     ----------
-    cards : sequence of Ship, Card, str or path
+    cards : sequence of Vessel, Card, str or path
         Two or more (captive, trial, estimate: in any order).
     members : int
         Ships drawn within the errors of each card for the deviations of the figures; 0 for none.
@@ -45,8 +45,8 @@ def compare(
     ['Yv']
     """
     from tank2sim.analysis.validation.comparison import compare_cards
-    from tank2sim.api.ship import as_ship
+    from tank2sim.dynamics.vessel import as_vessel
     from tank2sim.results.comparison import ComparisonResult
 
-    ships = [as_ship(card) for card in ([cards] if isinstance(cards, str | Path) else cards)]
+    ships = [as_vessel(card) for card in ([cards] if isinstance(cards, str | Path) else cards)]
     return ComparisonResult(compare_cards([ship.steered() for ship in ships], members), tuple(ships))

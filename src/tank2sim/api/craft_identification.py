@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.api.ship import Ship, as_ship
 from tank2sim.arguments import checked
 from tank2sim.cards import Card, CraftCard
+from tank2sim.dynamics.vessel import Vessel, as_vessel
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import FreePrediction, fit_craft, predict_free
@@ -29,7 +29,7 @@ CraftTrialPaths = str | Path | Sequence[str | Path]
 
 @checked
 def identify_craft(
-    card: Ship | Card | str | Path,
+    card: Vessel | Card | str | Path,
     trials: CraftTrialPaths,
     *,
     holdout: CraftTrialPaths = (),
@@ -43,7 +43,7 @@ def identify_craft(
 
     Parameters
     ----------
-    card : Ship, Card, str or path
+    card : Vessel, Card, str or path
         Of kind ``small_craft``: mass and places of the thrusters are taken as exact, all else with the standard errors
         that it states, or wide ones.
     trials, holdout : path or sequence of paths
@@ -69,7 +69,7 @@ def identify_craft(
     >>> abs(found.card.thrusters[0].ahead_Ns2 / 0.01108 - 1) < 0.05
     True
     """
-    ship = as_ship(card)
+    ship = as_vessel(card)
     if not isinstance(ship.card, CraftCard):
         raise InputError(ship.card.source, "model.kind", "is not small_craft", "t2s.identify takes cards of ships")
     fitted, held = craft_trial_files(trials), craft_trial_files(holdout)

@@ -11,13 +11,13 @@ from tank2sim.errors import ArgumentError
 from tank2sim.files import FMU, SYSTEM
 
 if TYPE_CHECKING:
-    from tank2sim.api.ship import Ship
+    from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.fmu import CheckResult, ExportResult
 
 
-@verb("the FMU, Model Exchange and Co-Simulation")
+@verb("the FMU, Model Exchange and Co-Simulation", name="export")
 def make_fmu_file(
-    ship: Ship,
+    ship: Vessel,
     output: Annotated[Path, Written(FMU, "SHIP.fmu")],
     *,
     fmi: Literal[2, 3] = 2,
@@ -32,7 +32,7 @@ def make_fmu_file(
 
     Parameters
     ----------
-    ship : Ship
+    ship : Vessel
     output : path
         The FMU.
     fmi : int
@@ -93,8 +93,12 @@ def make_fmu_file(
     return ExportResult(study, made, files)
 
 
-@verb("an FMU validated, and compared with its reference", exit_code=lambda result: 0 if result.passed else 1)
-def check_fmu(fmu: str | Path, card: Ship | str | Path | None = None) -> CheckResult:
+@verb(
+    "an FMU validated, and compared with its reference",
+    exit_code=lambda result: 0 if result.passed else 1,
+    name="check",
+)
+def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
 
     It runs the FMU's own code with your rights: check only files from sources that you trust. The command ends with
@@ -104,7 +108,7 @@ def check_fmu(fmu: str | Path, card: Ship | str | Path | None = None) -> CheckRe
     ----------
     fmu : path
         FMI 2.0 or 3.0, with a library for this machine.
-    card : Ship, optional
+    card : Vessel, optional
         What the FMU should be: a card, or the name of a bundled ship; by default the card inside it.
 
     Raises
@@ -112,10 +116,10 @@ def check_fmu(fmu: str | Path, card: Ship | str | Path | None = None) -> CheckRe
     InputError
         The file is missing, not an FMU, of another version of FMI, or has no library for this machine.
     """
-    from tank2sim.api.ship import as_ship
     from tank2sim.cards import parse_card
     from tank2sim.dynamics import build
     from tank2sim.dynamics.simulator_interface import with_simulator_interface
+    from tank2sim.dynamics.vessel import as_vessel
     from tank2sim.fmu.check import compare_with_model
     from tank2sim.fmu.unpacking import embedded_card
     from tank2sim.marks import marked
@@ -124,7 +128,7 @@ def check_fmu(fmu: str | Path, card: Ship | str | Path | None = None) -> CheckRe
     path = Path(fmu)
     text = embedded_card(path) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
-    model = inside if card is None else as_ship(card).model
+    model = inside if card is None else as_vessel(card).model
     report = compare_with_model(path, model=model and with_simulator_interface(model))
     lacking = "the FMU carries no card: only its description was validated; give --card to compare"
     doubts = marked(model.notices) if model else ()

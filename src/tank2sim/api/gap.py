@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.arguments import Count, Effects, NumberArgument, checked
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.vessel import Vessel, as_vessel
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin
 from tank2sim.gap.fleet.search import nonlinear_card
@@ -33,7 +33,7 @@ SUREST_WRONG = round(1 - SUREST, 9)
 
 @checked
 def find_gap(
-    card: Ship | Card | str | Path,
+    card: Vessel | Card | str | Path,
     trials: TrialPaths,
     *,
     holdout: TrialPaths = (),
@@ -49,7 +49,7 @@ def find_gap(
 
     Parameters
     ----------
-    card : Ship, Card, str or path
+    card : Vessel, Card, str or path
         The ship as it is known (an ``abkowitz`` card).
     trials, holdout : path or sequence of paths
         Trials that name the effect, and trials that only prove it; a folder means the trials in it.
@@ -73,7 +73,7 @@ def find_gap(
         A file is at fault, a trial is too short, an effect is not known or cannot be tried on this card, or an option
         is out of its range.
     """
-    ship = nonlinear_card(as_ship(card).card)
+    ship = nonlinear_card(as_vessel(card).card)
     options = gap_options(effects, without, max_effects, workers, false_discovery)
     with _workers(executor, workers) as pool:
         fitted, held = fitted_and_held(trials, holdout, ship, report_unused=False)  # a search uses them

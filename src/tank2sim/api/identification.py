@@ -9,10 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from tank2sim.analysis.ensemble.draws import by_file_name
-from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.arguments import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, checked
 from tank2sim.cards import Card, parse_card
+from tank2sim.dynamics.vessel import Vessel, as_vessel
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
@@ -31,7 +31,7 @@ from tank2sim.results.identification import IdentificationResult
 
 @checked
 def identify(
-    card: Ship | Card | str | Path,
+    card: Vessel | Card | str | Path,
     trials: TrialPaths,
     *,
     holdout: TrialPaths = (),
@@ -55,7 +55,7 @@ def identify(
 
     Parameters
     ----------
-    card : Ship, Card, str or path
+    card : Vessel, Card, str or path
         What is known of the ship beforehand; its standard errors say how well.
     trials, holdout : path, TrialRecord, or sequence of them
         Trials to fit, and trials only to compare with; a folder means the trials in it.
@@ -109,7 +109,7 @@ def identify(
     ):
         if value not in known:
             raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
-    ship = as_ship(card).manoeuvring()
+    ship = as_vessel(card).manoeuvring()
     options = IdentificationOptions(
         method=method,
         structure=structure,

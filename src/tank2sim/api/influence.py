@@ -25,7 +25,7 @@ from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 
 if TYPE_CHECKING:
     from tank2sim.analysis.influence.card_influence import InfluenceStudy
-    from tank2sim.api.ship import Ship
+    from tank2sim.dynamics.vessel import Vessel
 
 
 DEFAULT_FIGURES = (
@@ -44,7 +44,7 @@ _INDEPENDENT = (
 
 
 def influence_of_ship(
-    ship: Ship, figures: Sequence[str], joint_variation: Mapping[str, float], ensemble: EnsembleOptions
+    ship: Vessel, figures: Sequence[str], joint_variation: Mapping[str, float], ensemble: EnsembleOptions
 ) -> InfluenceResult:
     """Influence coefficients of a ship. Raises as :meth:`.Ship.influence`.
 
@@ -81,7 +81,7 @@ def craft_figures(card: CraftCard) -> list[InfluenceFigure]:
 
 
 def tune_ship(
-    ship: Ship, targets: Sequence[str], figures: Sequence[str], means: Means, ensemble: EnsembleOptions
+    ship: Vessel, targets: Sequence[str], figures: Sequence[str], means: Means, ensemble: EnsembleOptions
 ) -> TuningResult:
     """Tune a ship's card to targets. Raises as :meth:`.Ship.tune`.
 
@@ -109,7 +109,7 @@ def tune_ship(
     return TuningResult(reported, ship, card)
 
 
-def _tuned_card(ship: Ship, tuned: Tuned) -> tuple[Card, tuple[str, ...]]:
+def _tuned_card(ship: Vessel, tuned: Tuned) -> tuple[Card, tuple[str, ...]]:
     """The tuned card, and notices on its covariance."""
     card = ship.steered()
     return derived_card(card, tuned_text(card, tuned), "the tuned card")
@@ -121,7 +121,7 @@ def _reported(found: CardInfluence, notices: Sequence[str] = ()) -> InfluenceStu
     return replace(found.reported(), notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler])))
 
 
-def _bands(ship: Ship, study: Study, ensemble: EnsembleOptions) -> FigureBands | None:
+def _bands(ship: Vessel, study: Study, ensemble: EnsembleOptions) -> FigureBands | None:
     if not ensemble.members:
         return None
     names = [figure.text for figure in study.figures]

@@ -15,11 +15,11 @@ from tank2sim.simulation.manoeuvres import Manoeuvre, PullOut
 from tank2sim.simulation.run import simulate
 
 if TYPE_CHECKING:
-    from tank2sim.api.ship import Ship
+    from tank2sim.dynamics.vessel import Vessel
 
 
 def simulate_manoeuvre(
-    ship: Ship,
+    ship: Vessel,
     manoeuvre: Manoeuvre,
     words: str,
     duration_s: float | None,

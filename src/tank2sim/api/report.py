@@ -16,7 +16,7 @@ _REMEDY = "give what a command wrote with --json"
 _FAULTS = (AttributeError, IndexError, KeyError, TypeError, ValueError, ArithmeticError)
 
 
-@verb("one page of any result", page_required=True)
+@verb("one page of any result", page_required=True, name="report")
 def make_report(result: Mapping[str, object] | str | Path) -> Result[Any]:
     """Read a result back: its page, tables and charts are those of the command that wrote it.
 

@@ -17,11 +17,11 @@ from tank2sim.results.stability import StabilityResult
 from tank2sim.simulation.integrator import NO_COMPILER
 
 if TYPE_CHECKING:
-    from tank2sim.api.ship import Ship
+    from tank2sim.dynamics.vessel import Vessel
 
 
 def judge_stability(
-    ship: Ship, speed_mps: float | None, *, spirals: bool, ensemble: EnsembleOptions
+    ship: Vessel, speed_mps: float | None, *, spirals: bool, ensemble: EnsembleOptions
 ) -> StabilityResult:
     """Stability of a ship, with an ensemble if it has members. Raises as :meth:`.Ship.stability`."""
     study = stability_study(ship.model, speed_mps, spirals=spirals)
@@ -36,7 +36,7 @@ def judge_stability(
     return StabilityResult(study, ship)
 
 
-def judge_craft_stability(ship: Ship, speed_mps: float | None) -> CraftStabilityResult:
+def judge_craft_stability(ship: Vessel, speed_mps: float | None) -> CraftStabilityResult:
     """Stability of a craft. Raises as :meth:`.Ship.stability`."""
     assert isinstance(ship.card, CraftCard)
     return CraftStabilityResult(craft_stability(ship.card, speed_mps), ship)

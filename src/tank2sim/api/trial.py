@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from tank2sim.api.commands import VERBS
 from tank2sim.arguments import checked
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -20,10 +21,10 @@ from tank2sim.records.trials import Trial
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tank2sim.answer.result import Result
     from tank2sim.cards import ManoeuvringCard
     from tank2sim.identification.trials.problem.prepare_trials import Measured
     from tank2sim.results.audit import AuditResult
-    from tank2sim.results.signals import SignalsResult
 
 
 class TrialRecord:
@@ -82,9 +83,8 @@ class TrialRecord:
 
     def audit(self) -> AuditResult:
         """What is wrong with the data, as :func:`tank2sim.audit` finds it."""
-        from tank2sim.api.audit import audit
-
-        return audit(self)
+        result: AuditResult = VERBS["audit"].function(self)
+        return result
 
     def signals(
         self,
@@ -93,11 +93,12 @@ class TrialRecord:
         max_gap_s: float | None = None,
         segment_s: float | None = None,
         filter: str | None = None,
-    ) -> SignalsResult:
+    ) -> Result[Any]:
         """Statistics and spectra of the columns, and a `filter`; parameters are those of :func:`tank2sim.signals`."""
-        from tank2sim.api.signals import signals
-
-        return signals(self, columns, max_gap_s=max_gap_s, segment_s=segment_s, filter=filter)
+        result: Result[Any] = VERBS["signals"].function(
+            self, columns, max_gap_s=max_gap_s, segment_s=segment_s, filter=filter
+        )
+        return result
 
     def __repr__(self) -> str:
         columns = file_columns(self.trial)

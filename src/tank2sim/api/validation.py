@@ -10,15 +10,15 @@ from tank2sim.api.verbs import verb
 from tank2sim.arguments import REQUIRED_PERCENT, VALIDATION_MEMBERS, PositiveArgument, SmallEnsemble
 
 if TYPE_CHECKING:
-    from tank2sim.api.ship import Ship
     from tank2sim.api.trial import TrialRecord
+    from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.craft_validation import CraftValidationResult
     from tank2sim.results.validation import ValidationResult
 
 
 @verb("a validation report after ITTC 7.5-02-06-03")
 def validate(
-    ship: Ship,
+    ship: Vessel,
     trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),
     *,
     members: SmallEnsemble = VALIDATION_MEMBERS,
@@ -31,7 +31,7 @@ def validate(
 
     Parameters
     ----------
-    ship : Ship, Card, str or path
+    ship : Vessel, Card, str or path
     trials : path, TrialRecord, or sequence of them
         Turning circles and zigzags; a folder means the trials in it. Without any, the model is documented and
         verified.

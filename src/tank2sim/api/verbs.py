@@ -68,6 +68,8 @@ class Verb:
     Parameters
     ----------
     function : callable
+    name : str
+        Of the command.
     words : str
         A few words for the list of commands.
     outputs : sequence of Output
@@ -84,6 +86,7 @@ class Verb:
     """
 
     function: Callable[..., Any]
+    name: str
     words: str
     outputs: Sequence[Output] = ()
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
@@ -93,7 +96,7 @@ class Verb:
     exit_code: Callable[[Any], int] = lambda _: 0
 
 
-def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:
+def verb(words: str, *outputs: Output, name: str = "", **more: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:
     """Declare a function a verb: its arguments are checked by their annotations, and it is a command.
 
     A first argument `ship` may also be a card, its file, or the name of a bundled ship.
@@ -103,6 +106,8 @@ def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T
     words : str
         A few words for the list of commands.
     *outputs : Output
+    name : str
+        Of the command; by default the name of the function.
     **more
         Further fields of :class:`Verb`.
     """
@@ -115,12 +120,12 @@ def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T
         def call(*args: _P.args, **options: _P.kwargs) -> _T:
             if first != "ship":
                 return checking(*args, **options)
-            from tank2sim.api.ship import as_ship
+            from tank2sim.dynamics.vessel import as_vessel
 
             ship, *rest = args or (options.pop("ship", None),)
-            return checking(as_ship(ship), *rest, **options)  # type: ignore[arg-type]
+            return checking(as_vessel(ship), *rest, **options)  # type: ignore[arg-type]
 
-        call.verb = Verb(call, words, outputs, **more)  # type: ignore[attr-defined]
+        call.verb = Verb(call, name or function.__name__, words, outputs, **more)  # type: ignore[attr-defined]
         return call
 
     return declare

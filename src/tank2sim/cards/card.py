@@ -8,30 +8,24 @@ from pathlib import Path
 
 from tank2sim.cards.covariance import Covariance, covariance_file, not_referring, referring
 from tank2sim.cards.form import (
+    BodyModel,
     BodySection,
     CraftModel,
     EffectEntry,
     Environment,
     FittedTrial,
-    Glider,
-    GliderModel,
     MmgModel,
     MmgPropeller,
     MmgRudder,
     MmgShipSection,
-    ProgrammeSection,
     Propulsion,
     RigidBody,
     Roll,
     ShipModel,
     ShipSection,
     SteeringGear,
-    Surge,
-    SurgeModel,
     ThrusterSection,
     WavesSection,
-    YawRig,
-    YawRigModel,
 )
 from tank2sim.cards.scaling import Bis, FileScales, PrimeII, Scales, file_factor
 from tank2sim.cards.terms import known_term
@@ -69,7 +63,7 @@ class Card:
     text: str
     ship: BodySection
     environment: Environment
-    model: ShipModel | CraftModel | SurgeModel | GliderModel | YawRigModel
+    model: ShipModel | CraftModel | BodyModel
     covariance: Covariance | None = field(default=None, kw_only=True, compare=False, repr=False)
 
     def files(self, path: Path) -> dict[Path, str | bytes]:
@@ -293,33 +287,6 @@ class CraftCard(Card):
 
 SteeredCard = ManoeuvringCard | CraftCard
 """Card of a vessel that is steered in the horizontal plane, by a rudder or by thrusters."""
-
-
-@dataclass(frozen=True)
-class SurgeBodyCard(Card):
-    """Card of a body that only surges: (1.5) of paper 1, SI."""
-
-    model: SurgeModel
-    surge: Surge
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class GliderCard(Card):
-    """Card of an underwater glider: paper 5 (Kulikovsky and Velikanov 2012), SI."""
-
-    model: GliderModel
-    glider: Glider
-
-
-@dataclass(frozen=True)
-class YawRigCard(Card):
-    """Card of a body on the yaw rig: (3) of paper 3 (Alyshev 2019), SI, and the programme that it runs."""
-
-    model: YawRigModel
-    yaw_rig: YawRig
-    programme: ProgrammeSection | None = None
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
 
 
 CRAFT_COMMANDS = (

@@ -140,24 +140,10 @@ class MmgModel(ShipModel):
         return self.valid_speed_mps or (LOWEST_OF_MMG * self.speed_mps, 1.2 * self.speed_mps)
 
 
-class SurgeModel(CardSection):
-    """``[model]`` of a body that only surges (eq. 1.5)."""
+class BodyModel(CardSection):
+    """``[model]`` of a body that is neither a ship nor a craft; the form of its kind says more of `kind`."""
 
-    kind: Literal["surge"]
-    valid_speed_mps: SpeedRange | None = None
-
-
-class GliderModel(CardSection):
-    """``[model]`` of an underwater glider."""
-
-    kind: Literal["glider"]
-    valid_speed_mps: SpeedRange | None = None
-
-
-class YawRigModel(CardSection):
-    """``[model]`` of a body that a motor turns in a tank."""
-
-    kind: Literal["yaw_rig"]
+    kind: str
     valid_speed_mps: SpeedRange | None = None
 
 
@@ -347,140 +333,6 @@ class MmgRudder(CardSection):
     C_Rrrv: Coefficient | None = None
 
 
-class Surge(CardSection):
-    """``[surge]``: coefficients of (1.5), M dv/dt + B1 v^4 + B2 v^3 + B3 v^2 = T."""
-
-    total_mass_kg: Mass
-    B1_kgs2pm3: float = 0.0
-    B2_kgspm2: float = 0.0
-    B3_kgpm: float
-    force_N: float = 0.0
-    dry_mass_kg: Mass | None = None
-
-
-class Glider(CardSection):
-    """``[glider]``: mass, size and coefficients of an underwater glider, SI, incidence in rad.
-
-    C_L = ``lift_slope`` alpha + ``lift_quadratic`` alpha |alpha|; C_D = ``drag_zero`` + ``drag_quadratic`` alpha^2;
-    both with ``reference_area_m2``. ``mass_kg`` is that of hull and ballast, ``buoyancy_kg`` the size of the net
-    buoyancy (displaced mass less own mass) with which it usually glides.
-    """
-
-    mass_kg: Mass
-    volume_m3: Positive
-    buoyancy_kg: Mass
-    hull_mass_kg: Mass | None = None
-    reference_area_m2: Annotated[float, Field(ge=1e-6, le=1e6)]
-    lift_slope: Annotated[float, Field(ge=1e-3, le=1e4)]
-    lift_quadratic: Annotated[float, Field(ge=0.0, le=1e4)]
-    drag_zero: Annotated[float, Field(ge=1e-6, le=1e3)]
-    drag_quadratic: Annotated[float, Field(ge=1e-3, le=1e4)]
-    added_mass_axial_kg: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
-    added_mass_normal_kg: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
-    buoyancy_time_constant_s: TimeConstant = 10.0
-    pitch_time_constant_s: TimeConstant = 5.0
-    roll_time_constant_s: TimeConstant = 5.0
-
-
-class TankWalls(CardSection):
-    """``[yaw_rig.walls]``: a rectangular tank, and the coefficients of lambda_66l and f_66l; SI.
-
-    Each is c_a/(l_a + 1) + c_f/(l_f + 1), l_a and l_f in m from the ends of the waterline to the nearest wall. (Paper 3
-    says "the flat wall"; the nearest of the four is our choice. Its a is the bow, its f the stern.)
-
-    Parameters
-    ----------
-    length_m, breadth_m : float
-        The tank, along the body's axis at psi = 0 and across it.
-    x_m, y_m : float
-        Axis of rotation, from the middle of the tank.
-    body_length_m : float
-        On the waterline.
-    bow_inertia_kgm2, stern_inertia_kgm2 : float
-        lambda_66a0, lambda_66f0.
-    bow_damping_Nms, stern_damping_Nms : float
-        f_66a0, f_66f0, N m s.
-
-    Raises
-    ------
-    ValueError
-        The body strikes the walls when it turns.
-    """
-
-    length_m: Length = 1.6
-    breadth_m: Length = 1.4
-    x_m: float = 0.0
-    y_m: float = 0.0
-    body_length_m: Length
-    bow_inertia_kgm2: float = 0.0
-    stern_inertia_kgm2: float = 0.0
-    bow_damping_Nms: float = 0.0
-    stern_damping_Nms: float = 0.0
-
-    @model_validator(mode="after")
-    def _holds_the_body(self) -> Self:
-        reach = self.body_length_m / 2
-        if abs(self.x_m) + reach >= self.length_m / 2 or abs(self.y_m) + reach >= self.breadth_m / 2:
-            raise ValueError(f"a body of {self.body_length_m:g} m strikes the walls of the tank when it turns")
-        return self
-
-
-class YawRig(CardSection):
-    """``[yaw_rig]``: coefficients of (3) of paper 3, motor, current loop and encoder, SI.
-
-    Parameters
-    ----------
-    inertia_kgm2 : float
-        J_zz, of the body with the rotor of the motor.
-    added_inertia_kgm2 : float
-        lambda_661; 0 in air.
-    coulomb_Nm, viscous_Nms, quadratic_Nms2 : float
-        f_c, f_1 (in water f_12 + f_661), f_662.
-    torque_constant_NmpA, current_lag_s, max_current_A : float
-        k_t, T_c, and the largest current asked of the motor.
-    inertia_accelerating_kgm2, inertia_braking_kgm2 : float
-        lambda_662a, lambda_662d at 1 rad/s.
-    braking_quadratic_Nms2 : float, optional
-        f_662d; by default `quadratic_Nms2`, which is then f_662a = f_662d.
-    gravity_Nm, gravity_angle_rad : float
-        Moment of gravity -G sin(psi - psi_0).
-    pulses_per_turn : float
-        Pulses of the encoder in a turn.
-    walls : TankWalls, optional
-    """
-
-    inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1e15)]
-    added_inertia_kgm2: float = 0.0
-    coulomb_Nm: float = 0.0
-    viscous_Nms: float = 0.0
-    quadratic_Nms2: float = 0.0
-    torque_constant_NmpA: Annotated[float, Field(ge=1e-6, le=1e6)]
-    current_lag_s: TimeConstant = 0.055
-    max_current_A: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.0
-    inertia_accelerating_kgm2: float = 0.0
-    inertia_braking_kgm2: float = 0.0
-    braking_quadratic_Nms2: float | None = None
-    gravity_Nm: float = 0.0
-    gravity_angle_rad: float = 0.0
-    pulses_per_turn: Annotated[float, Field(ge=4, le=1e9)] = 3000.0
-    walls: TankWalls | None = None
-
-    @property
-    def quadratic_braking(self) -> float:
-        """f_662d."""
-        return self.quadratic_Nms2 if self.braking_quadratic_Nms2 is None else self.braking_quadratic_Nms2
-
-
-class ProgrammeSection(CardSection):
-    """``[programme]`` of the yaw rig: the motion that is run."""
-
-    kind: Literal["unidirectional", "reversing", "full_turn"] = "unidirectional"
-    max_rate_radps: Annotated[float, Field(ge=-100, le=100)]
-    rise_s: Annotated[float, Field(ge=0.01, le=1e5)]
-    settle_s: Annotated[float, Field(ge=0, le=1e4)] = 0.5
-    humps: Annotated[int, Field(ge=1, le=1000)] = 5
-
-
 class ThrusterSection(CardSection):
     """One of ``[[thrusters]]`` of a small craft: its place, thrust curve and limits, SI.
 
@@ -648,48 +500,3 @@ class CraftForm(CardSection):
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
     thrusters: Annotated[list[ThrusterSection], Field(min_length=1, max_length=8)]
     effects: list[EffectEntry] = []
-
-
-class SurgeCard(CardSection):
-    """The card of a body that only surges, as in its file."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: SurgeModel
-    surge: Surge
-    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
-
-
-class GliderForm(CardSection):
-    """The card of an underwater glider, as in its file."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: GliderModel
-    glider: Glider
-
-
-class YawRigForm(CardSection):
-    """The card of a body on the yaw rig, as in its file."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: YawRigModel
-    yaw_rig: YawRig
-    programme: ProgrammeSection | None = None
-    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
-
-
-CARD_FORMS: dict[str, type[ShipCard] | type[CraftForm] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
-    "linear": ShipCard,
-    "abkowitz": ShipCard,
-    "mmg": MmgForm,
-    "small_craft": CraftForm,
-    "surge": SurgeCard,
-    "glider": GliderForm,
-    "yaw_rig": YawRigForm,
-}
-"""Kind of model to the form of its card."""

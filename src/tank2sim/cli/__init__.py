@@ -22,6 +22,7 @@ from typing import Any
 import click
 
 from tank2sim import __version__
+from tank2sim.api.commands import VERBS
 from tank2sim.errors import ArgumentError, InputError, close_name
 from tank2sim.escaping import one_line
 from tank2sim.memory import keep_freed_memory
@@ -73,28 +74,6 @@ GROUPS = {
 COMMANDS = {name: words for group in GROUPS.values() for name, words in group.items()}
 
 
-VERBS = {
-    "audit": "api.audit:audit",
-    "compare": "api.comparison:compare",
-    "reduce": "api.reduction:reduce",
-    "report": "api.report:make_report",
-    "signals": "api.signals:signals",
-    "validate": "api.validation:validate",
-    "autopilot": "api.autopilot:autopilot",
-    "check": "api.fmu:check_fmu",
-    "convention": "api.convention:convention",
-    "convert": "api.conversion:convert",
-    "design": "api.design:design_campaign",
-    "export": "api.fmu:make_fmu_file",
-    "guess": "api.guess:guess",
-    "pilotcard": "api.bridge:make_pilot_card",
-    "poster": "api.bridge:make_poster",
-    "ships": "api.bundled_ships:list_ships",
-    "tow": "api.tow:tow",
-}
-"""Commands that are derived from their function."""
-
-
 class _Commands(click.Group):
     """Commands are imported when they are called, so that ``tank2sim ships`` does not wait for CasADi."""
 
@@ -111,11 +90,9 @@ class _Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         if cmd_name in VERBS:
-            module, _, function = VERBS[cmd_name].partition(":")
-            declared = getattr(importlib.import_module(f"tank2sim.{module}"), function)
             from tank2sim.cli.derived import command_of
 
-            return command_of(cmd_name, declared.verb)
+            return command_of(VERBS[cmd_name])
         command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
         return command
 

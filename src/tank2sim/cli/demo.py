@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from tank2sim.api.demo import run_demo
+from tank2sim.apps.demo import DEMO_STEPS
+from tank2sim.apps.demo.command import run_demo
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile
-from tank2sim.demo import DEMO_STEPS
 from tank2sim.errors import InputError
 
 

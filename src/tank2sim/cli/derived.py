@@ -19,7 +19,7 @@ from tank2sim import arguments
 from tank2sim.api.verbs import Output, Verb, Written
 from tank2sim.cli.options import OutputFile
 from tank2sim.errors import InputError
-from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled
+from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled, writable_folder
 from tank2sim.units import in_words
 
 
@@ -50,15 +50,8 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def command_of(name: str, verb: Verb) -> click.Command:
-    """Return the command of a verb.
-
-    Parameters
-    ----------
-    name : str
-        Name of the command.
-    verb : Verb
-    """
+def command_of(verb: Verb) -> click.Command:
+    """Return the command of a verb."""
     others = {flag: other.verb for flag, other in verb.variants.items()}  # type: ignore[attr-defined]
     own: dict[str | None, click.Parameter] = {}
     for each in (verb, *others.values()):
@@ -84,7 +77,7 @@ def command_of(name: str, verb: Verb) -> click.Command:
         _refuse_foreign(others.get(chosen, verb), problem, own)
         return _run(others.get(chosen, verb), given)
 
-    return VerbCommand(name, params=[*own.values(), *flags, *shared], callback=run, help=text)
+    return VerbCommand(verb.name, params=[*own.values(), *flags, *shared], callback=run, help=text)
 
 
 def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
@@ -151,7 +144,7 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
     """The argument or the options of one parameter of a verb."""
     one, kind = argument
     several = _several(kind)
-    if _is_of("Ship", kind):
+    if _is_of("Vessel", kind):
         change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
                          "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
         required = one.default is inspect.Parameter.empty
@@ -233,7 +226,7 @@ def _output_parameters(output: Output) -> list[click.Parameter]:
     _, helps = _documented(output.write)
     for one, kind in _arguments(output.write):
         if one.kind is inspect.Parameter.KEYWORD_ONLY:
-            found += _parameters((one, kind), helps, Verb(output.write, ""))
+            found += _parameters((one, kind), helps, Verb(output.write, "", ""))
     return found
 
 
@@ -243,7 +236,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
     from tank2sim.cli.progress import showing_stages
 
     values, changes = dict(given), given.get("set", ())
-    named = [_value_of(output, values) for output in verb.outputs]
+    named = [_value_of(output, values) for output in verb.outputs if output.endings != ()]  # folders may be shared
     refuse_doubled(path for path in (*named, values["page"], values["json"]) if path is not None)
     inputs: list[Path] = []
     with ExitStack() as stack:
@@ -261,9 +254,12 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             options = _values_for(output.write, {name: values[name] for name in own}, {}, (), inputs)
             if "report" in inspect.signature(output.write).parameters:
                 options["report"] = stack.enter_context(showing_stages("writing"))
+            if output.endings == ():
+                writable_folder(path)
             made = output.write(result, path, **options)
             if not isinstance(made, Mapping):
                 result, made = made, made.files
+            refuse_doubled([*contents, *made])
             contents |= made
     given_files = {name: values[name] for name in ("page", "plot", "json")}
     written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
@@ -290,11 +286,13 @@ def _values_for(
     for one, kind in _arguments(function):
         if one.name not in values or (value := values[one.name]) is None or value == ():
             continue
-        if _is_of("Ship", kind):
-            from tank2sim.api.ship import load
+        if _is_of("Vessel", kind):
+            from tank2sim.cards import read_card
             from tank2sim.cli.overrides import parse_changes
+            from tank2sim.dynamics.vessel import Vessel
 
-            value = load(value, parse_changes(changes if one.default is inspect.Parameter.empty else ()))
+            of_ship = parse_changes(changes if one.default is inspect.Parameter.empty else ())
+            value = Vessel(read_card(value, of_ship))
             inputs.append(Path(value.card.source))
         elif one.name in texts:
             value = texts[one.name](value)

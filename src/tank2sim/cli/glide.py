@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.glide import BUNDLED_GLIDER
-from tank2sim.api.ship import load
+from tank2sim.apps.rigs.glider.command import BUNDLED_GLIDER
 from tank2sim.arguments import PositiveArgument
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import number, page_option, plot_option, set_option
 from tank2sim.errors import InputError
+from tank2sim.ship import load
 
 
 @click.command("glide")

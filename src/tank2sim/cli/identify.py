@@ -9,7 +9,6 @@ from click.core import ParameterSource
 
 from tank2sim.api.craft_identification import craft_trial_files, identify_craft
 from tank2sim.api.identification import identify
-from tank2sim.api.ship import Ship, load
 from tank2sim.api.trial import trial_files
 from tank2sim.arguments import Count, DrawsOfChain, SmallEnsemble
 from tank2sim.cards import CraftCard
@@ -17,11 +16,13 @@ from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, executor_option, number, page_option, plot_folder_option
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
+from tank2sim.dynamics.vessel import Vessel
 from tank2sim.errors import InputError
 from tank2sim.files import CARD
 from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
 from tank2sim.identification.trials.options import BY_RESIDUALS, TRIAL_METHODS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
+from tank2sim.ship import load
 
 _SHIP_OPTIONS = {
     "method": "--method",
@@ -44,7 +45,7 @@ _SHIP_OPTIONS = {
 
 
 def _of_craft(
-    ship: Ship,
+    ship: Vessel,
     trials: tuple[Path, ...],
     holdout: tuple[Path, ...],
     output: Path | None,

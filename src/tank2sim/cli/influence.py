@@ -9,20 +9,21 @@ import click
 
 from tank2sim.analysis.influence.figures import forms
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN
-from tank2sim.api.ship import Ship, load
-from tank2sim.api.steering_models import steering_models
-from tank2sim.api.turn_tuning import THROUGH_OPTION, THROUGH_REMEDY
+from tank2sim.apps.steering_cards.card import find_steering_card
+from tank2sim.apps.steering_cards.command import steering_models
+from tank2sim.apps.steering_cards.result import SteeringModelsResult
+from tank2sim.apps.steering_cards.tuning_command import THROUGH_OPTION, THROUGH_REMEDY, tune_ship_through
+from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
 from tank2sim.arguments import TuningRange
-from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.joint_variation import parse_agreed, parse_bounds
 from tank2sim.cli.options import OutputFile, ensemble_options, number, page_option, plot_option, set_option
 from tank2sim.cli.trials import TakesSeveral
+from tank2sim.dynamics.vessel import Vessel
 from tank2sim.errors import InputError
 from tank2sim.files import CARD
 from tank2sim.results.influence import InfluenceResult, TuningResult
-from tank2sim.results.steering_models import SteeringModelsResult
-from tank2sim.results.turn_tuning import TurnTuningResult
+from tank2sim.ship import load
 
 
 @click.command("influence", cls=TakesSeveral, several=("--figure", "--tune", "--agreed", "--through"))
@@ -149,11 +150,11 @@ def command(
     show_result(result)
 
 
-def _through(ship: Ship, points: Sequence[str]) -> TurnTuningResult:
+def _through(ship: Vessel, points: Sequence[str]) -> TurnTuningResult:
     if len(points) != 2:
         problem = f"has {len(points)} point{'s' * (len(points) != 1)}"
         raise InputError(THROUGH_OPTION, "", problem, THROUGH_REMEDY)
-    return ship.tune_through(points[0], points[1])
+    return tune_ship_through(ship, points[0], points[1])
 
 
 def _refuse(problem: str, options: Mapping[str, object]) -> None:

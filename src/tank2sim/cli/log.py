@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.log import log
+from tank2sim.apps.logs.channels import CHANNELS_FILE
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.trial_files import remove_earlier_trials
 from tank2sim.cli.console import json_option, screen, show_notices, show_result, write_result
 from tank2sim.cli.options import OutputFile, page_option
 from tank2sim.gap.outcome.files import folder_made
-from tank2sim.logs.channels import CHANNELS_FILE
-from tank2sim.logs.trial_files import remove_earlier_trials
 
 
 @click.command("log")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import OutputFile, ensemble_options, page_option, plot_option, set_option
 from tank2sim.files import TABLE
+from tank2sim.ship import load
 from tank2sim.simulation.manoeuvres import MANOEUVRE_FORMS, THRUSTER_FORMS
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.ship import load
 from tank2sim.arguments import SpeedArgument
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import ensemble_options, number, page_option, set_option
 from tank2sim.errors import InputError
+from tank2sim.ship import load
 
 
 @click.command("stability")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from tank2sim.api.ship import load
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, set_option
 from tank2sim.files import PAGE
+from tank2sim.ship import load
 
 DEFAULT_SHIP = "esso-osaka-ship"
 """Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
@@ -48,7 +48,7 @@ def command(
 
     It needs no network.
     """
-    from tank2sim.api.steering_page import make_steering_page
+    from tank2sim.apps.steering.command import make_steering_page
 
     ship = load(card, values)
     result = make_steering_page(ship, ghost, scenario, view_3d, report=screen.print)

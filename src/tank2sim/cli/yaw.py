@@ -8,19 +8,19 @@ from typing import get_args
 
 import click
 
-from tank2sim.api.ship import load
-from tank2sim.api.yaw import CONTROLLERS, simulate_yaw
-from tank2sim.api.yaw import yaw as identify_yaw
+from tank2sim.apps.rigs.yaw.command import CONTROLLERS, simulate_yaw
+from tank2sim.apps.rigs.yaw.command import yaw as identify_yaw
+from tank2sim.apps.rigs.yaw.found_card import BEST
+from tank2sim.apps.rigs.yaw.identify import YAW_METHODS
+from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
+from tank2sim.apps.rigs.yaw.records import Medium, read_yaw_record
+from tank2sim.apps.rigs.yaw.result import YawResult
 from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import OutputFile, number, page_option, plot_folder_option
 from tank2sim.errors import InputError
 from tank2sim.files import CARD
-from tank2sim.identification.yaw.card import BEST
-from tank2sim.identification.yaw.identify import YAW_METHODS
-from tank2sim.identification.yaw.intervals import ENERGY_TERMS
-from tank2sim.records.yaw import Medium, read_yaw_record
-from tank2sim.results.yaw import YawResult
+from tank2sim.ship import load
 
 _POSITIVE = number(PositiveArgument)
 

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import cast
 
-from tank2sim.cards.card import Card, CraftCard, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
+from tank2sim.cards.card import Card, CraftCard, ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
+from tank2sim.cards.kinds import CARD_KINDS
 from tank2sim.dynamics.effects import EFFECTS, Effect
-from tank2sim.dynamics.glider import glider_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.simulator_interface import force_shares
 from tank2sim.dynamics.small_craft import craft_model
-from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
-from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.units import from_si
 
 KEPT_MODELS = 16
@@ -62,21 +60,12 @@ def _built(described: _Described) -> Model:
 
 
 def _model(card: Card) -> Model:
-    if isinstance(card, SurgeBodyCard):
-        surge = card.surge
-        coefficients = SurgeCoefficients(
-            total_mass_kg=surge.total_mass_kg,
-            B1_kgs2pm3=surge.B1_kgs2pm3,
-            B2_kgspm2=surge.B2_kgspm2,
-            B3_kgpm=surge.B3_kgpm,
-        )
-        return surge_model(card.ship.name, coefficients, surge.force_N, valid_speed_mps=card.model.valid_speed_mps)
-    if isinstance(card, GliderCard):
-        return glider_model(card)
-    if isinstance(card, YawRigCard):
-        return yaw_rig_model(card.ship.name, card.yaw_rig)
     if not isinstance(card, ManoeuvringCard | CraftCard):
-        raise TypeError(f"no model for {type(card).__name__}")
+        kind = CARD_KINDS[card.model.kind]
+        if kind.model is None:
+            raise TypeError(f"no model for {type(card).__name__}")
+        model: Model = kind.model(card)
+        return model
     for number, entry in enumerate(card.effects):
         _check_effect(card, entry, f"effects.{number}")
     spelt = {place: key for place, key in card.spelt.items() if not place.startswith("effects.")}

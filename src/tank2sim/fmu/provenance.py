@@ -8,7 +8,7 @@ from typing import Any
 
 import tomlkit
 
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, CraftCard, ManoeuvringCard, SurgeBodyCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, CraftCard, ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.particulars import estimated_from
 from tank2sim.dynamics.low_speed import SOURCES
@@ -92,7 +92,7 @@ def origins(card: Card) -> dict[str, ValueOrigin]:
     for variable, (section, key) in (_PLACES | particulars).items():
         comment = _line_comment(document.get(section), key)
         if comment is not None:
-            error, whence = _surge_error(card, key)
+            error, whence = _stated_error(card, key)
             found[variable] = ValueOrigin(card.ship.source, comment, error, whence)
     if isinstance(card, CraftCard):
         return found | dict(_of_craft(card, document)) | dict(_of_effects(card, document))
@@ -133,10 +133,9 @@ def _stem(key: str) -> str:
     return stem if stem and unit in ("m", "m2", "kg", "mps") else key
 
 
-def _surge_error(card: Card, key: str) -> tuple[float | None, str]:
-    if isinstance(card, SurgeBodyCard) and key in card.uncertainty:
-        return card.uncertainty[key], STATED_ERROR
-    return None, NOT_STATED
+def _stated_error(card: Card, key: str) -> tuple[float | None, str]:
+    stated = getattr(card, "uncertainty", {}).get(key)
+    return stated, NOT_STATED if stated is None else STATED_ERROR
 
 
 def _of_effects(card: ManoeuvringCard | CraftCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:

@@ -6,7 +6,10 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from tank2sim.analysis.catalogue.tables import (
+from tank2sim.analysis.influence.percent import change_percent
+from tank2sim.analysis.turning.points import TurningPoints
+from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
+from tank2sim.apps.steering_cards.tables import (
     agreed_variation,
     combined_prediction,
     complete,
@@ -17,9 +20,6 @@ from tank2sim.analysis.catalogue.tables import (
     not_given,
     turns_of,
 )
-from tank2sim.analysis.influence.percent import change_percent
-from tank2sim.analysis.turning.points import TurningPoints
-from tank2sim.cards.steering_card import SteeringCard, read_steering_card
 from tank2sim.errors import InputError
 
 TABLE_1 = {

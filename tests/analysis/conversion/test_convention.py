@@ -13,7 +13,7 @@ import pytest
 from convention import HERE, Table, combinations
 
 import tank2sim as t2s
-from tank2sim.analysis.conversion.readings import (
+from tank2sim.apps.programs.readings import (
     Reading,
     linear_figures,
     possible_readings,

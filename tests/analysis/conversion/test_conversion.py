@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.analysis.conversion.conventions import shift_matrix
-from tank2sim.analysis.conversion.polynomial_fit import fit_polynomial
-from tank2sim.analysis.conversion.program_code import program_name
+from tank2sim.apps.programs.conventions import shift_matrix
+from tank2sim.apps.programs.polynomial_fit import fit_polynomial
+from tank2sim.apps.programs.program_code import program_name
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import parse_card, read_card
 from tank2sim.cards.card import ManoeuvringCard, MmgCard

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.analysis.glide.steady import smallest_angle, steady_glide
-from tank2sim.analysis.glide.study import best_glide, fastest_glide, glide_polar, glide_range
+from tank2sim.apps.rigs.glider.steady import smallest_angle, steady_glide
+from tank2sim.apps.rigs.glider.study import best_glide, fastest_glide, glide_polar, glide_range
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 

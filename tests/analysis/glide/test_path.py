@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tank2sim.analysis.glide.path import fly, path_of
-from tank2sim.analysis.glide.steady import glide_as_printed, steady_glide
+from tank2sim.apps.rigs.glider.path import fly, path_of
+from tank2sim.apps.rigs.glider.programme import GlideProgramme, ProgrammeStep, read_programme
+from tank2sim.apps.rigs.glider.steady import glide_as_printed, steady_glide
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
-from tank2sim.simulation.glide_programme import GlideProgramme, ProgrammeStep, read_programme
 
 PROBE = read_card("kulikovsky-velikanov")
 SAMPLE = read_programme(bundled("models", "kulikovsky-velikanov", "programme.csv"))

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
-from tank2sim.analysis.glide.steady import (
+from tank2sim.apps.rigs.glider.card import GliderCard
+from tank2sim.apps.rigs.glider.steady import (
     ballast_kg,
     force_residual,
     glide_as_printed,
@@ -19,7 +20,7 @@ from tank2sim.analysis.glide.steady import (
     smallest_angle,
     steady_glide,
 )
-from tank2sim.cards import GliderCard, read_card
+from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 
 PROBE = read_card("kulikovsky-velikanov")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from tank2sim.analysis.glide.path import path_of
-from tank2sim.analysis.glide.steady import steady_glide
-from tank2sim.analysis.glide.transient import compare_with_steady, equilibrium, quasi_steady_error
 from tank2sim.analysis.linearisation import state_space
+from tank2sim.apps.rigs.glider.path import path_of
+from tank2sim.apps.rigs.glider.steady import steady_glide
+from tank2sim.apps.rigs.glider.transient import compare_with_steady, equilibrium, quasi_steady_error
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.simulation.integrator import Integrator

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.guess import conditioning
-from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, GivenFigure, GuessMembers, conditioned
-from tank2sim.analysis.guess.prior import ShipDimensions, prior_card, rudder_by_rules
-from tank2sim.analysis.guess.study import guess_ship, study_members
+from tank2sim.apps.guess import conditioning
+from tank2sim.apps.guess.conditioning import FIGURE_KEYS, GivenFigure, GuessMembers, conditioned
+from tank2sim.apps.guess.prior import ShipDimensions, prior_card, rudder_by_rules
+from tank2sim.apps.guess.study import guess_ship, study_members
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.guess import conditioning
-from tank2sim.analysis.guess.conditioning import FIGURE_KEYS, POSTER_MANOEUVRES, GivenFigure, PosterFigures, conditioned
-from tank2sim.analysis.guess.prior import ShipDimensions, prior_card
-from tank2sim.analysis.guess.study import guess_ship, parse_figures
+from tank2sim.apps.guess import conditioning
+from tank2sim.apps.guess.conditioning import FIGURE_KEYS, POSTER_MANOEUVRES, GivenFigure, PosterFigures, conditioned
+from tank2sim.apps.guess.prior import ShipDimensions, prior_card
+from tank2sim.apps.guess.study import guess_ship, parse_figures
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.reading import read_card

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.stability.study import steady_speeds
-from tank2sim.api.ship import Ship
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
+from tank2sim.ship import Ship
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 

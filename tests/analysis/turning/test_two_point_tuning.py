@@ -6,9 +6,10 @@ import math
 
 import pytest
 
-from tank2sim.analysis.catalogue.tables import form_of, model_of
 from tank2sim.analysis.turning.points import TurningPoints
-from tank2sim.analysis.turning.two_point_tuning import (
+from tank2sim.apps.steering_cards.card import read_steering_card
+from tank2sim.apps.steering_cards.tables import form_of, model_of
+from tank2sim.apps.steering_cards.two_point_tuning import (
     Levers,
     WantedTurn,
     levers_of_form,
@@ -16,7 +17,6 @@ from tank2sim.analysis.turning.two_point_tuning import (
     tune_to_two_points,
 )
 from tank2sim.cards import ManoeuvringCard, linear_card, read_card
-from tank2sim.cards.steering_card import read_steering_card
 from tank2sim.dynamics import Model, build
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn

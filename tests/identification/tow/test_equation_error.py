@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from tank2sim.bundled import bundled
-from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import scaled_condition
-from tank2sim.identification.tow.equation_error import (
+from tank2sim.apps.rigs.tow.equation_error import (
     covariance,
     discretise,
     fit_mean_speed,
@@ -18,7 +15,10 @@ from tank2sim.identification.tow.equation_error import (
     solve_by_qr,
     solve_normal_equations,
 )
-from tank2sim.records.tows import Tows, read_tows
+from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.bundled import bundled
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import scaled_condition
 
 TERMS = ("B1", "B2", "B3")
 TIMES_S = np.arange(0, 51, 5.0)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.identification.tow.findings import _worst_misfit
-from tank2sim.records.tows import Tows
+from tank2sim.apps.rigs.tow.findings import _worst_misfit
+from tank2sim.apps.rigs.tow.records import Tows
 
 SCATTER = 0.01
 

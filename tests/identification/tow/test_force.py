@@ -11,13 +11,13 @@ from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
+from tank2sim.apps.rigs.tow.equation_error import covariance, discretise, fit_mean_speed, solve_by_qr
+from tank2sim.apps.rigs.tow.force import force_words, parse_force
+from tank2sim.apps.rigs.tow.identify import identify_tow, tow_card_text
+from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, speed_predictor
+from tank2sim.apps.rigs.tow.records import Tows, read_tows
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
-from tank2sim.identification.tow.equation_error import covariance, discretise, fit_mean_speed, solve_by_qr
-from tank2sim.identification.tow.force import force_words, parse_force
-from tank2sim.identification.tow.identify import identify_tow, tow_card_text
-from tank2sim.identification.tow.output_error import TowOptions, fit_speeds, speed_predictor
-from tank2sim.records.tows import Tows, read_tows
 
 LATE = TowOptions(start_delay=True)
 VARYING = Polynomial([12.0, 0.1, -0.0015])

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.study import study_values
+from tank2sim.apps.rigs.tow.identify import identify_tow, parse_terms
+from tank2sim.apps.rigs.tow.output_error import simulated_speeds
+from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
-from tank2sim.dynamics.surge import SurgeCoefficients
 from tank2sim.errors import InputError
-from tank2sim.identification.tow.identify import identify_tow, parse_terms
-from tank2sim.identification.tow.output_error import simulated_speeds
 from tank2sim.marks import CHECK, marked
-from tank2sim.records.tows import Tows, read_tows
 
 # what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
 PRINTED = np.array([2550.0, 92418.0, -26096.0, 2015.0])

@@ -8,12 +8,12 @@ import pytest
 from scipy import stats
 from scipy.integrate import solve_ivp
 
+from tank2sim.apps.rigs.tow.output_error import fit_speeds, simulated_speeds, speed_predictor
+from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.bundled import bundled
-from tank2sim.dynamics.surge import SurgeCoefficients
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import scaled_condition
-from tank2sim.identification.tow.output_error import fit_speeds, simulated_speeds, speed_predictor
-from tank2sim.records.tows import Tows, read_tows
 
 FORCE_N = 11.63
 

@@ -7,16 +7,16 @@ import pytest
 from numpy.polynomial import Polynomial
 from scipy import stats
 
+from tank2sim.apps.rigs.tow import paper as tow_paper
+from tank2sim.apps.rigs.tow.equation_error import discretise, solve_by_qr
+from tank2sim.apps.rigs.tow.identify import identify_tow
+from tank2sim.apps.rigs.tow.model_selection import SIMPLE, SIMPLE_LATE, TowModel, compare_models, mass_range
+from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds
+from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.result import TowResult
+from tank2sim.apps.rigs.tow.study import speed_polynomials, study_tows, towed_body
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
-from tank2sim.identification.tow import paper as tow_paper
-from tank2sim.identification.tow.equation_error import discretise, solve_by_qr
-from tank2sim.identification.tow.identify import identify_tow
-from tank2sim.identification.tow.model_selection import SIMPLE, SIMPLE_LATE, TowModel, compare_models, mass_range
-from tank2sim.identification.tow.output_error import TowOptions, fit_speeds, simulated_speeds
-from tank2sim.identification.tow.study import speed_polynomials, study_tows, towed_body
-from tank2sim.records.tows import Tows, read_tows
-from tank2sim.results.tow import TowResult
 
 
 @pytest.fixture(scope="module")

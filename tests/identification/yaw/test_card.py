@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from tank2sim.apps.rigs.yaw.found_card import known_added_inertia, nrdot_prime
 from tank2sim.errors import InputError
-from tank2sim.identification.yaw.card import known_added_inertia, nrdot_prime
 
 
 def found(value) -> SimpleNamespace:

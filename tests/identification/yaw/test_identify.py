@@ -6,12 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.cards import parse_card
-from tank2sim.cards.form import TankWalls
-from tank2sim.dynamics.yaw_rig import SHIP_T1, UNKNOWN_RIG
-from tank2sim.errors import InputError
-from tank2sim.identification.yaw.card import rig_card_text
-from tank2sim.identification.yaw.identify import (
+from tank2sim.apps.rigs.yaw.card import TankWalls
+from tank2sim.apps.rigs.yaw.control import TunedController
+from tank2sim.apps.rigs.yaw.found_card import rig_card_text
+from tank2sim.apps.rigs.yaw.identify import (
     WATER_TERMS,
     BodyInertia,
     YawOptions,
@@ -19,12 +17,14 @@ from tank2sim.identification.yaw.identify import (
     parse_yaw_terms,
     torque_constant,
 )
-from tank2sim.identification.yaw.intervals import intervals, known_work
+from tank2sim.apps.rigs.yaw.intervals import intervals, known_work
+from tank2sim.apps.rigs.yaw.model import SHIP_T1, UNKNOWN_RIG
+from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME
+from tank2sim.apps.rigs.yaw.records import read_yaw_record, yaw_record_text
+from tank2sim.apps.rigs.yaw.simulation import Measuring, run_yaw_rig, yaw_record
+from tank2sim.cards import parse_card
+from tank2sim.errors import InputError
 from tank2sim.marks import marked
-from tank2sim.records.yaw import read_yaw_record, yaw_record_text
-from tank2sim.records.yaw_programme import PAPER_PROGRAMME
-from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig, yaw_record
-from tank2sim.simulation.yaw_rig_control import TunedController
 from tests.marks import first_fast
 from tests.yaw_truth import Truth, mirrored, record, written
 

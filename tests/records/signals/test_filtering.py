@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from tank2sim.apps.signals.requests import parse_filter
 from tank2sim.errors import InputError
 from tank2sim.records.signals.filtering import (
     FilterType,
@@ -14,7 +15,6 @@ from tank2sim.records.signals.filtering import (
     savitzky_golay,
     smoothing_spline,
 )
-from tank2sim.records.signals.requests import parse_filter
 from tests.records.signals.made import series, white
 
 STEP = 0.05

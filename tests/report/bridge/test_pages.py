@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import pytest
 
-from tank2sim.analysis.validation.bridge_data import Bridge, bridge_of
+from tank2sim.apps.bridge.boxes import OUTSIDE, draughts, particulars, steering, stopping, telegraph, turning, zigzags
+from tank2sim.apps.bridge.drawings import circles_drawing, clock, knots
+from tank2sim.apps.bridge.pages import pilot_card_page, poster_page
+from tank2sim.apps.bridge.study import Bridge, bridge_of
 from tank2sim.cards import read_card
-from tank2sim.report.bridge.boxes import OUTSIDE, draughts, particulars, steering, stopping, telegraph, turning, zigzags
-from tank2sim.report.bridge.drawings import circles_drawing, clock, knots
-from tank2sim.report.bridge.pages import pilot_card_page, poster_page
 from tests.report.browser import browser, measured_in_browser
 
 BLANK = 'class="blank"'

@@ -9,7 +9,7 @@ from html import unescape
 import numpy as np
 import pytest
 
-from tank2sim.report.steering.ship import has_compiler
+from tank2sim.apps.steering.ship import has_compiler
 from tests.report.opened_page import CHROMIUM, opened
 
 in_browser = [

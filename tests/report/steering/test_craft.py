@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.apps.steering.page import PageShip, steering_page
+from tank2sim.apps.steering.ship import controls, levers_of, ship_in_page, thrusters_of
 from tank2sim.errors import InputError
-from tank2sim.report.steering.page import PageShip, steering_page
-from tank2sim.report.steering.ship import controls, levers_of, ship_in_page, thrusters_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 from tests.report.steering.sailing import data_of, in_browser, sailed

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.steering_page import make_steering_page
+from tank2sim.apps.steering.command import make_steering_page
+from tank2sim.apps.steering.members import members_of
+from tank2sim.apps.steering.ship import telegraph_of
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.ship import mass_fault
-from tank2sim.report.steering.members import members_of
-from tank2sim.report.steering.ship import telegraph_of
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tests.made_results import without_wasm

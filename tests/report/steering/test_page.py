@@ -5,14 +5,14 @@ import re
 import numpy as np
 import pytest
 
+from tank2sim.apps.steering.ghost import ghost_of
+from tank2sim.apps.steering.page import PageShip, steering_page
+from tank2sim.apps.steering.ship import WEB, controls, ship_following_angle, ship_in_page
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
-from tank2sim.report.steering.ghost import ghost_of
-from tank2sim.report.steering.page import PageShip, steering_page
-from tank2sim.report.steering.ship import WEB, controls, ship_following_angle, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tests.report.steering.sailing import data_of, in_browser, sailed

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.steering_page import make_steering_page
+from tank2sim.apps.steering.command import make_steering_page
+from tank2sim.apps.steering.scenario import bundled_scenarios, read_scenario
 from tank2sim.errors import InputError
-from tank2sim.report.steering.scenario import bundled_scenarios, read_scenario
 from tests.corpus.mutations import mutate
 from tests.report.steering.sailing import data_of, in_browser, sailed
 

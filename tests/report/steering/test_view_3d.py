@@ -5,14 +5,14 @@ import re
 
 import pytest
 
+from tank2sim.apps.steering.ghost import ghost_of
+from tank2sim.apps.steering.page import PageShip, steering_page
+from tank2sim.apps.steering.scenario import Feature, Scenario
+from tank2sim.apps.steering.ship import ship_following_angle, ship_in_page
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.records.reading import read_trial_file
-from tank2sim.report.steering.ghost import ghost_of
-from tank2sim.report.steering.page import PageShip, steering_page
-from tank2sim.report.steering.scenario import Feature, Scenario
-from tank2sim.report.steering.ship import ship_following_angle, ship_in_page
 from tests.report.opened_page import WEBGL
 from tests.report.steering.sailing import data_of, in_browser, sailed
 

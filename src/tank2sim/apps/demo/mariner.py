@@ -1,0 +1,253 @@
+"""Second half of the demo: the Mariner, linear and third order, as four FMUs that manoeuvre like the CasADi model."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import control
+import numpy as np
+
+from tank2sim.analysis.linearisation import state_space, straight_course
+from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
+from tank2sim.analysis.stability.straight_line import Stability, stability
+from tank2sim.answer.charts.picture import (
+    FrequencyResponse,
+    History,
+    TrackData,
+    bode_chart,
+    chart_png,
+    error_chart,
+    history_chart,
+    track_chart,
+)
+from tank2sim.answer.charts.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.answer.study import study_values
+from tank2sim.apps.demo.fmu_helpers import DemoOutcome, Workshop, demo_output_errors, error_words, largest_error
+from tank2sim.arrays import Array
+from tank2sim.cards import linear_card, read_card
+from tank2sim.dynamics import Model, build
+from tank2sim.fmu.check import CheckReport
+from tank2sim.fmu.manoeuvre import InputSequence
+from tank2sim.fmu.running import replay
+from tank2sim.simulation.manoeuvres import parse_manoeuvre
+from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trial_file import trial_csv
+from tank2sim.units import in_words
+
+MANOEUVRES = {"turn-35": "turn:35", "zigzag-20-20": "zigzag:20/20"}
+IN_WORDS = {"turn:35": "turning circle, 35 deg of rudder", "zigzag:20/20": "20/20 zigzag"}
+THIRD, FIRST, IN_FMU = "third order", "linear", "third order, FMU"
+
+
+def mariner(workshop: Workshop) -> DemoOutcome:
+    """Export and check four FMUs, simulate two manoeuvres on the desk and in the FMU, judge stability."""
+    card = read_card("mariner")
+    cards = {THIRD: card, FIRST: linear_card(card)}
+    models = {name: build(card) for name, card in cards.items()}
+    names = {THIRD: "mariner", FIRST: "mariner-linear"}
+    checked = [workshop.checked_fmu(cards[kind], models[kind], names[kind], fmi) for kind in names for fmi in (2, 3)]
+    path, reports = checked[0][0], [report for _, report in checked]
+    runs, sections = {}, []
+    for name, text in MANOEUVRES.items():
+        workshop.begin(f"Mariner: {text}, on the desk and in the FMU")
+        run = {kind: simulate(model, parse_manoeuvre(text)) for kind, model in models.items()}
+        runs[name] = run
+        fmu = _in_fmu(models[THIRD], path, run[THIRD])
+        workshop.write(
+            f"mariner-{name}.csv", trial_csv(run[THIRD].trajectory, f"tank2sim simulation of the Mariner: {text}")
+        )
+        sections.append(_manoeuvre_section(workshop, name, text, run, fmu))
+    workshop.begin("Mariner: stability")
+    judged = {kind: stability(model) for kind, model in models.items()}
+    criteria = imo_criteria(models[THIRD])
+    sections = [*sections, _stability_section(models, judged, criteria), _fmu_section(reports)]
+    figures = _figures(reports, runs["turn-35"][THIRD], runs["zigzag-20-20"][THIRD], judged[THIRD])
+    result: dict[str, object] = {
+        "figures": {name: {kind: entry.figures for kind, entry in run.items()} for name, run in runs.items()},
+        "stability": {kind: study_values(entry.reported()) for kind, entry in judged.items()},
+        "imo": [study_values(criterion) for criterion in criteria],
+        "checks": [asdict(report) for report in reports],
+    }
+    return DemoOutcome(figures, sections, result)
+
+
+def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Array]:
+    """The same orders through the FMU; communication points are the samples of the run, its switches among them."""
+    motion = run.trajectory
+    return replay(path, InputSequence(motion.t, motion.u[:-1]), model)
+
+
+def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Array]) -> Section:
+    third, first = run[THIRD].trajectory, run[FIRST].trajectory
+    tracks = track_chart(
+        [
+            track_data(THIRD, third),
+            TrackData(label=IN_FMU, x_m=fmu["motion.x"], y_m=fmu["motion.y"], time_s=third.t),
+            track_data(FIRST, first),
+        ],
+        title=f"{IN_WORDS[text]}: tracks".capitalize(),
+    )
+    in_fmu = History(label=IN_FMU, time_s=third.t, values=dict(fmu))
+    histories = history_chart(
+        [
+            history_of(THIRD, third, SHIP_SIGNALS),
+            in_fmu,
+            history_of(FIRST, first, SHIP_SIGNALS),
+        ],
+        signals_of(third.model, SHIP_SIGNALS),
+        title=f"{IN_WORDS[text]}: time histories".capitalize(),
+    )
+    workshop.write(f"mariner-{name}-track.png", chart_png(tracks))
+    workshop.write(f"mariner-{name}-history.png", chart_png(histories))
+    apart = np.hypot(fmu["motion.x"] - third["motion.x"], fmu["motion.y"] - third["motion.y"])
+    return Section(
+        heading=f"Mariner: {IN_WORDS[text]}",
+        text=f"The FMU, given the same orders by FMPy, stays within {apart.max():.1e} m of the model.",
+        tables=[_figure_table(run)],
+        charts=[
+            Illustration(
+                chart=tracks,
+                caption="North is up. The FMU's track lies on that of the model it was made from.",
+                half=True,
+            ),
+            Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard.", half=True),
+        ],
+        notes=[f"{kind}: {notice}." for kind, result in run.items() for notice in result.notices],
+    )
+
+
+def _figure_table(run: dict[str, Run]) -> Table:
+    rows: list[list[Cell]] = []
+    for name, value in run[THIRD].figures.items():
+        words, unit = in_words(name)
+        both = [result.figures[name] for result in run.values()]
+        if isinstance(value, list):
+            lists = [each if isinstance(each, list) else [] for each in both]
+            for k in range(max(len(each) for each in lists)):
+                rows.append([f"{words}, {k + 1}", *(each[k] if k < len(each) else None for each in lists), unit])
+        else:
+            rows.append([words, *(_cell(each) for each in both), unit])
+    columns = [Column(title="figure"), *(Column(title=kind) for kind in run), Column(title="unit")]
+    return Table(caption="Manoeuvring figures", columns=columns, rows=rows)
+
+
+def _fmu_section(reports: list[CheckReport]) -> Section:
+    rows: list[list[Cell]] = [
+        [
+            report.path.rpartition("/")[2],
+            f"FMI {report.fmi}",
+            kind,
+            max(errors.values()),
+            report.limits[kind],
+            Verdict.PASSED if report.passed else Verdict.FAILED,
+        ]
+        for report in reports
+        for kind, errors in report.errors.items()
+    ]
+    heads = ("file", "standard", "kind", "largest error", "limit", "verdict")
+    table = Table(
+        caption="Largest error of any output, relative to its range in the run",
+        columns=[Column(title=head, digits=2) for head in heads],
+        rows=rows,
+    )
+    return Section(
+        heading="Four FMUs of the Mariner, checked",
+        text=(
+            "Each file was validated by FMPy and driven through steps of rudder and a failure of the steering gear. "
+            "Co-Simulation is held against the same Runge-Kutta steps in CasADi, "
+            "Model Exchange against the exact solution."
+        ),
+        folded=True,
+        tables=[table],
+        charts=[
+            Illustration(
+                chart=error_chart(demo_output_errors(reports[:2]), title="Errors of the third-order FMUs by output")
+            )
+        ],
+    )
+
+
+def _stability_section(
+    models: dict[str, Model], judged: dict[str, Stability], criteria: tuple[ImoCriterion, ...]
+) -> Section:
+    point = straight_course(models[THIRD])
+    channel = {"inputs": ["rudder.command"], "outputs": ["motion.r"]}
+    system = state_space(models[THIRD], point, states=["motion.v", "motion.r", "rudder.angle"], **channel)
+    omega = np.logspace(-4, 0.5, 400)
+    response = control.frequency_response(system, omega)
+    nomoto = judged[THIRD].nomoto
+    first_order = nomoto.K_per_s / (1 + 1j * omega * nomoto.T_s)
+    chart = bode_chart(
+        [
+            FrequencyResponse(label="linearised, with gear", omega_radps=omega, response=response.frdata[0, 0]),
+            FrequencyResponse(label="Nomoto, first order", omega_radps=omega, response=first_order),
+        ],
+        title="Yaw rate by rudder order",
+    )
+    verdicts = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
+    rows = [
+        [criterion.name, criterion.found, criterion.allowed, criterion.unit, verdicts[criterion.passed]]
+        for criterion in criteria
+    ]
+    imo = Table(
+        caption="IMO MSC.137(76), the worse of the two sides",
+        columns=[Column(title=head) for head in ("criterion", "found", "allowed", "unit", "verdict")],
+        rows=rows,
+    )
+    return Section(
+        heading="Mariner: stability",
+        text=f"C′ = {format_number(judged[THIRD].criterion, 3)}: {_verdict(judged[THIRD])} on a straight course.",
+        tables=[_nomoto_table(judged), imo],
+        charts=[Illustration(chart=chart)],
+    )
+
+
+def _verdict(judged: Stability) -> str:
+    return "stable" if judged.stable else "unstable"
+
+
+def _nomoto_table(judged: dict[str, Stability]) -> Table:
+    times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
+    columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
+    rows = [[kind, *vars(result.nomoto).values()] for kind, result in judged.items()]
+    return Table(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
+
+
+def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stability) -> list[KeyFigure]:
+    overshoots = zigzag.figures["overshoots_deg"]
+    assert isinstance(overshoots, list)
+    same, exact = (largest_error(reports, kind) for kind in ("CoSimulation", "ModelExchange"))
+    return [
+        KeyFigure(
+            label="Mariner's FMUs, Co-Simulation",
+            value=error_words(same),
+            verdict=Verdict.PASSED,
+            note="largest difference from the model, relative",
+        ),
+        KeyFigure(
+            label="Mariner's FMUs, Model Exchange",
+            value=error_words(exact),
+            verdict=Verdict.PASSED,
+            note="largest difference from the exact solution, relative",
+        ),
+        KeyFigure(label="Tactical diameter, 35 deg", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
+        KeyFigure(label="First overshoot, 20/20", value=overshoots[0], unit="deg"),
+        KeyFigure(
+            label="Straight-line stability",
+            value=_verdict(judged),
+            verdict=Verdict.PASSED if judged.stable else Verdict.CAUTION,
+            note=f"C′ = {format_number(judged.criterion, 3)}",
+        ),
+    ]
+
+
+def _cell(figure: object) -> Cell:
+    return figure if isinstance(figure, float | str) else None
+
+
+def _number(figure: object) -> float:
+    assert isinstance(figure, float)
+    return figure

@@ -1,0 +1,339 @@
+"""Runs that a tank can make: candidates within its limits, and the usual matrix."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.apps.design.tank_form import TankFile
+from tank2sim.cards.writing import TestedRange
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.tank_conditions import (
+    LARGEST_FREQUENCY_PARAMETER,
+    LARGEST_REDUCED_FREQUENCY,
+    OscillationMotion,
+    Tank,
+    tank_resonance,
+)
+from tank2sim.records.campaign_form import OSCILLATING, RunType
+
+BELOW_LIMIT = 0.95
+"""Share of the limit of omega U/g that candidates reach: `reduce` leaves out runs at it. Project choice: frequency and
+speed err by some percent."""
+
+_FREQUENCIES, _FREQUENCY_RATIO = 5, 4.0
+"""Frequencies of candidates, and the ratio of the highest to the lowest. Project choice: finer steps change the
+certainty by less than a percent, and lower frequencies show accelerations less and less."""
+_DRIFTS, _RUDDERS, _AMPLITUDES, _MIXED = 6, 7, 4, 4
+"""Levels of candidates in one direction: of drift, of rudder, of an oscillation, and of each motion in runs of two
+motions. Project choice: the optimum of a polynomial of third order has at most four levels, near these."""
+_STEADY_RECORDS, _OSCILLATING_RECORDS = (0.5, 0.1), (1.0, 0.5, 0.25)
+"""Lengths of a candidate's record over the longest that the carriage has room for. Project choice: a steady record soon
+shows no more than the zero error of its run, and what a shorter one saves is less than the waiting time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedRun:
+    """One run of a plan; SI, rudder positive to starboard.
+
+    Parameters
+    ----------
+    type : str
+        As in ``[[runs]]`` of a campaign.
+    drift_rad, rudder_rad : float
+    frequency_radps : float
+        0 in a steady run.
+    velocity : float
+        Amplitude of v (m/s) in pure sway, of r (rad/s) in yaw.
+    speed_mps : float
+        U.
+    record_s, tank_s : float
+        Length of the record, and time in the tank until the next run can start.
+    """
+
+    type: RunType
+    drift_rad: float = 0.0
+    rudder_rad: float = 0.0
+    frequency_radps: float = 0.0
+    velocity: float = 0.0
+    speed_mps: float
+    record_s: float
+    tank_s: float
+
+    @property
+    def oscillates(self) -> bool:
+        """The model oscillates in it."""
+        return self.type in OSCILLATING
+
+    @property
+    def cycles(self) -> int:
+        """Whole cycles of the record."""
+        return round(self.record_s * self.frequency_radps / (2 * math.pi))
+
+    @property
+    def sway_amplitude_m(self) -> float:
+        """Sideways amplitude of the mechanism, m: of the sway, or of the path of the yaw, U r_a/omega^2."""
+        if not self.oscillates:
+            return 0.0
+        if self.type == "pure_sway":
+            return self.velocity / self.frequency_radps
+        return self.speed_mps * self.velocity / self.frequency_radps**2
+
+    @property
+    def heading_amplitude_rad(self) -> float:
+        """Amplitude of the heading, rad."""
+        return self.velocity / self.frequency_radps if self.oscillates and self.type != "pure_sway" else 0.0
+
+    def mirrored(self) -> PlannedRun:
+        """The run to the other side."""
+        return replace(self, drift_rad=-self.drift_rad + 0.0, rudder_rad=-self.rudder_rad + 0.0)
+
+
+RunGroup = tuple[PlannedRun, ...]
+"""Runs that are made together: a steady run to both sides, or one run that is its own mirror image."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TankRuns:
+    """Runs of a model in a tank.
+
+    Parameters
+    ----------
+    tank : TankFile
+    length_m, speed_mps : float
+        Length and speed of the model, and of the test.
+    largest : TestedRange
+        To which the tests go, before the limits of the mechanism.
+    """
+
+    tank: TankFile
+    length_m: float
+    speed_mps: float
+    largest: TestedRange
+
+    def __post_init__(self) -> None:
+        fastest = self.tank.carriage.speed_mps
+        if fastest is not None and self.speed_mps > fastest:
+            problem = f"is {fastest:g} m/s, and the test speed {self.speed_mps:.3g}"
+            raise InputError("tank", "carriage.speed_mps", problem, "take a shorter model, or a lower test speed")
+        if self.longest_s <= 0:
+            way = self.speed_mps**2 / self.tank.carriage.acceleration_mps2
+            problem = (
+                f"is {self.tank.carriage.length_m:g} m, and start and stop at {self.speed_mps:.3g} m/s take {way:.3g} m"
+            )
+            raise InputError("--carriage-length", "", problem, "take a longer one, or a shorter model")
+
+    @property
+    def longest_s(self) -> float:
+        """Longest record, s: what is left of the carriage's way after start, settling and stop."""
+        carriage = self.tank.carriage
+        way = self.speed_mps**2 / carriage.acceleration_mps2 + carriage.settling_lengths * self.length_m
+        return (carriage.length_m - way) / self.speed_mps
+
+    @property
+    def drift_rad(self) -> float:
+        """Largest drift angle."""
+        return min(self.largest.drift_rad, self.tank.mechanism.drift_rad or math.inf)
+
+    @property
+    def rudder_rad(self) -> float:
+        """Largest rudder angle."""
+        return min(self.largest.rudder_rad, self.tank.mechanism.rudder_rad or math.inf)
+
+    @property
+    def yaw_rate_radps(self) -> float:
+        """Largest yaw rate."""
+        return self.largest.yaw_rate_prime * self.speed_mps / self.length_m
+
+    def highest_frequency(self, motion: str) -> float:
+        """Highest frequency of ``sway`` or ``yaw``, rad/s."""
+        mechanism, model = self.tank.mechanism, self.tank.model
+        return min(
+            BELOW_LIMIT * LARGEST_FREQUENCY_PARAMETER * model.gravity_mps2 / self.speed_mps,
+            LARGEST_REDUCED_FREQUENCY[motion] * self.speed_mps / self.length_m,
+            mechanism.highest_frequency_radps or math.inf,
+        )
+
+    def lowest_frequency(self) -> float:
+        """Lowest frequency with the fewest cycles in the longest record, rad/s."""
+        mechanism = self.tank.mechanism
+        return max(mechanism.cycles * 2 * math.pi / self.longest_s, mechanism.lowest_frequency_radps or 0.0)
+
+    def frequencies(self, motion: str, count: int, ratio: float) -> list[float]:
+        """Frequencies of a motion, rising, off the standing waves of the tank.
+
+        Raises
+        ------
+        InputError
+            The carriage is too short for the fewest cycles at any allowed frequency.
+        """
+        highest, lowest = self.highest_frequency(motion), self.lowest_frequency()
+        if lowest > highest:
+            problem = (
+                f"leaves {self.longest_s:.3g} s of record, and {self.tank.mechanism.cycles} cycles of {motion} at the "
+                f"highest frequency ({highest:.3g} rad/s) need {self.tank.mechanism.cycles * 2 * math.pi / highest:.3g}"
+            )
+            raise InputError("--carriage-length", f"{self.tank.carriage.length_m:g}", problem, "take a longer one")
+        found = np.geomspace(max(lowest, highest / ratio), highest, count) if lowest < highest else np.array([highest])
+        return [frequency for frequency in found.tolist() if not self._resonant(motion, frequency)]
+
+    def _resonant(self, motion: str, frequency: float) -> bool:
+        basin = Tank(self.tank.tank.breadth_m, self.tank.tank.depth_m)
+        run = OscillationMotion("", motion, frequency)
+        return any(caution.runs for caution in tank_resonance((run,), basin, self.tank.model.gravity_mps2))
+
+    def steady(self, kind: RunType, drift: float = 0.0, rudder: float = 0.0, share: float = 1.0) -> RunGroup:
+        """A steady run and its mirror image."""
+        run = self.run(kind, share * self.longest_s, drift=drift, rudder=rudder)
+        return (run, run.mirrored()) if drift or rudder else (run,)
+
+    def oscillating(
+        self, kind: RunType, frequency: float, velocity: float, drift: float = 0.0, share: float = 1.0
+    ) -> RunGroup:
+        """An oscillating run of whole cycles, with drift also to the other side; () if the tank cannot make it."""
+        mechanism, period = self.tank.mechanism, 2 * math.pi / frequency
+        cycles = math.floor(share * self.longest_s / period + 1e-9)
+        run = self.run(kind, cycles * period, drift=drift, frequency=frequency, velocity=velocity)
+        too_large = (
+            run.sway_amplitude_m > (mechanism.sway_amplitude_m or math.inf)
+            or run.heading_amplitude_rad > (mechanism.heading_amplitude_rad or math.inf)
+            or cycles < mechanism.cycles
+        )
+        if too_large:
+            return ()
+        return (run, run.mirrored()) if drift else (run,)
+
+    def run(
+        self,
+        kind: RunType,
+        record_s: float,
+        *,
+        drift: float = 0.0,
+        rudder: float = 0.0,
+        frequency: float = 0.0,
+        velocity: float = 0.0,
+    ) -> PlannedRun:
+        """A run with its time in the tank: start, settling, record, stop, and waiting or the way back."""
+        carriage = self.tank.carriage
+        speed = self.speed_mps
+        sailing = 2 * speed / carriage.acceleration_mps2 + carriage.settling_lengths * self.length_m / speed + record_s
+        way = speed**2 / carriage.acceleration_mps2 + carriage.settling_lengths * self.length_m + record_s * speed
+        return PlannedRun(
+            type=kind,
+            drift_rad=drift,
+            rudder_rad=rudder,
+            frequency_radps=frequency,
+            velocity=velocity,
+            speed_mps=speed,
+            record_s=record_s,
+            tank_s=sailing + max(carriage.waiting_s, way / carriage.return_speed_mps),
+        )
+
+    def candidates(self) -> tuple[RunGroup, ...]:
+        """All candidate runs."""
+        return tuple(group for group in self._candidates() if group)
+
+    def _candidates(self) -> Iterator[RunGroup]:
+        drifts, rudders = _levels(self.drift_rad, _DRIFTS), _levels(self.rudder_rad, _RUDDERS)
+        sways = self.frequencies("sway", _FREQUENCIES, _FREQUENCY_RATIO)
+        yaws = self.frequencies("yaw", _FREQUENCIES, _FREQUENCY_RATIO)
+        velocities = _levels(self.speed_mps * math.sin(self.drift_rad), _AMPLITUDES)
+        rates = _levels(self.yaw_rate_radps, _AMPLITUDES)
+        for share in _STEADY_RECORDS:
+            yield self.steady("static_drift", share=share)
+            yield from (self.steady("static_drift", drift, share=share) for drift in drifts)
+            yield from (self.steady("static_rudder", rudder=rudder, share=share) for rudder in rudders)
+            for drift in _levels(self.drift_rad, _MIXED):
+                for rudder in _levels(self.rudder_rad, _MIXED):
+                    yield from (self.steady("drift_and_rudder", drift, side * rudder, share) for side in (1, -1))
+        for share in _OSCILLATING_RECORDS:
+            for frequency in sways:
+                yield from (self.oscillating("pure_sway", frequency, v, share=share) for v in velocities)
+            for frequency in yaws:
+                for rate in rates:
+                    yield self.oscillating("pure_yaw", frequency, rate, share=share)
+                    for drift in _levels(self.drift_rad, _MIXED):
+                        yield self.oscillating("yaw_with_drift", frequency, rate, drift, share)
+
+    def usual_matrix(self) -> tuple[RunGroup, ...]:
+        """The usual matrix: all types of test of ITTC 7.5-02-06-02, in even steps to the same limits.
+
+        Project choice, as the procedure leaves numbers to the tank: a straight run; six drift angles and seven rudder
+        angles to either side; three drift angles with two rudder angles to either side; sway and yaw with four
+        amplitudes at three frequencies; yaw with three drift angles to either side and three amplitudes.
+        """
+        sways, yaws = self.frequencies("sway", 3, 2.0), self.frequencies("yaw", 3, 2.0)
+        groups: list[RunGroup] = [self.steady("static_drift")]
+        groups += [self.steady("static_drift", drift) for drift in _levels(self.drift_rad, 6)]
+        groups += [self.steady("static_rudder", rudder=rudder) for rudder in _levels(self.rudder_rad, 7)]
+        groups += [
+            self.steady("drift_and_rudder", drift, side * rudder)
+            for drift in _levels(self.drift_rad, 3)
+            for rudder in _levels(self.rudder_rad, 2)
+            for side in (1, -1)
+        ]
+        velocities, rates = _levels(self.speed_mps * math.sin(self.drift_rad), 4), _levels(self.yaw_rate_radps, 4)
+        groups += [self.oscillating("pure_sway", frequency, v) for frequency in sways for v in velocities]
+        groups += [self.oscillating("pure_yaw", frequency, rate) for frequency in yaws for rate in rates]
+        groups += [
+            self.oscillating("yaw_with_drift", yaws[len(yaws) // 2], rate, drift)
+            for drift in _levels(self.drift_rad, 3)
+            for rate in _levels(self.yaw_rate_radps, 3)
+            if yaws
+        ]
+        return tuple(group for group in groups if group)
+
+    def check_runs(self, planned: Sequence[RunGroup]) -> tuple[RunGroup, ...]:
+        """Runs that the planned ones lack to show whether the polynomial holds, and whether the forces are delayed.
+
+        An optimal design for a polynomial may have no run that could contradict it. Project choice: a straight run;
+        each motion between a fifth and four fifths of its range; and two frequencies of sway and of yaw, by which
+        `reduce` distinguishes a delay of the forces from added mass.
+        """
+        runs = [run for group in planned for run in group]
+        groups: list[RunGroup] = []
+        if not any(not (run.oscillates or run.drift_rad or run.rudder_rad) for run in runs):
+            groups.append(self.steady("static_drift", share=_STEADY_RECORDS[-1]))
+        if not any(_between(run.drift_rad, self.drift_rad) for run in runs if not run.oscillates):
+            groups.append(self.steady("static_drift", self.drift_rad / 2, share=_STEADY_RECORDS[-1]))
+        if not any(_between(run.rudder_rad, self.rudder_rad) for run in runs):
+            groups.append(self.steady("static_rudder", rudder=self.rudder_rad / 2, share=_STEADY_RECORDS[-1]))
+        swaying = [run for run in runs if run.type == "pure_sway"]
+        yawing = [run for run in runs if run.oscillates and run.type != "pure_sway"]
+        groups += self._oscillating_checks("pure_sway", swaying, self.speed_mps * math.sin(self.drift_rad))
+        groups += self._oscillating_checks("pure_yaw", yawing, self.yaw_rate_radps)
+        return tuple(groups)
+
+    def _oscillating_checks(self, kind: RunType, runs: Sequence[PlannedRun], largest: float) -> list[RunGroup]:
+        """Runs at half the largest velocity, highest and lowest frequency, unless `runs` have such ones."""
+        motion = "sway" if kind == "pure_sway" else "yaw"
+        used = {run.frequency_radps for run in runs}
+        between = any(_between(run.velocity, largest) for run in runs)
+        fitting = [
+            group
+            for frequency in self.frequencies(motion, 3, 2.0)
+            if (group := self.oscillating(kind, frequency, largest / 2, share=_OSCILLATING_RECORDS[1]))
+        ]
+        if not fitting or (between and len(used) > 1):
+            return []
+        if not used:
+            return [fitting[0], fitting[-1]] if len(fitting) > 1 else fitting
+        extremes = (fitting[0], fitting[-1])
+        return [max(extremes, key=lambda group: min(abs(group[0].frequency_radps - other) for other in used))]
+
+
+def _between(value: float, largest: float) -> bool:
+    return 0.2 * largest <= abs(value) <= 0.8 * largest
+
+
+def _levels(largest: float, count: int) -> list[float]:
+    """Even steps up to the largest."""
+    return [largest * step / count for step in range(1, count + 1)]
+
+
+def time_of(groups: Sequence[RunGroup]) -> float:
+    """Time in the tank of all runs, s."""
+    return sum(run.tank_s for group in groups for run in group)

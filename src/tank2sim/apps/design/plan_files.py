@@ -1,0 +1,143 @@
+"""Files of a captive plan: the list of runs, the campaign template that ``reduce`` reads, and runs of a campaign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+
+import tomlkit
+
+from tank2sim.apps.design.captive_design import CaptiveDesign
+from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup, TankRuns
+from tank2sim.apps.design.study import PlannedManoeuvre, PlannedRow
+from tank2sim.errors import InputError
+from tank2sim.records.campaigns import read_campaign_form
+
+
+def run_rows(design: CaptiveDesign) -> tuple[PlannedRow, ...]:
+    """The runs in their order."""
+    rows = []
+    checks = {id(run): test.check for test in design.tests for run in test.runs}
+    for number, run in enumerate(design.runs, start=1):
+        swings, yaws = run.oscillates, run.oscillates and run.type != "pure_sway"
+        row = PlannedRow(
+            run=number,
+            file=f"run_{number:03d}.csv",
+            type=run.type,
+            speed_mps=_rounded(run.speed_mps),
+            drift_deg=_rounded(math.degrees(run.drift_rad)),
+            rudder_deg=_rounded(math.degrees(run.rudder_rad)),
+            frequency_radps=_rounded(run.frequency_radps) if swings else None,
+            period_s=_rounded(2 * math.pi / run.frequency_radps) if swings else None,
+            cycles=run.cycles if swings else None,
+            sway_amplitude_m=_rounded(run.sway_amplitude_m) if swings else None,
+            yaw_rate_amplitude_degps=_rounded(math.degrees(run.velocity)) if yaws else None,
+            heading_amplitude_deg=_rounded(math.degrees(run.heading_amplitude_rad)) if yaws else None,
+            record_s=_rounded(run.record_s),
+            tank_min=_rounded(run.tank_s / 60),
+            purpose="check" if checks[id(run)] else "figures",
+        )
+        rows.append(row)
+    return tuple(rows)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}") + 0.0
+
+
+def plan_csv(rows: Sequence[PlannedRow | PlannedManoeuvre]) -> str:
+    """The plan as CSV, a row for each run or manoeuvre; empty where a column has no meaning for it."""
+    heads = ",".join(field.name for field in fields(rows[0]))
+    cells = [["" if value is None else f"{value}" for value in vars(row).values()] for row in rows]
+    return "\n".join([heads, *map(",".join, cells)]) + "\n"
+
+
+def campaign_template(design: CaptiveDesign, rows: Sequence[PlannedRow]) -> str:
+    """``campaign.toml`` of the planned runs: it lacks only their files, and what the tank alone knows.
+
+    Parameters
+    ----------
+    design : CaptiveDesign
+    rows : sequence of PlannedRow
+    """
+    runs, ship, planned = design.tank_runs, design.card.ship, design.planned
+    scale = runs.length_m / ship.length_m
+    document = tomlkit.document()
+    document.add(tomlkit.comment("A plan by tank2sim design: correct the body, the force convention and what else"))
+    document.add(tomlkit.comment("differs in the tank, put the files of the runs next to it, and reduce it."))
+    document["format"] = "tank2sim-campaign/1"
+    model: dict[str, object] = {"name": planned.model.name, "length_m": _rounded(runs.length_m)}
+    for key in ("beam_m", "draught_m"):
+        if (size := getattr(ship, key, None)) is not None:
+            model[key] = _rounded(size * scale)
+    body = planned.model
+    inertia = None if body.yaw_inertia_kgm2 is None else _rounded(body.yaw_inertia_kgm2)
+    model |= {"mass_kg": _rounded(body.mass_kg), "yaw_inertia_kgm2": inertia}
+    model["x_G_m"] = _rounded(body.x_G_m)
+    if scale < 1:
+        model["scale"] = _rounded(1 / scale)
+    document["model"] = model
+    document["test"] = {
+        "water_density_kgpm3": planned.water_density_kgpm3,
+        "gravity_mps2": planned.gravity_mps2,
+        "speed_mps": _rounded(runs.speed_mps),
+        "force_convention": "on_gauge",
+    }
+    basin = {key: value for key, value in runs.tank.tank.model_dump().items() if value is not None}
+    basin.setdefault("length_m", runs.tank.carriage.length_m)
+    document["tank"] = basin
+    sheets = tomlkit.aot()
+    for row in rows:
+        sheets.append(tomlkit.item(_sheet(row)))
+    document["runs"] = sheets
+    return tomlkit.dumps(document)
+
+
+def _sheet(row: PlannedRow) -> dict[str, object]:
+    sheet: dict[str, object] = {"file": row.file, "type": row.type}
+    sheet |= {"drift_deg": row.drift_deg, "rudder_deg": row.rudder_deg}
+    if row.frequency_radps is not None:
+        sheet["frequency_radps"] = row.frequency_radps
+    if row.type == "pure_sway":
+        sheet["amplitude_m"] = row.sway_amplitude_m
+    elif row.yaw_rate_amplitude_degps is not None:
+        sheet["yaw_rate_amplitude_degps"] = row.yaw_rate_amplitude_degps
+    return sheet
+
+
+def runs_of_campaign(path: Path, runs: TankRuns) -> tuple[RunGroup, ...]:
+    """The runs of a campaign's sheet, as this tank would make them; the records of oscillations are as long as it can.
+
+    Raises
+    ------
+    InputError
+        The campaign is at fault, has no ``[[runs]]``, or a run lacks its frequency or amplitude.
+    """
+    form = read_campaign_form(path)
+    if not form.runs:
+        raise InputError(path, "runs", "has none", "give a campaign with [[runs]]")
+    sign = -1.0 if form.test.rudder_sign == "port" else 1.0
+    found: list[RunGroup] = []
+    scale = runs.length_m / form.model.length_m
+    speeds = runs.speed_mps / form.test.speed_mps
+    for number, sheet in enumerate(form.runs):
+        drift, rudder = sheet.drift_rad or 0.0, sign * (sheet.rudder_rad or 0.0)
+        if sheet.type in ("static_drift", "static_rudder", "drift_and_rudder"):
+            found.append((runs.run(sheet.type, runs.longest_s, drift=drift, rudder=rudder),))
+            continue
+        key = "amplitude_m" if sheet.type == "pure_sway" else "yaw_rate_amplitude_radps"
+        amplitude = getattr(sheet, key)
+        if sheet.frequency_radps is None or amplitude is None:
+            lacking = "frequency_radps" if sheet.frequency_radps is None else key
+            raise InputError(path, f"runs.{number}.{lacking}", "is missing", "add it: the sheet is all that is read")
+        frequency = sheet.frequency_radps * speeds / scale
+        velocity = (
+            amplitude * sheet.frequency_radps * speeds if sheet.type == "pure_sway" else amplitude * speeds / scale
+        )
+        period = 2 * math.pi / frequency
+        cycles = max(math.floor(runs.longest_s / period + 1e-9), 1)
+        run: PlannedRun = runs.run(sheet.type, cycles * period, drift=drift, frequency=frequency, velocity=velocity)
+        found.append((run,))
+    return tuple(found)

@@ -1,0 +1,339 @@
+"""Results of ``design``: the next captive campaign, and the next sea trial."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, records_table, table
+from tank2sim.answer.result import Result
+from tank2sim.apps.design.captive_design import CaptiveDesign
+from tank2sim.apps.design.charts import certainty_charts, figure_words, run_planes
+from tank2sim.apps.design.plan_files import campaign_template, plan_csv
+from tank2sim.apps.design.planning import counted
+from tank2sim.apps.design.study import CampaignStudy, TrialStudy
+from tank2sim.apps.design.trial_design import TrialDesign
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_S = TypeVar("_S", CampaignStudy, TrialStudy)
+
+_ON_SCREEN = 12
+"""Coefficients in the printed table. Project choice: the page and JSON have all."""
+
+
+class DesignResult(Result[_S]):
+    """A plan that makes figures most certain, and the usual programme in the same time."""
+
+    command: ClassVar[str] = "design"
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures by name: value of the card's ship, standard errors by the design and by the usual programme."""
+        import pandas as pd
+
+        rows = {name: asdict(one) for name, one in self.study.figures.items()}
+        return pd.DataFrame.from_dict(rows, orient="index").dropna(axis=1, how="all").rename_axis("figure")
+
+    def _certainty(self, text: str, seconds: float, unit: str) -> Section:
+        charts = certainty_charts(self.study.certainty, seconds, unit)
+        rows: list[list[Cell]] = [
+            [
+                figure_words(name),
+                one.value,
+                one.before,
+                one.design,
+                one.usual,
+                one.design / one.usual,
+                one.variance_ratio,
+            ]
+            for name, one in self.study.figures.items()
+        ]
+        heads = ["figure", "value", "before", "design", "usual", "ratio", "ratio of variances"]
+        known = [place for place in range(len(heads)) if any(row[place] is not None for row in rows)]
+        figures = table(
+            "Figures and their standard errors",
+            [heads[place] for place in known],
+            [[row[place] for place in known] for row in rows],
+        )
+        return Section(
+            heading="Certainty of the figures",
+            text=text,
+            charts=[Illustration(chart=chart, half=True) for chart in charts],
+            tables=[figures],
+        )
+
+    def _cards(self, first: KeyFigure, needed: float | None, whole: float, unit: str, usual: str) -> list[KeyFigure]:
+        cards = [
+            first,
+            KeyFigure(
+                label=f"Time for the certainty of the {usual}",
+                value="none found" if needed is None else 100 * needed / whole,
+                unit="" if needed is None else "%",
+                note="" if needed is None else f"{needed:.3g} {unit} in place of {whole:.3g} {unit}",
+            ),
+        ]
+        for name, one in self.study.figures.items():
+            label = figure_words(name)
+            note = f"± {one.design:.2g}; usual programme ± {one.usual:.2g}"
+            figure_unit = in_words(name.partition("@")[0])[1]
+            cards.append(KeyFigure(label=label[:1].upper() + label[1:], value=one.value, unit=figure_unit, note=note))
+        return cards
+
+
+def _time_words(needed: float | None, whole: float, unit: str, usual: str) -> str:
+    if needed is None:
+        return f"No plan was found that has every figure as certain as the {usual} in {whole:.3g} {unit}."
+    return (
+        f"{needed:.3g} {unit} of this plan are as accurate as {whole:.3g} {unit} of the {usual} "
+        f"({100 * needed / whole:.0f} %)."
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignDesignResult(DesignResult[CampaignStudy]):
+    """A captive campaign that makes figures most certain, and the usual matrix in the same hours.
+
+    Parameters
+    ----------
+    study : CampaignStudy
+    design : CaptiveDesign, optional
+        None if the result was read from its JSON.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> plan = t2s.design_campaign("mariner", figures="K_prime", draws=0)
+    >>> bool((plan.figures["design"] < plan.figures["usual"]).all())
+    True
+    """
+
+    study: CampaignStudy
+    design: CaptiveDesign | None = None
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return f"{self.study.ship}: the next captive campaign"
+
+    @property
+    def subtitle(self) -> str:
+        """Model and range of the tests."""
+        model = self.study.model
+        return (
+            f"model {model.length_m:.3g} m at {model.speed_mps:.3g} m/s; drift to {model.drift_deg:.3g} deg, rudder to "
+            f"{model.rudder_deg:.3g} deg, r' to {model.yaw_rate_prime:.2g}"
+        )
+
+    @property
+    def runs(self) -> pd.DataFrame:
+        """The runs in their order: type, speed, angles, frequency, amplitudes, length of the record, time in the
+        tank."""
+        import pandas as pd
+
+        return pd.DataFrame([asdict(row) for row in self.study.runs]).set_index("run")
+
+    @property
+    def plan(self) -> str:
+        """The runs as CSV."""
+        return plan_csv(self.study.runs)
+
+    @property
+    def template(self) -> str:
+        """``campaign.toml`` for :func:`.reduce`, which lacks the files of the runs."""
+        assert self.design is not None, "the JSON of a design does not hold it"
+        return campaign_template(self.design, self.study.runs)
+
+    @property
+    def _compared_h(self) -> float:
+        return self.study.usual_matrix.hours * self.study.usual_matrix.repeats
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Number of runs and hours, and the hours in which a plan is as good as the usual matrix."""
+        study = self.study
+        return (
+            f"{study.ship}: {counted(len(study.runs), 'run')} in {study.hours_used:.3g} h.",
+            _time_words(study.hours_for_usual_certainty, self._compared_h, "h", "usual matrix"),
+        )
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Runs, hours, and each figure."""
+        study = self.study
+        first = KeyFigure(label="Runs", value=len(study.runs), note=f"in {study.hours_used:.3g} h")
+        return self._cards(first, study.hours_for_usual_certainty, self._compared_h, "h", "usual matrix")
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Certainty of the figures, places of the runs, coefficients that matter, and the plan."""
+        study = self.study
+        planes = run_planes(study)
+        kinds = records_table(
+            "Kinds of runs (amplitude: v/U or r L/U)", study.kinds, fields=_KINDS, digits=3, folded=False
+        )
+        plan = records_table("Runs in their order", study.runs, fields=_RUNS, digits=3, on_screen=False)
+        return [
+            self._certainty(_CAMPAIGN, 3600, "h"),
+            Section(
+                heading="Where the runs are",
+                text=_PLACES,
+                charts=[Illustration(chart=chart, half=True) for chart in planes],
+                tables=[kinds],
+            ),
+            Section(heading="Coefficients that matter", text=_COEFFICIENTS, tables=list(self._coefficients())),
+            Section(heading="The plan", tables=[plan]),
+        ]
+
+    def _coefficients(self) -> Sequence[Table]:
+        ordered = sorted(self.study.coefficients.items(), key=lambda item: -item[1].largest_share)
+        names = list(self.study.figures)
+        rows: list[list[Cell]] = []
+        for name, one in ordered:
+            shares = (one.share_of_variance.get(figure) for figure in names)
+            percents = [None if share is None else 100 * share for share in shares]
+            rows.append([name, one.value, one.design, one.usual, *percents])
+        heads = ["coefficient", "value", "design", "usual"]
+        largest: list[list[Cell]] = [
+            [name, one.value, one.design, one.usual, 100 * one.largest_share] for name, one in ordered[:_ON_SCREEN]
+        ]
+        words = [f"{figure_words(figure)} (%)" for figure in names]
+        return (
+            table("Coefficients that matter (prime)", [*heads, "largest share of a variance (%)"], largest, digits=3),
+            table("Coefficients and their shares of the variances", [*heads, *words], rows, digits=3, on_screen=False),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TrialDesignResult(DesignResult[TrialStudy]):
+    """A sea trial that makes figures most certain, and the usual set of manoeuvres in the same time.
+
+    Parameters
+    ----------
+    study : TrialStudy
+    design : TrialDesign, optional
+        None if the result was read from its JSON.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> trial = t2s.design_trial("mariner", figures="advance_m@35")
+    >>> bool((trial.figures["design"] < trial.figures["before"]).all())
+    True
+    """
+
+    study: TrialStudy
+    design: TrialDesign | None = None
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return f"{self.study.ship}: the next sea trial"
+
+    @property
+    def subtitle(self) -> str:
+        """The usual set."""
+        usual = self.study.usual_set
+        return f"usual set: {', '.join(usual.manoeuvres)}, {usual.minutes:.3g} min"
+
+    @property
+    def manoeuvres(self) -> pd.DataFrame:
+        """The manoeuvres in their order: repeats, length (s), time with approach (min), file of the orders."""
+        import pandas as pd
+
+        return pd.DataFrame([asdict(one) for one in self.study.manoeuvres]).set_index("manoeuvre")
+
+    @property
+    def plan(self) -> str:
+        """The manoeuvres as CSV."""
+        return plan_csv(self.study.manoeuvres)
+
+    @property
+    def orders(self) -> dict[str, str]:
+        """Name of a file to the orders of a manoeuvre, for ``simulate --manoeuvre file:``; zigzags are switched at the
+        headings of the card's ship."""
+        assert self.design is not None, "the JSON of a design does not hold the orders"
+        pairs = zip(self.study.manoeuvres, self.design.manoeuvres, strict=True)
+        return {row.orders: manoeuvre.orders for row, (manoeuvre, _) in pairs}
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Number of manoeuvres and time, and the time in which a plan is as good as the usual set."""
+        study = self.study
+        count = sum(one.repeats for one in study.manoeuvres)
+        return (
+            f"{study.ship}: {counted(count, 'manoeuvre')} in {study.minutes_used:.3g} min.",
+            _time_words(study.minutes_for_usual_certainty, study.minutes, "min", "usual set"),
+        )
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Manoeuvres, time, and each figure."""
+        study = self.study
+        count = sum(one.repeats for one in study.manoeuvres)
+        first = KeyFigure(label="Manoeuvres", value=count, note=f"in {study.minutes_used:.3g} min")
+        return self._cards(first, study.minutes_for_usual_certainty, study.minutes, "min", "usual set")
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Certainty of the figures, the plan, and the coefficients that become known."""
+        words = {"manoeuvre": "", "repeats": "", "duration_s": "length", "total_min": "with approach", "orders": ""}
+        plan = records_table("Manoeuvres", self.study.manoeuvres, fields=words, digits=3, folded=False)
+        ordered = dict(sorted(self.study.coefficients.items(), key=lambda item: item[1].design))
+        fields = {"before": "before (prime)", "design": "", "usual": ""}
+        known = records_table("Coefficients", ordered, first="coefficient", fields=fields, digits=3)
+        text = "Standard errors before the trial (prime), and after it over those before."
+        return [
+            self._certainty(_TRIAL, 60, "min"),
+            Section(heading="The plan", tables=[plan]),
+            Section(heading="Coefficients", text=text, tables=[known]),
+        ]
+
+
+_KINDS = {
+    "runs": "",
+    "type": "",
+    "drift": "drift (deg)",
+    "rudder": "rudder (deg)",
+    "frequency_radps": "",
+    "amplitude_prime": "amplitude",
+    "cycles": "",
+    "record_s": "",
+    "check": "",
+}
+_RUNS = {
+    "run": "",
+    "type": "",
+    "drift_deg": "",
+    "rudder_deg": "",
+    "frequency_radps": "",
+    "sway_amplitude_m": "",
+    "yaw_rate_amplitude_degps": "yaw rate",
+    "heading_amplitude_deg": "heading",
+    "cycles": "",
+    "record_s": "",
+    "tank_min": "tank (min)",
+    "purpose": "",
+}
+_CAMPAIGN = (
+    "Standard errors of the figures of the ship that the reduction of the tests will give, from the errors of the "
+    "gauges alone, by the plan and by the usual matrix in the same time, but at least once. The ratio of variances is "
+    "a mean over the ships that the card may be.\n\nErrors common to the whole campaign (calibration, alignment, "
+    "scale) are the same in both."
+)
+_PLACES = (
+    "The area of a point is the number of runs. Runs marked as checks show whether a polynomial of third order holds "
+    "between the extremes."
+)
+_COEFFICIENTS = (
+    "Standard errors of the coefficients (prime), and the share of the variance of each figure that would go if one of "
+    "them were known exactly."
+)
+_TRIAL = (
+    "Standard errors of the figures before the trial, after the plan, and after the usual set in the same time, as far "
+    "as the errors of the card and of the sensors go. Windows of the records have an unknown first state and unknown "
+    "constant disturbances, as wind and waves make."
+)

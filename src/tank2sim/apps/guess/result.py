@@ -1,0 +1,205 @@
+"""Result of ``guess``: a ship guessed from dimensions and the figures of a wheelhouse poster."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import altair as alt
+import numpy as np
+
+from tank2sim.answer.charts.parts import Chart
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, records_table, table
+from tank2sim.answer.result import Result
+from tank2sim.apps.guess.study import GuessedFigure, GuessStudy
+from tank2sim.cards import ManoeuvringCard
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FIRST = ("tactical_diameter@turn35", "overshoot_1@zigzag10", "overshoot_1@zigzag20")
+"""Figures at the top of the page."""
+
+_MANOEUVRES = {"turn35": "turn 35°", "zigzag10": "zigzag 10/10", "zigzag20": "zigzag 20/20"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GuessResult(Result[GuessStudy]):
+    """A guessed ship: the card with its covariance, what the figures settle, and what is predicted.
+
+    Parameters
+    ----------
+    study : GuessStudy
+    card : ManoeuvringCard, optional
+        The card; ``card.save("ship.toml")`` writes it and its covariance. None if the result was read from its JSON.
+    """
+
+    study: GuessStudy
+    card: ManoeuvringCard | None = None
+    command: ClassVar[str] = "guess"
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return "A guessed ship" if self.study.ship == "guessed ship" else f"{self.study.ship}: a guess"
+
+    @property
+    def subtitle(self) -> str:
+        """Dimensions and speed."""
+        size = self.study.dimensions
+        return (
+            f"{size['length_m']:g} x {size['beam_m']:g} x {size['draught_m']:g} m, block coefficient "
+            f"{size['block']:g}, {size['speed_kn']:g} kn"
+        )
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures by key (m, deg): given, and quantiles of 5, 50 and 95 % by the dimensions alone and found."""
+        import pandas as pd
+
+        rows = {}
+        for key, figure in self.study.figures.items():
+            before, after = figure.by_dimensions, figure.found
+            spread = {"by_dimensions_p5": before.p5, "by_dimensions_p50": before.p50, "by_dimensions_p95": before.p95}
+            rows[key] = {"given": figure.given, **spread, "p5": after.p5, "p50": after.p50, "p95": after.p95}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("figure")
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Numbers that the figures settle, and how far they narrow the other figures."""
+        study, given, settled = self.study, self._given, self._settled
+        if not given:
+            return (f"{study.ship}: no figures were given, so the dimensions alone define the intervals.",)
+        words = f"the given figures ({given}) settle {', '.join(settled) or 'no number of the card'}"
+        others = [figure for figure in study.figures.values() if figure.given is None]
+        narrower = [1 - _width(figure) for figure in others if figure.by_dimensions.p95 > figure.by_dimensions.p5]
+        if not narrower:
+            return (f"{study.ship}: {words}.",)
+        share = 100 * float(np.mean(narrower))
+        return (f"{study.ship}: {words}. The intervals of the other figures are {share:.0f} % narrower on average.",)
+
+    @property
+    def _given(self) -> int:
+        return sum(figure.given is not None for figure in self.study.figures.values())
+
+    @property
+    def _settled(self) -> list[str]:
+        return [name for name, number in self.study.parameters.items() if number.settled]
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The best-known figures, the number of those given, and the one that would help most."""
+        study = self.study
+        cards = [_key_figure(key, study.figures[key]) for key in _FIRST if key in study.figures]
+        note = f"{len(self._settled)} of {len(study.parameters)} numbers are settled by them"
+        cards.append(KeyFigure(label="Figures given", value=self._given, note=note))
+        if study.next_figures:
+            best, share = next(iter(study.next_figures.items()))
+            note = f"removes {100 * share:.0f} % of the variance of the others"
+            cards.append(KeyFigure(label="Would help most", value=_named(best), note=note))
+        return cards
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Figures, numbers of the card, and the figures that would help most."""
+        return [self._figures(), self._numbers(), *([self._next()] if self.study.next_figures else [])]
+
+    def _figures(self) -> Section:
+        found: list[list[Cell]] = []
+        prior: list[list[Cell]] = []
+        for key, figure in self.study.figures.items():
+            before, after = figure.by_dimensions, figure.found
+            given = figure.given, figure.standard_error
+            found.append([_named(key), figure.unit, *given, after.p5, after.p50, after.p95])
+            prior.append([_named(key), figure.unit, before.p5, before.p50, before.p95])
+        heads = ("figure", "unit", "given", "standard error", "5 %", "50 %", "95 %")
+        prior_heads = ("figure", "unit", "5 %", "50 %", "95 %")
+        return Section(
+            heading="Figures",
+            text="Nine of ten ships lie in each interval. Intervals are wide for the dimensions alone, and narrower "
+            "for ships that also have the figures given. Figures that were not given are predictions.",
+            charts=[Illustration(chart=figures_chart(self.study))],
+            tables=[
+                table("Figures: nine of ten ships lie between 5 and 95 %", heads, found),
+                table("The same by the dimensions alone", prior_heads, prior),
+            ],
+        )
+
+    def _numbers(self) -> Section:
+        words = {
+            "by_dimensions": "prior",
+            "by_dimensions_standard_error": "prior standard error",
+            "value": "found",
+            "standard_error": "standard error",
+            "settled": "",
+        }
+        return Section(
+            heading="Numbers that the figures settle",
+            text="A number is settled if the figures remove at least half of its variance. The other numbers have the "
+            "errors of the prior; manoeuvres of another kind than those given may depend on them.",
+            tables=[records_table("Numbers of the card, prime", self.study.parameters, first="number", fields=words)],
+        )
+
+    def _next(self) -> Section:
+        rows: list[list[Cell]] = [[_named(key), 100 * share] for key, share in self.study.next_figures.items()]
+        return Section(
+            heading="Further figures that would help most",
+            text="Mean share of the variance of all figures not given that one more figure would remove. The figure is "
+            "measured with the usual error; covariances are those of the ships found.",
+            tables=[table("One more figure", ("figure", "variance removed (%)"), rows, digits=2)],
+        )
+
+
+def _width(figure: GuessedFigure) -> float:
+    """Width of the interval found, over the width by the dimensions alone."""
+    return (figure.found.p95 - figure.found.p5) / (figure.by_dimensions.p95 - figure.by_dimensions.p5)
+
+
+def _key_figure(key: str, figure: GuessedFigure) -> KeyFigure:
+    name, found = _named(key), figure.found
+    note = f"{format_number(found.p5, 3)} to {format_number(found.p95, 3)} {figure.unit}, nine of ten ships"
+    return KeyFigure(label=name[:1].upper() + name[1:], value=found.p50, unit=figure.unit, note=note)
+
+
+def _named(key: str) -> str:
+    """A figure as a reader sees it: ``overshoot_1@zigzag10`` is ``zigzag 10/10: overshoot 1``."""
+    figure, _, manoeuvre = key.partition("@")
+    return f"{_MANOEUVRES.get(manoeuvre, manoeuvre)}: {figure.replace('_', ' ')}"
+
+
+def figures_chart(study: GuessStudy) -> alt.TopLevelMixin:
+    """Intervals of each figure over the median found: by the dimensions alone, with the figures, and as given.
+
+    Parameters
+    ----------
+    study : GuessStudy
+    """
+    rows: list[dict[str, object]] = []
+    anything = any(figure.given is not None for figure in study.figures.values())
+    for key, figure in study.figures.items():
+        middle = figure.found.p50
+        label = f"{_named(key)}, {format_number(middle, 3)} {figure.unit}"
+        ways = {"by dimensions": figure.by_dimensions, **({"with the figures": figure.found} if anything else {})}
+        for kind, band in ways.items():
+            rows.append({"figure": label, "kind": kind, "low": band.p5 / middle, "high": band.p95 / middle})
+        if figure.given is not None:
+            share = figure.given / middle
+            rows.append({"figure": label, "kind": "given", "low": share, "high": share})
+    base = Chart(alt.Data(values=rows))
+    scale = alt.Scale(type="log", nice=False)
+    x = alt.X("low:Q", title="times the median", scale=scale, axis=alt.Axis(format="~g"))
+    y = alt.Y("figure:N", title=None, sort=None, axis=alt.Axis(labelExpr="split(datum.label, ': ')"))
+    legend = alt.Legend() if anything else None
+    colour = alt.Color("kind:N", title=None, sort=["by dimensions", "with the figures", "given"], legend=legend)
+    offset = alt.YOffset("kind:N", sort=["by dimensions", "with the figures", "given"])
+    bars = base.transform_filter("datum.kind != 'given'").mark_bar(height=6)
+    points = base.transform_filter("datum.kind == 'given'").mark_point(filled=True, size=50)
+    layers = [bars.encode(x=x, x2="high:Q", y=y, color=colour, yOffset=offset)]
+    if anything:
+        layers.append(points.encode(x=x, y=y, color=colour))
+    chart: alt.TopLevelMixin = alt.layer(*layers).properties(
+        width=560, height=36 * len(study.figures), title="Figures that nine of ten such ships have"
+    )
+    return chart

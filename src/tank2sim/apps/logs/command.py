@@ -1,0 +1,91 @@
+"""A vessel's own log, from its streams to trials."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from tank2sim.api.craft_identification import identify_craft
+from tank2sim.api.trial import TrialRecord
+from tank2sim.apps.logs.channels import ChannelSet, read_channels
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.result import LogResult
+from tank2sim.apps.logs.stretches import find_stretches
+from tank2sim.apps.logs.study import study_log
+from tank2sim.apps.logs.trial_files import TrialCut, cut_trials
+from tank2sim.apps.logs.voyage import make_voyage
+from tank2sim.arguments import checked
+from tank2sim.cards import CraftCard
+from tank2sim.dynamics.vessel import Vessel, as_vessel
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.results.craft_identification import CraftIdentificationResult
+
+
+@checked
+def log(
+    files: str | Path | Sequence[str | Path],
+    *,
+    channels: str | Path | ChannelSet | None = None,
+    card: Vessel | str | Path | None = None,
+) -> LogResult:
+    """Read logs of a vessel, find their channels and manoeuvres, and cut these into trials.
+
+    Formats: NMEA 0183, NMEA 2000 (candump, Actisense), ROS 1 and ROS 2 bags, MCAP, ArduPilot ``.bin`` and ``.tlog``,
+    PX4 ULog, any CSV. All but CSV need the extra ``tank2sim[logs]``.
+
+    Parameters
+    ----------
+    files : path or sequence of paths
+        Logs of one voyage.
+    channels : path or ChannelSet, optional
+        Which stream is which quantity, as ``channels.toml`` has it; by default they are found.
+    card : Vessel, str or path, optional
+        Of a small craft: what the trials say of each of its coefficients is then in the result.
+
+    Raises
+    ------
+    InputError
+        A file is missing, of no known format or broken, a library is missing, the channels file is wrong, or nothing in
+        the logs is understood.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import tank2sim as t2s
+    >>> file = tempfile.mkdtemp() + "/voyage.csv"
+    >>> text = t2s.load("mariner").zigzag(20, 20).to_csv(file)
+    >>> found = t2s.log(file)
+    >>> list(found.stretches["kind"])[-1]
+    'zigzag'
+    """
+    paths = [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]
+    if not paths:
+        raise InputError("log", "", "has no file", "give at least one log")
+    stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
+    craft = None if card is None else as_vessel(card)
+    if craft is not None and not isinstance(craft.card, CraftCard):
+        remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
+        raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
+    voyage = make_voyage([read_log(path) for path in paths], stated)
+    found = find_stretches(voyage)
+    cuts = cut_trials(voyage, found)
+    identified = None if craft is None else _identified(craft, cuts)
+    study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
+    trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
+    return LogResult(study, voyage, found, tuple(cuts), trials, identified)
+
+
+def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
+    """Coefficients of a craft from all trials; None without any."""
+    assert isinstance(craft.card, CraftCard)
+    turning = any(thruster.max_azimuth_rad is not None for thruster in craft.card.thrusters)
+    taken = [cut for cut in cuts if turning or not cut.steered]
+    if not taken:
+        return None
+    with tempfile.TemporaryDirectory() as name:
+        paths = [Path(name) / cut.trial.path.name for cut in taken]
+        write_together({path: cut.text for path, cut in zip(paths, taken, strict=True)})
+        return identify_craft(craft, paths)

@@ -1,0 +1,272 @@
+"""Tests of what a stream holds, by its consistency with the motion: heading, rates, speeds, courses, rudders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from tank2sim.apps.logs.clock import usual_step
+from tank2sim.apps.logs.quantities import QUANTITIES
+from tank2sim.apps.logs.reference import (
+    HEADING_WINDOW_S,
+    ReferenceMotion,
+    differenced,
+    interpolated,
+)
+from tank2sim.apps.logs.streams import wrapped_angle
+from tank2sim.arrays import Array
+
+NEAR_RAD = math.radians(35.0)
+"""Largest difference of course and heading that counts as agreement: drift angles of ships in the tightest turns are
+below it (Crane, Eda and Landsburg 1989, PNA vol. III, IX.5: 10 to 20 deg)."""
+
+AGREES = 0.8
+"""Correlation, or share of samples, from which content agrees. Project choice: astern motion and pivoting of small
+craft leave it above, an exchanged channel is below 0.5."""
+
+DIFFERS = 0.5
+"""Correlation or share below which content contradicts a name. Project choice: halfway to nothing."""
+
+_SIDEWAYS = 0.35
+"""Sideways speed (rms) as a share of the speed below which a heading is one. Project choice: half of the 0.71 of an
+angle that has nothing to do with the motion; small craft in turns reach 0.3."""
+
+UNIT_SLACK = 0.2
+"""Relative difference of a scale from that of a unit that is taken for it. Project choice: units are factors of 1.85
+and more apart, scales of sensors are off by some per cent."""
+
+FEW_SAMPLES = 30
+"""Samples that a test needs. Project choice: correlations of fewer are chance."""
+
+LEAST_TURNED_RAD = math.radians(60.0)
+"""Change of heading in a log below which signs of headings are not judged. Project choice: on one course, a mirrored
+heading differs by a constant alone."""
+
+RATE_WINDOWS_S = (HEADING_WINDOW_S, 8.0, 30.0)
+"""Times over which heading and rate of turn are compared, s, one after the other until they agree. Project choice: a
+large ship turns so slowly that the noise of a compass hides it within seconds."""
+
+_DECISIVE = 0.97
+"""Correlation from which no longer time is tried (project choice)."""
+
+_LAGS_S = np.arange(-3.0, 3.01, 0.25)
+_NOMOTO_T_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
+"""Time constants of yaw from craft to tanker, s (Nomoto 1957: T' of 0.3 to 3 at 1 to 10 m/s and 2 to 300 m)."""
+
+
+@dataclass(frozen=True)
+class ContentEvidence:
+    """What the content of a stream says of what it is.
+
+    Parameters
+    ----------
+    agreement : float or None
+        0 to 1; None where the log cannot show it.
+    sign : int
+        Sign of the values against the convention of trials; 0 where the log cannot show it.
+    unit : str
+        Unit by the size of the values; empty where the log cannot show it.
+    offset_rad : float
+        Mean difference of an angle from what it should be, rad.
+    spread_rad : float
+        Median difference of an angle from what it should be, without its mean, rad.
+    text : str
+        The finding in a few words.
+    """
+
+    agreement: float | None = None
+    sign: int = 0
+    unit: str = ""
+    offset_rad: float = 0.0
+    spread_rad: float = 0.0
+    text: str = ""
+
+
+UNTESTED = ContentEvidence(text="not to be tested in this log")
+
+
+def angle_unit(values: Array, stated: str) -> str:
+    """Unit of an angle of the full circle: ``deg`` or ``rad``, by its size where nothing states it."""
+    if stated in ("deg", "rad"):
+        return stated
+    return "deg" if np.nanmax(np.abs(values)) > 2 * math.pi + 0.1 else "rad"
+
+
+def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion) -> ContentEvidence:
+    """Compare a heading or a course (n,), rad, with the course of the positions, where the vessel moves.
+
+    All four right angles between them and both senses of rotation are tried; the agreement is the share of samples
+    that differ by less than :data:`NEAR_RAD`.
+    """
+    if not len(motion.time_s) or not motion.moving.any():
+        return UNTESTED
+    at = motion.time_s[motion.moving]
+    course = np.arctan2(motion.v_east_mps, motion.v_north_mps)[motion.moving]
+    step = max(usual_step(time_s), 1.0)
+    cosine, sine = (interpolated(at, time_s, part, 5 * step) for part in (np.cos(angle_rad), np.sin(angle_rad)))
+    good = np.isfinite(cosine)
+    if good.sum() < FEW_SAMPLES:
+        return UNTESTED
+    angle, course = np.arctan2(sine, cosine)[good], course[good]
+    shares = {
+        (sign, quarter): float((np.abs(wrapped_angle(sign * angle + quarter * math.pi / 2 - course)) < NEAR_RAD).mean())
+        for sign in (1, -1)
+        for quarter in range(4)
+    }
+    as_it_is = shares[1, 0]
+    best = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
+    turned = np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
+    sign, quarter = best
+    difference = wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
+    middle = float(np.median(difference)) - quarter * math.pi / 2
+    offset = float(wrapped_angle(np.array([middle]))[0])
+    if best == (1, 0) or not turned:
+        text = f"follows the course of the positions in {100 * as_it_is:.0f} % of the time"
+        if turned and DIFFERS <= as_it_is < AGREES:
+            north, east = (part[motion.moving][good] for part in (motion.v_north_mps, motion.v_east_mps))
+            if (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
+                as_it_is = AGREES
+                text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
+        spread = float(np.median(np.abs(difference - np.median(difference))))
+        return ContentEvidence(as_it_is, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
+    mirrored = "mirrored and " if sign < 0 else ""
+    words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
+    return ContentEvidence(as_it_is, sign, offset_rad=offset, text=words)
+
+
+def _sideways_share(heading: Array, north: Array, east: Array) -> float:
+    """Sideways speed (rms) as a share of the speed through the water, in the steady current that makes it least.
+
+    Craft that go astern or slowly in a current have another course than heading, and still move along their keel:
+    -n sin(psi) + e cos(psi) is small for the velocity (n, e) less the current.
+    """
+    sideways = np.column_stack([-np.sin(heading), np.cos(heading)])
+    across = np.sum(sideways * np.column_stack([north, east]), axis=1)
+    current = np.linalg.lstsq(sideways, across, rcond=None)[0]
+    speed = np.hypot(north - current[0], east - current[1])
+    return float(np.sqrt(np.mean((across - sideways @ current) ** 2) / np.mean(speed**2)))
+
+
+def rate_evidence(
+    time_s: Array, values: Array, motion: ReferenceMotion, windows_s: Sequence[float] = RATE_WINDOWS_S
+) -> ContentEvidence:
+    """Compare a rate of turn (n,), in an unknown unit, with the derivative of the heading: unit and sign.
+
+    The windows of the comparison, s, are tried until one is decisive.
+    """
+    if len(motion.heading_time_s) < FEW_SAMPLES or len(time_s) < FEW_SAMPLES or np.ptp(values) == 0:
+        return UNTESTED
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time_s))])
+    best, slope, other = 0.0, np.zeros(0), np.zeros(0)
+    for window in windows_s:
+        at, slopes = differenced(motion.heading_time_s, motion.heading_rad, window)
+        rate_at, smooth = differenced(time_s, area, max(window, usual_step(motion.heading_time_s)))
+        for lag in _LAGS_S:
+            shifted = interpolated(at + lag, rate_at, smooth, 5.0)
+            found = _correlation(shifted, slopes)
+            if abs(found) > abs(best) + 1e-4:
+                good = np.isfinite(shifted)
+                best, slope, other = found, slopes[good], shifted[good]
+        if abs(best) > _DECISIVE:
+            break
+    if len(other) < FEW_SAMPLES:
+        return UNTESTED
+    scale = float(np.std(slope) / np.std(other))  # either may have the noise
+    unit = _nearest_unit(scale, "yaw_rate")
+    text = f"correlates with the derivative of the heading by {best:.3f}"
+    return ContentEvidence(abs(best), 1 if best > 0 else -1, unit, text=text)
+
+
+def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quantity: str) -> ContentEvidence:
+    """Compare a speed (n,), in an unknown unit, with that of the positions: unit, and whether it follows it."""
+    speed = motion.speed_mps
+    if len(speed) < FEW_SAMPLES or not motion.moving.any():
+        return UNTESTED
+    other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
+    good = np.isfinite(other) & motion.moving
+    if good.sum() < FEW_SAMPLES:
+        return UNTESTED
+    if not other[good].any():
+        return ContentEvidence(0.0, text="it stays at 0 while the positions move")
+    ratio = speed[good] / np.where(np.abs(other[good]) > 1e-9, np.abs(other[good]), np.nan)
+    scale = float(np.nanmedian(ratio))
+    spread = float(np.nanmedian(np.abs(ratio / scale - 1))) if np.isfinite(scale) and scale > 0 else math.inf
+    unit = _nearest_unit(scale, quantity)
+    # A spread of a tenth is agreement (current, leeway), one of a half is another quantity.
+    agreement = float(np.clip(1.0 - 2.0 * max(spread - 0.05, 0.0), 0.0, 1.0)) if unit else 0.0
+    sign = 1 if np.nanmedian(other[good]) > 0 else -1
+    varies = float(np.std(speed)) > 0.1 * float(np.mean(speed))
+    follows = _correlation(other, speed) if varies else 1.0
+    text = f"the speed of the positions is {scale:.3g} times its values, with a correlation of {follows:.2f}"
+    return ContentEvidence(min(agreement, abs(follows)) if follows < DIFFERS else agreement, sign, unit, text=text)
+
+
+def component_evidence(time_s: Array, values: Array, reference: Array, motion: ReferenceMotion) -> ContentEvidence:
+    """Compare a velocity (n,), m/s, with one of the positions at the times of the motion, without their means."""
+    other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
+    good = np.isfinite(other) & np.isfinite(reference)
+    if good.sum() < FEW_SAMPLES:
+        return UNTESTED
+    found = _correlation(other[good], reference[good])
+    text = f"correlates with that of the positions by {found:.2f}"
+    return ContentEvidence(abs(found), 1 if found > 0 else -1, text=text)
+
+
+def steering_evidence(
+    time_s: Array, values: Array, rate_time_s: Array, rate: Array, hold: bool = False
+) -> tuple[ContentEvidence, float]:
+    """Compare a rudder (n,) with the rate of turn (m,) that follows it: agreement, sign, and the best time constant, s.
+
+    The rate is compared with the rudder behind a first-order lag (Nomoto 1957), over a range of time constants; a
+    rudder leads the turn, and what has no lag (an acceleration, another rate) is none.
+    """
+    step = float(np.clip(max(usual_step(rate_time_s), 0.1), 0.1, 1.0))
+    if len(time_s) < FEW_SAMPLES or len(rate_time_s) < FEW_SAMPLES or np.ptp(values) == 0:
+        return UNTESTED, 0.0
+    begin, end = max(time_s[0], rate_time_s[0]), min(time_s[-1], rate_time_s[-1])
+    if end - begin < FEW_SAMPLES * step:
+        return UNTESTED, 0.0
+    grid = np.arange(begin, end, step)
+    rudder, turn = np.interp(grid, time_s, values), np.interp(grid, rate_time_s, rate)
+    found: dict[float, float] = {}
+    for constant in _NOMOTO_T_S:
+        share = math.exp(-step / constant) if constant else 0.0
+        lagged = lfilter([1 - share], [1, -share], rudder - rudder[0]) + rudder[0]
+        found[constant] = _correlation(lagged, turn)
+    best = max(found, key=lambda constant: abs(found[constant]))
+    text = f"the rate of turn follows it by {found[best]:.2f} with a lag of {best:g} s"
+    return ContentEvidence(abs(found[best]), 1 if found[best] > 0 else -1, text=text), best
+
+
+def rudder_unit(values: Array) -> str:
+    """Unit of a rudder by its size: ``rad`` to 0.75, ``1`` to 1.05, ``deg`` from 1.6 to 75, ``%`` to 105; else empty.
+
+    Rudders go to 35 deg (0.61 rad), some to 45 (SOLAS II-1, 29; flap and Schilling rudders to 70). Between, and from
+    70 to 105, nothing is certain, and the confidence says so.
+    """
+    most = float(np.nanpercentile(np.abs(values), 99.9))
+    for limit, unit in ((0.75, "rad"), (1.05, "1"), (1.6, ""), (75.0, "deg"), (105.0, "%")):
+        if most <= limit:
+            return unit
+    return ""
+
+
+def _nearest_unit(scale: float, quantity: str) -> str:
+    if not math.isfinite(scale) or scale <= 0:
+        return ""
+    units = QUANTITIES[quantity].units
+    unit = min(units, key=lambda name: abs(math.log(scale / units[name])))
+    return unit if abs(math.log(scale / units[unit])) < math.log(1 + UNIT_SLACK) else ""
+
+
+def _correlation(first: Array, second: Array) -> float:
+    good = np.isfinite(first) & np.isfinite(second)
+    if good.sum() < FEW_SAMPLES:
+        return 0.0
+    a, b = first[good] - first[good].mean(), second[good] - second[good].mean()
+    size = math.sqrt(float(np.sum(a * a) * np.sum(b * b)))
+    return float(np.sum(a * b)) / size if size > 0 else 0.0

@@ -1,0 +1,299 @@
+"""NMEA 2000: logs of candump (can-utils), Actisense and the other text formats of the library ``nmea2000``."""
+
+from __future__ import annotations
+
+import datetime as dt
+import logging
+import math
+import re
+from array import array
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.apps.logs.clock import continued_clock, rollover_s
+from tank2sim.apps.logs.lines import mostly, text_lines
+from tank2sim.apps.logs.nmea0183 import steady_times
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+
+_FIELDS: dict[int, dict[str, tuple[str, str]]] = {
+    127250: {"heading": ("rad", "heading")},
+    127251: {"rate": ("rad/s", "yaw_rate")},
+    127245: {"position": ("rad", "rudder_angle"), "angleOrder": ("rad", "rudder_order")},
+    127257: {"roll": ("rad", "heel")},
+    127488: {"speed": ("rpm", "rpm")},
+    128259: {"speedWaterReferenced": ("m/s", "u_water")},
+    129025: {"latitude": ("deg", "latitude"), "longitude": ("deg", "longitude")},
+    129026: {"cog": ("rad", "cog"), "sog": ("m/s", "sog")},
+    129029: {"latitude": ("deg", "latitude"), "longitude": ("deg", "longitude")},
+    130306: {"windSpeed": ("m/s", "wind_rel_speed"), "windAngle": ("rad", "wind_rel_direction")},
+    130578: {
+        "longitudinalSpeedWaterReferenced": ("m/s", "u_water"),
+        "transverseSpeedWaterReferenced": ("m/s", "v_water"),
+        "longitudinalSpeedGroundReferenced": ("m/s", "u_ground"),
+        "transverseSpeedGroundReferenced": ("m/s", "v_ground"),
+    },
+}
+"""Fields of the messages (PGN) by the names of canboat, with the unit of the library and the quantity."""
+
+_SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
+_EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+_OFTEN = 0.1
+"""Share of time stamps that fall from which they are differences. Project choice: messages rarely change places."""
+
+_CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
+"""Time of day of Actisense's ASCII and of the raw format of gateways, without a date."""
+
+_TIMED = re.compile(r"^\(\d+\.\d+\)|^\d{4}-\d\d-\d\d|^\d\d:\d\d:\d\d\.|^A\d{6}\.")
+_FRAME = re.compile(
+    r"^\s*\(?(?P<stamp>\d{4}-\d\d-\d\d[T ]\d\d:[\d:.]+Z?|\d+(?:\.\d+)?)\)?[\s,;]+"
+    r"(?P<bus>\S+?)[\s,;]+(?:[RT]X\s+\S\s+\S\s+)?(?P<id>[0-9A-Fa-f]{8})x?(?:\s*\[\d\]\s*|\#|\s+[RT]x\s+d\s+\d\s+|[\s,;]+)"
+    r"(?P<data>(?:[0-9A-Fa-f]{2} ?){1,8})\s*(?:[RT]|'.*')?\s*$"
+)
+"""A frame with a time stamp, a bus, the identifier of 29 bits and the data: candump in any form (-L, -t, -x, -a; of
+can-utils), Vector's ASC, and tables of frames."""
+
+_SIGNAL_K = re.compile(r"^\d{13};[^;]*;")
+"""What Signal K puts before a line that it records."""
+
+_LINES = (
+    re.compile(r"^\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d,\d+,\d+,\d+,\d+,[0-9A-Fa-f]{2},"),
+    re.compile(r"^\s*(?:<0x[0-9A-Fa-f]+>|[a-z]+\d?\s+[0-9A-Fa-f]{8})\s+\[\d\]"),
+    re.compile(r"^A\d{6}\.\d+ [0-9A-Fa-f]{5} [0-9A-Fa-f]{5,6} "),
+    re.compile(r"^\d\d:\d\d:\d\d\.\d+ [RT] [0-9A-Fa-f]{8} "),
+    _FRAME,
+)
+
+_FIRST_EPOCH_S = 1e8
+"""Least time stamp that counts from 1970, s (the year 1973); less counts from the beginning, or from line to line."""
+
+_SAME = 0.5
+"""Share of the lines of a log that decides how it is written. Project choice."""
+
+_VESSELS = frozenset((*range(127001, 129038), *range(129551, 129793), *range(129811, 130816)))
+"""Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)."""
+
+_NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")
+"""Beginnings of fields that are no values (canboat)."""
+
+
+def looks_like_nmea2000(head: bytes) -> bool:
+    """Whether at least half the lines of the beginning of a file are messages of a known format."""
+    return mostly(head, lambda line: any(form.match(_bare(line)) for form in _LINES))
+
+
+def _bare(line: bytes) -> str:
+    """A line without blanks and what Signal K puts before it."""
+    return _SIGNAL_K.sub("", line.decode("latin-1").strip())
+
+
+def read_nmea2000(path: Path) -> VesselLog:
+    """Read a text log of NMEA 2000: headings, rates of turn, rudders, engines, speeds, positions and wind.
+
+    Times are those of the recorder, set to UTC by the system time (PGN 126992) where the log holds it; without a time
+    stamp of the recorder they are those of the system times before and after. Time stamps without a date and without a
+    system time give a log without a date.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, no message is understood, or there is no time.
+    """
+    reader = _Reader(path)
+    for number, line in enumerate(text_lines(path)):
+        if line.strip() and not line.startswith(b"#"):
+            reader.take(number, _bare(line))
+    return reader.log()
+
+
+@dataclass
+class _Column:
+    """Values of a field of one source, with time stamps and numbers of lines."""
+
+    stamps: array[float] = field(default_factory=lambda: array("d"))
+    values: array[float] = field(default_factory=lambda: array("d"))
+    lines: array[int] = field(default_factory=lambda: array("q"))
+
+
+class _Reader:
+    """Reads line by line; the shift of the recorder's clock is known after the last."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        logging.getLogger("nmea2000").setLevel(logging.ERROR)
+        self.decoder = optional_library("nmea2000", path).NMEA2000Decoder()
+        self.counts: Counter[str] = Counter()
+        self.unused: Counter[int] = Counter()
+        self.columns: dict[tuple[int, int, str, str, str], _Column] = defaultdict(_Column)
+        self.units: dict[tuple[int, str], str] = {}
+        self.ticks = _Column()
+        self.sums = _Column()
+        self.variation = math.nan
+        self.days, self.last_s = 0, 0.0
+
+    def take(self, number: int, line: str) -> None:
+        """Take a line; one that cannot be read is counted."""
+        self.counts["lines"] += 1
+        stamp = math.nan
+        try:
+            if frame := _FRAME.match(line):
+                stamp = _seconds(frame["stamp"])
+                self._sum(stamp, number)
+                line = f"(0.0) can0 {frame['id']}#{frame['data'].replace(' ', '')}"
+            message = self.decoder.decode(line)
+        except Exception:  # whatever the library raises, the line is not a message
+            self.counts["corrupted"] += 1
+            return
+        if message is None:
+            return
+        if clock := _CLOCK.match(line):
+            stamp = self._of_day(clock)
+        elif not frame and _TIMED.match(line):
+            stamp = message.timestamp.replace(tzinfo=dt.UTC).timestamp()
+        self.counts["timed"] += math.isfinite(stamp)
+        self.counts["untimed"] += math.isnan(stamp)
+        values = {entry.id: entry.value for entry in message.fields}
+        if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
+            moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)
+            _append(self.ticks, stamp, moment.timestamp(), number)
+        if message.PGN == _VARIATION and isinstance(values.get("variation"), float):
+            self.variation = values["variation"]
+        self._keep(message.PGN, message.source, values, stamp, number)
+
+    def _keep(self, pgn: int, source: int, values: dict[str, object], stamp: float, number: int) -> None:
+        """Keep the fields that are quantities; of a message that is not used, all numbers."""
+        fields = _FIELDS.get(pgn)
+        if fields is None:
+            if pgn != _SYSTEM_TIME:
+                self.unused[pgn] += 1
+            names = [name for name in values if pgn in _VESSELS and not _NOT_VALUES.match(name)]
+            fields = dict.fromkeys(names, ("", ""))
+        instance = str(values["instance"]) if pgn in (_RUDDER, _ENGINE) and "instance" in values else ""
+        for name, (unit, quantity) in fields.items():
+            if isinstance(value := values.get(name), int | float):
+                self.units[pgn, name] = unit
+                where = _quantity(pgn, quantity, values)
+                _append(self.columns[pgn, source, name, where, instance], stamp, float(value), number)
+                if where == "magnetic_heading":
+                    stated = [values.get(key) for key in ("deviation", "variation")]
+                    deviation, variation = (part if isinstance(part, float) else 0.0 for part in stated)
+                    true = value + deviation + (variation or self.variation)
+                    if math.isfinite(true):
+                        self.units[pgn, "true heading"] = "rad"
+                        column = self.columns[pgn, source, "true heading", "heading", ""]
+                        _append(column, stamp, true % (2 * math.pi), number)
+
+    def _sum(self, stamp: float, number: int) -> None:
+        """Count where time stamps fall, and add them up, for they may be differences (candump -t d)."""
+        before = self.sums.stamps[-1] if len(self.sums.stamps) else 0.0
+        total = self.sums.values[-1] if len(self.sums.values) else 0.0
+        self.counts["falls"] += stamp < before
+        _append(self.sums, stamp, total + stamp, number)
+
+    def _of_day(self, clock: re.Match[str]) -> float:
+        """Time of day, s, which goes on over midnight."""
+        hours, minutes, seconds = (float(part) for part in clock.groups() if part is not None)
+        time = 3600 * hours + 60 * minutes + seconds
+        self.days += time < self.last_s - 43200
+        self.last_s = time
+        return 86400 * self.days + time
+
+    def log(self) -> VesselLog:
+        """The log after the last line."""
+        ticks = self.ticks
+        findings: list[LogFinding] = []
+        if not any(quantity for _, _, _, quantity, _ in self.columns):
+            raise InputError(self.path, "", "no message of it is understood", "give a log of candump or of Actisense")
+        timed = self.counts["timed"] > _SAME * (self.counts["timed"] + self.counts["untimed"])
+        if not timed and len(ticks.values) < 2:
+            remedy = "log with time stamps: candump -L"
+            raise InputError(self.path, "", "has neither time stamps nor system times", remedy)
+        stamps = [np.array(column.stamps) for column in (*self.columns.values(), ticks)]
+        dated = not timed or float(np.nanmedian(stamps[0])) > _FIRST_EPOCH_S
+        if timed and not dated and self.counts["falls"] > _OFTEN * self.counts["lines"]:
+            columns = (*self.columns.values(), ticks)
+            stamps = [np.interp(column.lines, self.sums.lines, self.sums.values) for column in columns]
+            findings.append(LogFinding("note", "the time stamps count from line to line and are added up"))
+        clock = np.array(ticks.values)
+        if len(clock) > 1:
+            clock, found = continued_clock(clock, "system time")
+            findings += found
+        shift = 0.0
+        if timed and len(clock):
+            shift = float(np.nanmedian(clock - stamps[-1]))
+            if dated:
+                turned, found = rollover_s(shift)
+                shift, findings = shift + turned, [*findings, *found]
+        streams = []
+        for (key, column), stamp in zip(self.columns.items(), stamps, strict=False):
+            time = stamp + shift if timed else steady_times(np.interp(column.lines, ticks.lines, clock))
+            streams.append(self._stream(key, column, time, findings))
+        streams.sort(key=lambda stream: "true heading" in stream.name)
+        if spoilt := self.counts["corrupted"]:
+            text = f"{spoilt} of {self.counts['lines']} lines are corrupted and left out"
+            findings.append(LogFinding("note", text))
+        counts = {"lines": self.counts["lines"]} | ({"corrupted": spoilt} if spoilt else {})
+        if self.unused.total():
+            counts["unused"] = self.unused.total()
+            kinds = {f"PGN {pgn}": number for pgn, number in self.unused.items() if pgn in _VESSELS}
+            others = self.unused.total() - sum(kinds.values())
+            findings += not_used("messages", kinds | ({"of makers, satellites, other ships": others} if others else {}))
+        return VesselLog(
+            self.path, "NMEA 2000", tuple(streams), counts, tuple(findings), dated or len(ticks.values) > 0
+        )
+
+    def _stream(
+        self, key: tuple[int, int, str, str, str], column: _Column, time: Array, findings: list[LogFinding]
+    ) -> LogStream:
+        """A column under a name of its own; engines by their instance, of which a single one has no side."""
+        pgn, source, name, quantity, instance = key
+        alike = [other for other in self.columns if (other[0], *other[2:]) == (pgn, *key[2:])]
+        instances = sorted({other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}, key=_engine)
+        label = f"{pgn}.{name}"
+        if pgn in _FIELDS and name in _FIELDS[pgn] and quantity != _FIELDS[pgn][name][1]:
+            label += f" ({quantity})"
+        if len(instances) > 1:
+            place = instances.index(instance)
+            label += f" of {('port', 'starboard')[place]}" if pgn == _ENGINE and place < 2 else f" of {place}"
+            if pgn == _ENGINE:
+                quantity = ("rpm_port", "rpm_starboard")[place] if place < 2 else ""
+        label += f" from {source}" if len(alike) > 1 else ""
+        unit = self.units[pgn, name]
+        return LogStream(label, time, np.array(column.values), unit, quantity, "format" if quantity else "")
+
+
+def _engine(instance: str) -> tuple[int, str]:
+    """Order of engines: the port one is the first (canboat, ENGINE_INSTANCE)."""
+    return "Starboard" in instance and "Port" not in instance, instance
+
+
+def _seconds(text: str) -> float:
+    """A time stamp, s: ISO 8601, or a number that counts s, ms, us or ns since 1970, or s since the beginning."""
+    if "-" in text:
+        moment = dt.datetime.fromisoformat(text.rstrip("Z"))
+        return moment.replace(tzinfo=dt.UTC).timestamp()
+    value = float(text)
+    return value * next((factor for least, factor in _EPOCHS if value > least), 1.0)
+
+
+def _append(column: _Column, stamp: float, value: float, number: int) -> None:
+    column.stamps.append(stamp)
+    column.values.append(value)
+    column.lines.append(number)
+
+
+def _quantity(pgn: int, quantity: str, values: dict[str, object]) -> str:
+    """Quantity of a field whose meaning depends on other fields of its message."""
+    reference = str(values.get("reference", values.get("cogReference", "")))
+    if pgn == 127250 and reference.startswith("Magnetic"):
+        return "magnetic_heading"
+    if pgn == 129026 and quantity == "cog" and reference.startswith("Magnetic"):
+        return ""
+    if pgn == 130306 and "Apparent" not in reference:
+        true = "ground" in reference.lower() or "North" in reference
+        return quantity.replace("wind_rel", "wind" if true else "wind_theoretical")
+    return quantity

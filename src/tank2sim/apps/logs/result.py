@@ -1,0 +1,297 @@
+"""Result of ``log``: channels, stretches and trials of a vessel's log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from tank2sim.answer.charts.motion import History, Signal, TimeMark, TrackData, history_chart, track_chart
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
+from tank2sim.answer.result import Result
+from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
+from tank2sim.apps.logs.current import DriftCurrent
+from tank2sim.apps.logs.stretches import Stretch
+from tank2sim.apps.logs.study import LogStudy, StretchStudy
+from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
+from tank2sim.apps.logs.voyage import Voyage
+from tank2sim.arrays import Columns
+from tank2sim.files import writable_folder, write_together
+from tank2sim.results.craft_identification import CraftIdentificationResult, craft_sections
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SIGNALS = (
+    Signal(name="rudder_order", title="rudder order", unit="rad"),
+    Signal(name="rudder_angle", title="rudder angle", unit="rad"),
+    Signal(name="thrust_order_port", title="port thruster", unit="1"),
+    Signal(name="thrust_order_starboard", title="starboard thruster", unit="1"),
+    Signal(name="rpm_order", title="ordered revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="rpm", title="revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="rpm_port", title="port revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="rpm_starboard", title="starboard revolutions", unit="rad/s", display_unit="rpm"),
+    Signal(name="heading", title="heading", unit="rad"),
+    Signal(name="yaw_rate", title="yaw rate", unit="rad/s"),
+    Signal(name="sog", title="speed over ground", unit="m/s"),
+    Signal(name="u_water", title="speed ahead through the water", unit="m/s"),
+    Signal(name="v_water", title="speed to starboard through the water", unit="m/s"),
+)
+_MOST_TRACKS = 8
+"""Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished."""
+
+_UNSURE = 0.7
+"""Confidence below which an unused channel is named under the table. Project choice."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LogResult(Result[LogStudy]):
+    """Channels, stretches and trials of a vessel's log.
+
+    Parameters
+    ----------
+    study : LogStudy
+    voyage : Voyage, optional
+        None if the result was read from its JSON; the following are then empty, too.
+    found : tuple of Stretch
+    cuts : tuple of TrialCut
+        Stretches as trials.
+    trials : tuple of TrialRecord
+        The trials with a rudder.
+    craft : CraftIdentificationResult, optional
+        Coefficients of the craft from all trials, if its card was given.
+    """
+
+    study: LogStudy
+    voyage: Voyage | None = None
+    found: tuple[Stretch, ...] = ()
+    cuts: tuple[TrialCut, ...] = ()
+    trials: tuple[Any, ...] = ()
+    craft: CraftIdentificationResult | None = None
+    command: ClassVar[str] = "log"
+
+    @property
+    def channels(self) -> pd.DataFrame:
+        """Channels, a row each: quantity, stream, unit, sign, confidence, use, why."""
+        import pandas as pd
+
+        return pd.DataFrame([asdict(channel) for channel in self.study.channels])
+
+    @property
+    def stretches(self) -> pd.DataFrame:
+        """Stretches, a row each: kind, UTC, begin and duration (s), rudder, heading change (deg), speeds, file."""
+        import pandas as pd
+
+        return pd.DataFrame([{**asdict(stretch), "kind": stretch.kind.value} for stretch in self.study.stretches])
+
+    @property
+    def identified(self) -> CraftIdentificationResult | None:
+        """Coefficients of the craft from all trials, with a verdict on each; None without its card or trials."""
+        if self.craft is None and self.study.identified is not None:
+            return CraftIdentificationResult(self.study.identified)
+        return self.craft
+
+    @property
+    def series(self) -> dict[str, pd.DataFrame]:
+        """Quantity to a frame of ``time_s`` (UTC, s since 1970) and ``value`` (SI) of each channel in use."""
+        import pandas as pd
+
+        series = self.voyage.series if self.voyage else {}
+        return {name: pd.DataFrame({"time_s": entry.time_s, "value": entry.values}) for name, entry in series.items()}
+
+    @property
+    def current(self) -> DriftCurrent | None:
+        """Mean current of the voyage; None where the log does not determine it."""
+        return self.study.current
+
+    def files(self, folder: str | Path) -> dict[Path, str | bytes]:
+        """Files of the voyage in a folder: ``channels.toml`` and a trial for each stretch that excites the vessel."""
+        folder = Path(folder)
+        out: dict[Path, str | bytes] = {folder / cut.trial.path.name: cut.text for cut in self.cuts}
+        if self.voyage and all(channel.why != "by the channels file" for channel in self.voyage.channels.channels):
+            out[folder / CHANNELS_FILE] = channels_text(self.voyage.channels)
+        return out
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write :meth:`files`, all or none, and return them.
+
+        Raises
+        ------
+        InputError
+            The folder or a file cannot be written.
+        """
+        files = self.files(folder)
+        writable_folder(Path(folder))
+        write_together(files, inputs=[Path(log.file) for log in self.study.logs])
+        remove_earlier_trials(Path(folder), files)
+        return list(files)
+
+    @property
+    def title(self) -> str:
+        """The files."""
+        return f"Log: {', '.join(PurePath(log.file).name for log in self.study.logs)}"
+
+    @property
+    def subtitle(self) -> str:
+        """The date."""
+        begins = self.study.begins_utc
+        return f"Voyage from {begins}" if begins else "Voyage without a date"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Length of the voyage, the trials cut out, and how many faults there are."""
+        study = self.study
+        formats = ", ".join(f"{PurePath(log.file).name} ({log.format})" for log in study.logs)
+        since = f" from {study.begins_utc}" if study.begins_utc else ""
+        used, exciting = sum(one.use for one in study.channels), sum(one.excites for one in study.stretches)
+        lines = [
+            f"{formats}: {study.duration_s:.5g} s{since}, {used} channels in use.",
+            f"{exciting} of {len(study.stretches)} stretches excite the vessel. {_cut_in_words(self._cut)}",
+        ]
+        if self._faults:
+            lines.append(f"{self._faults} faults of the log are noted.")
+        return (*lines, *(self.identified.headline if self.identified else ()))
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Trials, time that excites the vessel, channels and faults."""
+        study = self.study
+        exciting = sum(stretch.duration_s for stretch in study.stretches if stretch.excites)
+        return [
+            KeyFigure(label="Trials cut out", value=len(self._cut), note=f"of {len(study.stretches)} stretches"),
+            KeyFigure(
+                label="Time that excites the vessel",
+                value=round(exciting),
+                unit="s",
+                note=f"of {study.duration_s:.4g} s",
+            ),
+            KeyFigure(label="Channels in use", value=sum(channel.use for channel in study.channels)),
+            KeyFigure(label="Faults", value=self._faults, verdict=Verdict.CAUTION if self._faults else Verdict.PASSED),
+        ]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Map, time line, stretches, coefficients of a craft, channels and logs."""
+        study = self.study
+        return [
+            *([self._map(study.track)] if study.track else []),
+            *self._time_line(),
+            Section(heading="Channels", tables=self._channel_tables()),
+            Section(heading="Stretches", tables=[self._stretch_table()]),
+            *(craft_sections(study.identified) if study.identified else []),
+            Section(heading="Logs", tables=[self._log_table()], folded=True),
+        ]
+
+    @property
+    def _cut(self) -> list[StretchStudy]:
+        return [stretch for stretch in self.study.stretches if stretch.file]
+
+    @property
+    def _faults(self) -> int:
+        return sum(finding.kind == "fault" for finding in self.study.findings)
+
+    def _map(self, track: Columns) -> Section:
+        time, x, y = track["t_s"], track["x_m"], track["y_m"]
+        tracks = [TrackData(label="voyage", x_m=x, y_m=y, time_s=time)]
+        longest = sorted(self._cut, key=lambda stretch: -stretch.duration_s)[:_MOST_TRACKS]
+        for stretch in sorted(longest, key=lambda stretch: stretch.begins_s):
+            inside = (time >= stretch.begins_s) & (time <= stretch.begins_s + stretch.duration_s)
+            if inside.sum() > 1:
+                label = PurePath(str(stretch.file)).stem
+                tracks.append(TrackData(label=label, x_m=x[inside], y_m=y[inside], time_s=time[inside]))
+        origin = self.study.origin_deg
+        caption = f"Origin at {origin[0]:g} deg N, {origin[1]:g} deg E (WGS 84)." if origin else ""
+        if len(self._cut) > _MOST_TRACKS:
+            caption += f" The longest {_MOST_TRACKS} of {len(self._cut)} trials are shown."
+        return Section(heading="Map", charts=[Illustration(chart=track_chart(tracks, title="Map"), caption=caption)])
+
+    def _time_line(self) -> list[Section]:
+        line = self.study.time_line
+        shown = [signal for signal in _SIGNALS if signal.name in line]
+        if not shown:
+            return []
+        time = np.unique(np.concatenate([line[signal.name]["t_s"] for signal in shown]))
+        values = {
+            signal.name: np.interp(
+                time, line[signal.name]["t_s"], line[signal.name]["value"], left=np.nan, right=np.nan
+            )
+            for signal in shown
+        }
+        marks = [
+            TimeMark(
+                signal=signal.name,
+                begin_s=stretch.begins_s,
+                end_s=stretch.begins_s + stretch.duration_s,
+                text=stretch.file or stretch.kind.value,
+            )
+            for signal in shown
+            for stretch in self.study.stretches
+            if stretch.excites
+        ]
+        logged = [History(label="log", time_s=time, values=values)]
+        chart = history_chart(logged, shown, title="Logged signals", height_px=70, marks=marks)
+        caption = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
+        return [Section(heading="Time line", charts=[Illustration(chart=chart, caption=caption)])]
+
+    def _channel_tables(self) -> list[Table]:
+        """Channels in use, and all with the reasons of their confidence."""
+        channels, fields = self.study.channels, ("quantity", "stream", "unit", "sign", "confidence")
+        unsure = [one for one in channels if not one.use and one.confidence < _UNSURE]
+        notes = [f"not used: {one.quantity}: {one.stream}: {one.why}" for one in unsure]
+        used = records_table("Channels in use", [one for one in channels if one.use], fields=fields, digits=3)
+        caption = f"All channels, to be confirmed or corrected in {CHANNELS_FILE}"
+        every = records_table(caption, channels, fields=(*fields, "use", "why"), digits=3, folded=True, on_screen=False)
+        return [replace(used, notes=notes), every]
+
+    def _stretch_table(self) -> Table:
+        rows: list[list[Cell]] = [
+            [
+                stretch.kind.value,
+                stretch.begins_s,
+                stretch.duration_s,
+                stretch.steering,
+                stretch.heading_change_deg,
+                stretch.reversals,
+                stretch.speed_mps,
+                stretch.yaw_rate_rms_degps,
+                stretch.file,
+            ]
+            for stretch in self.study.stretches
+        ]
+        heads = ("stretch", "begins (s)", "lasts (s)", "steering", "heading change (deg)", "reversals", "speed (m/s)")
+        return replace(table("Stretches", [*heads, "rms yaw rate (deg/s)", "file"], rows), wide=True)
+
+    def _log_table(self) -> Table:
+        rows: list[list[Cell]] = [
+            [
+                PurePath(log.file).name,
+                log.format,
+                log.streams,
+                ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in log.counts.items()),
+            ]
+            for log in self.study.logs
+        ]
+        return table("Logs", ("file", "format", "streams", "read and lost"), rows, on_screen=False)
+
+
+def _cut_in_words(cut: Sequence[StretchStudy]) -> str:
+    """The trials of the log by their kinds and orders."""
+    if not cut:
+        return "No manoeuvre could be cut out as a trial."
+    orders: dict[str, list[str]] = {}  # kind to the orders of its trials, empty without any
+    for stretch in cut:
+        _, kind, *order = PurePath(str(stretch.file)).stem.split("_")  # such as 02_zigzag_-20
+        orders.setdefault(kind, []).append(" ".join(order))
+    names = ", ".join(f"{kind} {_in_short(each)}".rstrip() for kind, each in orders.items())
+    count = f"{len(cut)} trials are" if len(cut) > 1 else "One trial is"
+    return f"{count} cut out: {names}."
+
+
+def _in_short(orders: Sequence[str]) -> str:
+    """Orders of the trials of a kind, or how many these are."""
+    if all(orders):
+        return " ".join(orders)
+    return f"({len(orders)})" if len(orders) > 1 else ""

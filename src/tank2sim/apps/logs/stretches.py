@@ -1,0 +1,590 @@
+"""Manoeuvres and steady legs of a voyage, found by its orders and what the vessel did.
+
+Orders are taken apart where they jump into pieces; a piece is known by its rudder (or the difference of two thrusters),
+its propulsion and the speed; pieces that belong together are one stretch: a zigzag is a row of opposite rudders.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from tank2sim.apps.logs.clock import usual_step
+from tank2sim.apps.logs.content import steering_evidence
+from tank2sim.apps.logs.reference import differenced, held, interpolated
+from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
+from tank2sim.arrays import Array
+
+HELD_RUDDER_RAD = math.radians(4.0)
+"""Rudder from which on a vessel is steered to turn. Project choice: course keeping in fair weather stays below, and the
+smallest standard manoeuvre, the 5/5 zigzag, is above."""
+
+HELD_SHARE = 0.1
+"""Difference of two thrusters, as a share of full, that counts as :data:`HELD_RUDDER_RAD` does: 4 of 35 deg."""
+
+JUMP_S = 2.0
+"""Time in which an order changes by more than a half of its threshold where it jumps, s. Project choice: steering gear
+turns by 2.3 deg/s and more (SOLAS II-1, regulation 29.3.2), helmsmen's corrections are slower or smaller."""
+
+PROPULSION_STEP = 0.1
+"""Change of propulsion, as a share of its largest, that is an order. Project choice: governors hold 2 %."""
+
+STOPPED_SHARE = 0.05
+"""Propulsion below this share of its largest is stopped. Project choice: idling and dead bands are below."""
+
+RESTING_MPS = 0.25
+"""Speed below which a vessel rests, m/s: drifting with wind and current."""
+
+UNDER_WAY_MPS = 1.0
+"""Steady speed from which a vessel does not rest though its propulsion is stopped, m/s. Project choice: twice what
+currents usually are; sails or an engine that is not in the log drive it."""
+
+SPEED_CHANGE = 0.15
+"""Relative change of speed in a piece without steering from which it is an acceleration. Project choice."""
+
+LEAST_TURN_RAD = math.radians(15.0)
+"""Change of heading of a piece from which it is a turn. Project choice: below, a correction of the course."""
+
+LEAST_TURN_S = 5.0
+"""Shortest turn, s. Project choice: what is shorter checks the swing after another manoeuvre."""
+
+LEAST_TRIAL_ROWS = 30
+"""Samples of the heading in a stretch from which it becomes a trial. Project choice."""
+
+
+class StretchKind(StrEnum):
+    """What a stretch is."""
+
+    ZIGZAG = "zigzag"
+    TURN = "turn"
+    STEPS = "steps"
+    PIVOT = "pivot"
+    ACCELERATE = "accelerate"
+    COAST = "coast"
+    STOP = "stop"
+    ASTERN = "astern"
+    STEADY = "steady"
+    REST = "rest"
+
+    @property
+    def excites(self) -> bool:
+        """Whether it reveals more of the vessel than a straight course does."""
+        return self not in (StretchKind.STEADY, StretchKind.REST)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a voyage.
+
+    Parameters
+    ----------
+    kind : StretchKind
+    begin_s, end_s : float
+        In the time of the voyage; the begin is the execute.
+    rudder_rad : float
+        First held rudder, rad, positive to starboard; of thrusters their difference (port - starboard) as a share; nan
+        without.
+    heading_change_rad : float
+    reversals : int
+        Changes of the side of the rudder.
+    speed_mps : tuple of float
+        At the begin, the least and the largest; nan where no speed is known.
+    yaw_rate_radps : float
+        Root mean square.
+    """
+
+    kind: StretchKind
+    begin_s: float
+    end_s: float
+    rudder_rad: float
+    heading_change_rad: float
+    reversals: int
+    speed_mps: tuple[float, float, float]
+    yaw_rate_radps: float
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts."""
+        return self.end_s - self.begin_s
+
+
+@dataclass(frozen=True, eq=False)
+class _Signals:
+    """Orders and motion on one grid; steering and propulsion as multiples of their thresholds' units."""
+
+    time: Array
+    steering: Array
+    threshold: float
+    propulsion: Array
+    full: float
+    speed: Array
+    heading: Array
+    rate: Array
+    rest_s: float
+
+    @property
+    def step(self) -> float:
+        """s."""
+        return float(self.time[1] - self.time[0])
+
+    def held(self, begin: int, end: int) -> Array:
+        """Steering where it does not move to another order."""
+        values = self.steering[begin:end]
+        reach = max(1, round(JUMP_S / self.step))
+        still = np.abs(values[reach:] - values[:-reach]) < 0.5 * self.threshold
+        return values[reach:][still] if len(values) > reach else values[:0]
+
+
+@dataclass(frozen=True)
+class _Piece:
+    begin: int
+    end: int  # one past the last sample
+    kind: StretchKind
+    level: float
+    propulsion: float
+
+
+def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
+    """Find all stretches of a voyage in the order of time; empty where neither rudder nor thrusters are known."""
+    signals = _signals(voyage)
+    if signals is None:
+        return ()
+    pieces = _merged(signals, [_piece(signals, begin, end) for begin, end in _cuts(signals)])
+    return tuple(_stretch(signals, piece) for piece in pieces)
+
+
+def _signals(voyage: Voyage) -> _Signals | None:
+    series = voyage.series
+    steering = _steering(series)
+    if steering is None or len(steering[0].time_s) < LEAST_TRIAL_ROWS:
+        return None
+    entry, threshold = steering
+    step = float(np.clip(usual_step(entry.time_s), 0.2, 1.0))
+    time = np.arange(entry.time_s[0], entry.time_s[-1], step)
+    if len(time) < LEAST_TRIAL_ROWS:  # many samples of a few instants
+        return None
+    steer = median_filter(_on_grid(time, entry), size=3, mode="nearest")
+    propulsion, full = _propulsion(series, time)
+    heading = series.get("heading", series.get("magnetic_heading"))
+    at_heading = np.full(len(time), np.nan) if heading is None else np.interp(time, heading.time_s, heading.values)
+    rate = _rate(series)
+    at_rate = np.full(len(time), np.nan) if rate is None else np.interp(time, rate.time_s, rate.values)
+    _, lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate)))
+    speed = _speed(series, time)
+    return _Signals(
+        time, steer, threshold, propulsion, full, speed, at_heading, at_rate, float(np.clip(2 * lag, 2.0, 30.0))
+    )
+
+
+def _steering(series: Mapping[str, QuantitySeries]) -> tuple[QuantitySeries, float] | None:
+    """The order of the rudder, or its angle, or the difference of two thrusters; and the threshold of steering."""
+    for name in ("rudder_order", "rudder_angle"):
+        if name in series:
+            return series[name], HELD_RUDDER_RAD
+    for stem in ("thrust_order", "rpm"):
+        port, starboard = series.get(f"{stem}_port"), series.get(f"{stem}_starboard")
+        if port and starboard:
+            other = np.interp(port.time_s, starboard.time_s, starboard.values)
+            full = 1.0 if stem == "thrust_order" else max(float(np.percentile(np.abs(port.values), 99)), 1e-9)
+            return QuantitySeries(port.time_s, (port.values - other) / full / 2), HELD_SHARE / 2
+    return None
+
+
+def _propulsion(series: Mapping[str, QuantitySeries], time: Array) -> tuple[Array, float]:
+    """Order of the propulsion (n,), or revolutions, and its largest; nan without."""
+    if (entry := series.get("rpm_order", series.get("rpm"))) is not None:
+        values = median_filter(_on_grid(time, entry), size=5, mode="nearest")
+    else:
+        parts = []
+        for stem in ("thrust_order", "rpm"):
+            pair = [series.get(f"{stem}_{side}") for side in ("port", "starboard")]
+            if all(part is not None for part in pair):
+                parts = [_on_grid(time, part) for part in pair if part is not None]
+                break
+        if not parts:
+            return np.full(len(time), np.nan), 1.0
+        values = median_filter(0.5 * (parts[0] + parts[1]), size=3, mode="nearest")
+    return values, max(float(np.nanpercentile(np.abs(values), 99)), 1e-9)
+
+
+def _on_grid(time: Array, entry: QuantitySeries) -> Array:
+    """Values of an order or a measured signal (n,), held, for orders are."""
+    values = held(time, entry.time_s, entry.values)
+    return np.where(np.isfinite(values), values, entry.values[0])
+
+
+def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
+    for name in ("u_water", "sog", "u_ground"):
+        if name in series:
+            values = interpolated(time, series[name].time_s, series[name].values, 30.0)
+            return np.abs(values)
+    if "x" in series:
+        at, north = differenced(series["x"].time_s, series["x"].values, 4.0)
+        _, east = differenced(series["y"].time_s, series["y"].values, 4.0)
+        return interpolated(time, at, np.hypot(north, east), 30.0)
+    return np.full(len(time), np.nan)
+
+
+def _rate(series: Mapping[str, QuantitySeries]) -> QuantitySeries | None:
+    if "yaw_rate" in series:
+        return series["yaw_rate"]
+    heading = series.get("heading", series.get("magnetic_heading"))
+    if heading is None:
+        return None
+    time, rate = differenced(heading.time_s, heading.values, 2.0)
+    return QuantitySeries(time, rate) if len(time) else None
+
+
+def _cuts(signals: _Signals) -> list[tuple[int, int]]:
+    """Begin and end of pieces between jumps of the orders; a piece begins where its jump does."""
+    step = signals.time[1] - signals.time[0]
+    reach = max(1, round(JUMP_S / step))
+    jumping = np.zeros(len(signals.time), dtype=bool)
+    for values, least in (
+        (signals.steering, 0.75 * signals.threshold),
+        (signals.propulsion, PROPULSION_STEP * signals.full),
+    ):
+        moved = np.abs(values[reach:] - values[:-reach]) > least
+        for place in np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]])):
+            window = np.abs(np.diff(values[place : place + reach + 1]))
+            jumping[place + int(np.argmax(window > 0.2 * least)) + 1] = True
+        # Within a long movement there may be another order: a reversal of the movement itself.
+        slope = np.sign(values[reach:] - values[:-reach]) * moved
+        for place in np.flatnonzero(slope[1:] * slope[:-1] < 0):
+            jumping[place + reach // 2 + 1] = True
+    inactive = np.abs(signals.steering) < signals.threshold
+    turns = np.flatnonzero(np.diff(inactive.astype(int))) + 1
+    for begin, end in zip([0, *turns], [*turns, len(inactive)], strict=True):
+        settling = round(signals.rest_s / step)
+        if (
+            begin > settling
+            and inactive[begin]
+            and end - begin >= settling
+            and not jumping[begin - settling : begin].any()
+        ):
+            jumping[begin] = True  # a rudder that was brought back slowly
+    starts = np.flatnonzero(jumping)
+    edges = np.unique(np.concatenate([[0], starts, [len(signals.time)]]))
+    least = max(2, round(1.5 / step))
+    kept = [int(edges[0])]
+    kept += [int(edge) for edge in edges[1:-1] if edge - kept[-1] >= least and len(signals.time) - edge >= least]
+    return list(zip(kept, [*kept[1:], len(signals.time)], strict=True))
+
+
+def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
+    # The second half is free of the movement to the new order.
+    late = slice(begin + (end - begin) // 3, end)
+    level = float(np.median(signals.steering[late]))
+    early = signals.steering[begin : begin + max(2, (end - begin) // 3)]
+    if abs(level) < signals.threshold and abs(np.median(early)) > signals.threshold and end - begin > 4:
+        level = float(np.median(early)) if abs(_turned(signals, begin, end)) > LEAST_TURN_RAD else level
+    propulsion = float(np.median(signals.propulsion[late]))
+    share = propulsion / signals.full
+    speed = signals.speed[begin:end]
+    known = speed[np.isfinite(speed)]
+    first, last = (
+        float(np.median(part)) if len(part) else math.nan
+        for part in (known[: max(1, len(known) // 10)], known[-max(1, len(known) // 10) :])
+    )
+    change = abs(last - first) / max(first, last, 1e-9)
+    turning = abs(level) > signals.threshold
+    moved = len(known) > 0 and float(np.max(known)) > RESTING_MPS
+    if not math.isnan(share) and share < -STOPPED_SHARE:
+        kind = StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
+    elif not math.isnan(share) and abs(share) <= STOPPED_SHARE:
+        if turning:
+            kind = StretchKind.PIVOT if signals.threshold != HELD_RUDDER_RAD else StretchKind.TURN
+        else:
+            sailing = len(known) > 0 and float(np.median(known)) > UNDER_WAY_MPS
+            slow = StretchKind.STEADY if sailing else StretchKind.REST
+            kind = StretchKind.COAST if moved and change > SPEED_CHANGE else slow
+    elif turning:
+        kind = StretchKind.TURN
+    elif moved and change > SPEED_CHANGE:
+        kind = StretchKind.ACCELERATE
+    else:
+        kind = StretchKind.STEADY if moved or not len(known) else StretchKind.REST
+    return _Piece(begin, end, kind, level, propulsion)
+
+
+def _turned(signals: _Signals, begin: int, end: int) -> float:
+    heading = signals.heading[begin:end]
+    return float(heading[-1] - heading[0]) if len(heading) else 0.0
+
+
+_UNSTEERED = (StretchKind.STEADY, StretchKind.ACCELERATE, StretchKind.COAST, StretchKind.REST, StretchKind.ASTERN)
+
+_JOINABLE = (StretchKind.STEADY, StretchKind.REST, StretchKind.ASTERN)
+
+FAR_TURN_RAD = math.radians(100.0)
+"""Change of heading under one order from which it is a turn, and not a leg of a zigzag. Project choice: a leg of the
+20/20 zigzag changes it by 40 deg, and an overshoot comes back."""
+
+CHANGED_COURSE_RAD = math.radians(45.0)
+"""Change of heading from which a rudder's order is a turn, and not a step. Project choice: steps leave the course as
+it is in the mean."""
+
+_OTHER_ORDER = 0.3
+"""Relative difference from which two rudders to one side are two orders. Project choice: corrections of a helmsman are
+smaller in the mean, the step from 20 to 35 deg is larger."""
+
+_MOVING = 0.1
+"""Least change between samples, over the threshold, of a rudder on its way: a fifth of what gear turns in 0.2 s."""
+
+_ALIKE = 0.4
+"""Relative difference of the orders of a zigzag. Project choice: ITTC's are equal; angles differ by the gear."""
+
+_FOLLOWING = 0.7
+"""Share of the legs of a zigzag in which the heading follows the order (project choice)."""
+
+_STEPS_LEAST = 4
+"""Short stretches in a row that are one of steps. Project choice: fewer are an approach and a manoeuvre."""
+
+_STEPS_LONGEST = 2.5
+"""Longest of them, as a multiple of the time that the vessel needs to settle. Project choice."""
+
+
+def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
+    """Pieces that belong together as one: zigzags, steps, slow changes of propulsion, short corrections between."""
+    step = signals.step
+    joined: list[_Piece] = []
+    for piece in pieces:
+        last = joined[-1] if joined else None
+        lasted = (last.end - last.begin) * step if last else math.inf
+        moving = last is not None and lasted < signals.rest_s and _changes_power(signals, last)
+        movement = lasted < JUMP_S or (moving and _straight(signals, piece))
+        if last is not None and last.kind in _UNSTEERED and movement:
+            joined[-1] = _piece(signals, last.begin, piece.end)
+        else:
+            joined.append(piece)
+    groups: list[list[_Piece]] = []
+    for piece in joined:
+        brief = (piece.end - piece.begin) * step < signals.rest_s
+        if groups and _belongs(signals, groups[-1], piece, brief):
+            groups[-1].append(piece)
+        else:
+            groups.append([piece])
+    out: list[_Piece] = []
+    for piece in _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)]):
+        same = out and out[-1].kind == piece.kind and piece.kind in _JOINABLE
+        settled = out and out[-1].kind is StretchKind.ACCELERATE and piece.kind is StretchKind.STEADY
+        if same or (settled and (piece.end - piece.begin) * step < 2 * signals.rest_s):
+            out[-1] = replace(out[-1], end=piece.end)
+        else:
+            out.append(piece)
+    return out
+
+
+def _changes_power(signals: _Signals, piece: _Piece) -> bool:
+    """Whether the propulsion moves to another order throughout a piece."""
+    values = signals.propulsion[piece.begin : piece.end]
+    return bool(np.ptp(values) > PROPULSION_STEP * signals.full)
+
+
+def _straight(signals: _Signals, piece: _Piece) -> bool:
+    """Whether a piece is not steered."""
+    return piece.kind in (*_UNSTEERED, StretchKind.STOP) and abs(piece.level) < signals.threshold
+
+
+def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
+    """Rows of at least :data:`_STEPS_LEAST` short stretches as one of steps each."""
+    step = signals.step
+    longest = _STEPS_LONGEST * signals.rest_s
+    ship = signals.threshold == HELD_RUDDER_RAD
+    short = [
+        (piece.end - piece.begin) * step < longest
+        and piece.kind not in (StretchKind.ZIGZAG, StretchKind.REST)
+        and not (ship and abs(_turned(signals, piece.begin, piece.end)) > CHANGED_COURSE_RAD)
+        for piece in pieces
+    ]
+    out: list[_Piece] = []
+    place = 0
+    while place < len(pieces):
+        length = next((n for n, is_short in enumerate(short[place:]) if not is_short), len(pieces) - place)
+        steered = sum(abs(piece.level) > signals.threshold for piece in pieces[place : place + length])
+        if length >= _STEPS_LEAST and steered > 1:
+            out.append(replace(pieces[place], end=pieces[place + length - 1].end, kind=StretchKind.STEPS))
+            place += length
+        else:
+            out.append(pieces[place])
+            place += 1
+    return out
+
+
+def _belongs(signals: _Signals, group: Sequence[_Piece], piece: _Piece, brief: bool) -> bool:
+    last = group[-1]
+    same_power = _same_power(signals, last, piece)
+    steered = (StretchKind.TURN, StretchKind.PIVOT)
+    if last.kind in steered and piece.kind in steered:
+        if _amidships(signals, last):
+            return False
+        if last.kind == piece.kind is StretchKind.PIVOT and not brief:
+            return False
+        return same_power
+    return brief and same_power and last.kind in steered and piece.kind in (StretchKind.STEADY, StretchKind.ACCELERATE)
+
+
+def _manoeuvres(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
+    """The manoeuvres of a group: zigzags, turns, and what is left, as one of steps each."""
+    if len(group) == 1:
+        return [_single(signals, group[0])]
+    legs = _legs(signals, group)
+    out: list[_Piece] = []
+    others: list[_Piece] = []
+    place = 0
+    while place < len(legs):
+        count, kind = _zigzag_length(signals, legs[place:]), StretchKind.ZIGZAG
+        if not count and _turns_far(signals, legs[place]):
+            checked = place + 1 < len(legs) and _checks_swing(signals, *legs[place : place + 2])
+            count, kind = 1 + checked, legs[place].kind
+        if count:
+            out += [*_remaining(signals, others), _whole(legs[place : place + count], kind)]
+            others, place = [], place + count
+        else:
+            others.append(legs[place])
+            place += 1
+    if out and len(others) == 1 and _checks_swing(signals, legs[-2], others[0]):
+        out[-1], others = replace(out[-1], end=others[0].end), []
+    return out + _remaining(signals, others)
+
+
+def _single(signals: _Signals, piece: _Piece) -> _Piece:
+    """A piece alone: without a change of heading it is not a turn."""
+    lasted = (piece.end - piece.begin) * signals.step
+    turned = abs(_turned(signals, piece.begin, piece.end))
+    if piece.kind is StretchKind.TURN and (turned < LEAST_TURN_RAD or lasted < LEAST_TURN_S):
+        return replace(piece, kind=StretchKind.STEADY)
+    return piece
+
+
+def _legs(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
+    """Pieces of a group to one side as one each: a helmsman's corrections of an order belong to it."""
+    sides: list[list[_Piece]] = []
+    for piece in group:
+        if (
+            sides
+            and (_amidships(signals, piece) or sides[-1][0].level * piece.level > 0)
+            and _same_power(signals, sides[-1][0], piece)
+        ):
+            sides[-1].append(piece)
+        else:
+            sides.append([piece])
+    legs = [leg for pieces in sides for leg in _levels(signals, pieces)]
+    for place, (last, leg) in enumerate(pairwise(legs)):
+        begin = _movement_begin(signals, leg, last.begin)
+        legs[place : place + 2] = replace(legs[place], end=begin), replace(leg, begin=begin)
+    return legs
+
+
+def _amidships(signals: _Signals, piece: _Piece) -> bool:
+    """Whether the rudder is amidships at the end of a piece: for a moment, or brought back slowly."""
+    late = signals.steering[(piece.begin + piece.end) // 2 : piece.end]
+    return bool(abs(np.median(late)) <= signals.threshold)
+
+
+def _levels(signals: _Signals, pieces: Sequence[_Piece]) -> list[_Piece]:
+    """Pieces to one side as one leg, or as several where an order goes over into another for long."""
+    steered = [piece.end for piece in pieces if not _amidships(signals, piece)]
+    begin, end = pieces[0].begin, steered[-1] if steered else pieces[-1].end
+    settled = signals.rest_s / signals.step
+    costs: dict[int, float] = {}
+    for place, piece in enumerate(pieces):
+        parts = signals.held(begin, piece.begin), signals.held(piece.begin, end)
+        if min(map(len, parts)) > settled:
+            before, after = map(np.median, parts)
+            if abs(after - before) > max(_OTHER_ORDER * max(abs(before), abs(after)), signals.threshold):
+                costs[place] = float(np.abs(parts[0] - before).sum() + np.abs(parts[1] - after).sum())
+    if costs:
+        place = min(costs, key=costs.__getitem__)
+        return [*_levels(signals, pieces[:place]), *_levels(signals, pieces[place:])]
+    held_orders = signals.held(begin, end)
+    level = float(np.median(held_orders)) if len(pieces) > 1 and len(held_orders) else pieces[0].level
+    return [replace(pieces[0], end=pieces[-1].end, level=level)]
+
+
+def _movement_begin(signals: _Signals, leg: _Piece, least: int) -> int:
+    """The sample from which the rudder moves to the order of a leg, after sample `least`."""
+    begin, towards = leg.begin, math.copysign(1.0, leg.level) * np.diff(signals.steering)
+    while begin - 1 > least and towards[begin - 1] > _MOVING * signals.threshold:
+        begin -= 1
+    return begin
+
+
+def _same_power(signals: _Signals, first: _Piece, second: _Piece) -> bool:
+    return math.isnan(second.propulsion) or (
+        abs(second.propulsion - first.propulsion) <= PROPULSION_STEP * signals.full
+    )
+
+
+def _zigzag_length(signals: _Signals, legs: Sequence[_Piece]) -> int:
+    """How many of the first legs are a zigzag: opposite orders of one size that each turn the vessel; 0 for none."""
+    count = 0
+    for place, leg in enumerate(legs):
+        sizes = [abs(each.level) for each in legs[: place + 1]]
+        alike = max(sizes) - min(sizes) < _ALIKE * max(sizes)
+        other = place == 0 or leg.level * legs[place - 1].level < 0
+        same_power = abs(leg.propulsion - legs[0].propulsion) < 2 * PROPULSION_STEP * signals.full
+        if not (alike and other and (same_power or math.isnan(leg.propulsion))) or _turns_far(signals, leg):
+            break
+        count = place + 1
+    following = sum(_turned(signals, leg.begin, leg.end) * leg.level >= 0 for leg in legs[:count])
+    return count if count > 2 and following > _FOLLOWING * count else 0
+
+
+def _turns_far(signals: _Signals, leg: _Piece) -> bool:
+    """Whether a leg turns farther than one of a zigzag does."""
+    turn = leg.kind is StretchKind.TURN and abs(leg.level) > signals.threshold
+    return turn and abs(_turned(signals, leg.begin, leg.end)) > FAR_TURN_RAD
+
+
+def _checks_swing(signals: _Signals, turn: _Piece, check: _Piece) -> bool:
+    """Whether the second of two legs checks the swing of the first: short and small, or the heading does not follow."""
+    short = (check.end - check.begin) * signals.step < signals.rest_s
+    follows = _turned(signals, check.begin, check.end) * check.level > 0
+    return turn.level * check.level < 0 and (not follows or (short and abs(check.level) < 0.5 * abs(turn.level)))
+
+
+def _remaining(signals: _Signals, legs: Sequence[_Piece]) -> list[_Piece]:
+    """Legs that are neither a zigzag nor far turns."""
+    if len(legs) < 2:
+        return [_single(signals, leg) for leg in legs]
+    levels = [leg.level for leg in legs if abs(leg.level) > signals.threshold]
+    if len(levels) <= 2 and _main_share(legs) > 0.8:
+        return [_whole(legs, StretchKind.PIVOT if legs[0].kind is StretchKind.PIVOT else StretchKind.TURN)]
+    return [_whole(legs, StretchKind.STEPS)]
+
+
+def _whole(legs: Sequence[_Piece], kind: StretchKind) -> _Piece:
+    return replace(legs[0], end=legs[-1].end, kind=kind)
+
+
+def _main_share(group: Sequence[_Piece]) -> float:
+    """Share of a group that its first piece and others of the same side last: what remains checks the swing."""
+    same = sum(piece.end - piece.begin for piece in group if piece.level * group[0].level > 0)
+    return same / (group[-1].end - group[0].begin)
+
+
+def _stretch(signals: _Signals, piece: _Piece) -> Stretch:
+    part = slice(piece.begin, piece.end)
+    rate, speed = signals.rate[part], signals.speed[part]
+    steering = signals.steering[part]
+    sides = np.sign(steering[np.abs(steering) > signals.threshold])
+    reversals = int((sides[1:] != sides[:-1]).sum())
+    known = speed[np.isfinite(speed)]
+    speeds = (float(known[0]), float(known.min()), float(known.max())) if len(known) else (math.nan,) * 3
+    return Stretch(
+        kind=piece.kind,
+        begin_s=float(signals.time[piece.begin]),
+        end_s=float(signals.time[min(piece.end, len(signals.time) - 1)]),
+        rudder_rad=piece.level if piece.kind not in (StretchKind.STEADY, StretchKind.REST) else math.nan,
+        heading_change_rad=_turned(signals, piece.begin, piece.end),
+        reversals=reversals,
+        speed_mps=(speeds[0], speeds[1], speeds[2]),
+        yaw_rate_radps=float(np.sqrt(np.nanmean(rate**2))) if np.isfinite(rate).any() else math.nan,
+    )

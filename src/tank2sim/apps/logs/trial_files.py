@@ -1,0 +1,238 @@
+"""Stretches of a voyage as trial files."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.apps.logs.clock import usual_step, utc_text
+from tank2sim.apps.logs.current import drift_current
+from tank2sim.apps.logs.quantities import QUANTITIES
+from tank2sim.apps.logs.reference import held, interpolated, thinned_series
+from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch
+from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
+from tank2sim.arrays import Array
+from tank2sim.records.signals.columns import file_columns
+from tank2sim.records.signals.sampling import GAP_STEPS
+from tank2sim.records.signals.writing import trial_text
+from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial
+
+CUT_BY = "cut by tank2sim"
+"""Words in a comment of every trial that is cut from a log."""
+
+_HEAD_LINES = 100
+"""Lines of a file in which the comments of a trial are looked for."""
+
+LEAD_S = 5.0
+"""Time before the execute with which a trial begins, s. Project choice: long enough to see the approach, too short for
+a disturbance before it to matter."""
+
+SHORTEST_STEP_S = 0.1
+"""Least step of a trial, s; denser streams are averaged. Project choice: no vessel yaws faster, and files are small."""
+
+LONGEST_STEP_S = 1.0
+"""Largest step of a trial, s: slower streams leave empty cells. Project choice: rudders move within seconds."""
+
+_HELD = ("rudder_order", "rpm_order", "thrust_order_port", "thrust_order_starboard")
+
+_THRUSTER_COLUMNS = {
+    "rpm_port": ("n_port_rpm", 60 / (2 * math.pi)),
+    "rpm_starboard": ("n_starboard_rpm", 60 / (2 * math.pi)),
+    "thrust_order_port": ("order_port", 1.0),
+    "thrust_order_starboard": ("order_starboard", 1.0),
+}
+"""Columns of vessels with two thrusters, and their factors: the trial format has none for them."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialCut:
+    """A stretch as a trial.
+
+    Parameters
+    ----------
+    stretch : Stretch
+    trial : Trial
+        Times from its begin; signals in SI.
+    begins_s : float
+        Time of its first row in that of the voyage.
+    text : str
+        The file.
+    steered : bool
+        Whether it has a rudder, as the trial format asks; a craft with two thrusters has none.
+    """
+
+    stretch: Stretch
+    trial: Trial
+    begins_s: float
+    text: str
+    steered: bool
+
+
+def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]:
+    """Cut the stretches that excite the vessel into trials, in the order of time.
+
+    The rows of a trial have an even step, that of the heading between :data:`SHORTEST_STEP_S` and
+    :data:`LONGEST_STEP_S`. Each sample of a slower stream is in the nearest row, by a straight line to its neighbour at
+    the time of the row; rows without a sample are empty. Orders hold. Nothing is bridged over gaps.
+    """
+    cuts: list[TrialCut] = []
+    for place, stretch in enumerate(stretches):
+        if stretch.kind.excites:
+            before = stretches[place - 1] if place else None
+            lead = 0.0 if before is None else min(LEAD_S, before.duration_s)
+            cut = _cut(voyage, stretch, stretch.begin_s - lead, len(cuts) + 1)
+            if cut is not None:
+                cuts.append(cut)
+    return cuts
+
+
+def _cut(voyage: Voyage, stretch: Stretch, begin: float, number: int) -> TrialCut | None:
+    clock = next((voyage.series[name] for name in ("heading", "yaw_rate", "x", "sog") if name in voyage.series), None)
+    if clock is None:
+        return None
+    step = float(np.clip(usual_step(clock.time_s), SHORTEST_STEP_S, LONGEST_STEP_S))
+    first = clock.time_s[np.clip(np.searchsorted(clock.time_s, begin), 0, len(clock.time_s) - 1)]
+    first -= step * math.floor((first - begin) / step)
+    rows = math.floor((stretch.end_s - first) / step + 1e-6) + 1
+    if rows < LEAST_TRIAL_ROWS:
+        return None
+    at = first + step * np.arange(rows)
+    series = dict(voyage.series)
+    if "rpm_order" not in series and "rpm" in series:
+        series["rpm_order"] = series["rpm"]
+    series.pop("rpm", None)
+    for name in _redundant(series):
+        series.pop(name, None)
+    signals = {
+        signal: values
+        for name, signal in _columns().items()
+        if name in series and np.isfinite(values := _sampled(series[name], at, step, name)).any()
+    }
+    signals = {name: signals[name] for name in TRIAL_SIGNALS if name in signals}
+    thrusters = {
+        column: factor * _sampled(series[name], at, step, name)
+        for name, (column, factor) in _THRUSTER_COLUMNS.items()
+        if name in series
+    }
+    steered = any(name in signals for name in RUDDERS)
+    if not any(name in signals for name in MEASURED_COLUMNS) or not (steered or thrusters):
+        return None
+    name = _name(number, stretch, steered)
+    trial = Trial(Path(f"{name}.csv"), np.round(at - first, 6), signals)
+    text = trial_text(trial, _remarks(voyage, stretch, first)) if steered else ""
+    if thrusters:
+        text = _with_thrusters(text, trial, thrusters, _remarks(voyage, stretch, first))
+    return TrialCut(stretch, trial, first, text, steered)
+
+
+def _redundant(series: Mapping[str, QuantitySeries]) -> tuple[str, ...]:
+    """Velocities over the ground that the better record, the positions, holds already."""
+    ground = ("u_ground", "v_ground")
+    if "x" not in series or "y" not in series:
+        return ()
+    if "u_water" in series:
+        return (*ground, "sog", "cog")
+    return ground if "sog" in series and "cog" in series else ()
+
+
+def _columns() -> dict[str, str]:
+    """Quantity to signal of the trial format; revolutions that are ordered become those of the format."""
+    columns = {name: quantity.column for name, quantity in QUANTITIES.items() if quantity.column}
+    columns["rpm_order"] = columns.pop("rpm")
+    return columns
+
+
+def _name(number: int, stretch: Stretch, steered: bool) -> str:
+    if math.isnan(stretch.rudder_rad) or stretch.kind.value in ("accelerate", "coast", "stop", "astern"):
+        return f"{number:02d}_{stretch.kind}"
+    level = math.degrees(stretch.rudder_rad) if steered else 100 * stretch.rudder_rad
+    return f"{number:02d}_{stretch.kind}_{level:+.0f}"
+
+
+def _remarks(voyage: Voyage, stretch: Stretch, first: float) -> list[str]:
+    logs = ", ".join(log.path.name for log in voyage.logs)
+    remarks = [notice for notice in voyage.notices if notice.startswith("UNCONFIRMED")]
+    remarks.append(f"{stretch.kind}, {CUT_BY} from {logs}")
+    if voyage.dated:
+        remarks.append(f"begins: {utc_text(first)}")
+    remarks.append(f"execute: {stretch.begin_s - first:.2f}")
+    if voyage.origin_deg:
+        remarks.append(f"origin: {voyage.origin_deg[0]:g} {voyage.origin_deg[1]:g}")
+    if current := drift_current(voyage, stretch.begin_s, stretch.end_s):
+        remarks.append(f"current {current.speed_mps:.2f} m/s towards {current.direction_deg:.0f} deg, by {current.by}")
+    if "rpm" in voyage.series and "rpm_order" not in voyage.series:
+        remarks.append("n_rpm are measured revolutions, not ordered")
+    return remarks
+
+
+def _sampled(entry: QuantitySeries, at: Array, step: float, name: str) -> Array:
+    """Values (n,) at the rows: orders held, dense streams interpolated, of slow ones a sample in the nearest row."""
+    near = (entry.time_s >= at[0] - 60) & (entry.time_s <= at[-1] + 60)
+    time, values = entry.time_s[near], entry.values[near]
+    if not len(time):
+        return np.full(len(at), np.nan)
+    if name in _HELD:
+        return held(at, time, values)
+    circular = QUANTITIES[name].column in ("cog_rad", "wind_rel_direction_rad", "wind_direction_rad")
+    if circular:
+        values = np.unwrap(values)
+    if usual_step(time) < 0.75 * step:
+        time, values = thinned_series(time, values, step)
+    own_step = usual_step(time)
+    found = interpolated(at, time, values, max(GAP_STEPS * step, 1.5 * own_step))
+    if (
+        own_step > 1.5 * step and name != "rudder_angle"
+    ):  # which drives the vessel, and moves evenly between its samples
+        rows = np.clip(np.round((time - at[0]) / step).astype(int), 0, len(at) - 1)
+        sampled = np.zeros(len(at), dtype=bool)
+        sampled[rows[(time >= at[0] - step / 2) & (time <= at[-1] + step / 2)]] = True
+        found = np.where(sampled, found, np.nan)
+    return np.mod(found, 2 * math.pi) if circular else found
+
+
+def _with_thrusters(text: str, trial: Trial, thrusters: Mapping[str, Array], remarks: list[str]) -> str:
+    """The text of a trial with columns of thrusters behind its own."""
+    out = io.StringIO()
+    if text:
+        lines = text.splitlines()
+        head = next(place for place, line in enumerate(lines) if not line.startswith("#"))
+    else:
+        lines, head = [f"# {remark}" for remark in remarks], len(remarks)
+        columns = file_columns(trial)
+        lines.append(",".join(columns))
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        lines += [",".join(f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in row) for row in rows]
+    for line in lines[:head]:
+        out.write(f"{line}\n")
+    out.write(f"{lines[head]},{','.join(thrusters)}\n")
+    for line, *values in zip(lines[head + 1 :], *(column.tolist() for column in thrusters.values()), strict=True):
+        cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
+        out.write(f"{line},{','.join(cells)}\n")
+    return out.getvalue()
+
+
+def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
+    """Remove the trials that an earlier run cut into a folder and this one did not write; return their names.
+
+    Only files that say in their comments that they were cut by tank2sim are removed.
+
+    Parameters
+    ----------
+    folder : Path
+    written : iterable of Path
+        Files of this run, which stay.
+    """
+    removed = []
+    for path in sorted(set(folder.glob("[0-9][0-9]*_*.csv")) - set(written)):
+        with path.open(encoding="utf-8", errors="replace") as file:
+            head = [line for line in itertools.islice(file, _HEAD_LINES) if line.startswith("#")]
+        if any(CUT_BY in line for line in head):
+            path.unlink()
+            removed.append(path.name)
+    return removed

@@ -1,0 +1,108 @@
+"""A ship's card in another language."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from tank2sim.api.verbs import Output, verb
+from tank2sim.arguments import NumberArgument, Scatter
+
+if TYPE_CHECKING:
+    from tank2sim.apps.programs.convert_result import ConversionResult
+    from tank2sim.dynamics.vessel import Vessel
+
+LANGUAGES = {
+    "abkowitz": "a card with a third-order polynomial",
+    "mmg": "a card of the MMG method, in another scaling",
+    "shipmmg": "a Python file with the parameters of shipmmg",
+    "mmgdynamics": "a Python file with a vessel of mmgdynamics",
+    "small_craft": "a card of a small craft, in another scaling",
+    "gazebo": "SDF of Gazebo's hydrodynamics and thruster plugins for a small craft",
+    "vrx": "SDF of VRX's SimpleHydrodynamics for a small craft",
+    "mss": "a function for MATLAB or Octave, as the ships of MSS are",
+    "pvs": "a Python file with a vehicle for the Python Vehicle Simulator",
+}
+"""What a card can be converted to."""
+
+Language = Literal["abkowitz", "mmg", "shipmmg", "mmgdynamics", "small_craft", "gazebo", "vrx", "mss", "pvs"]
+
+
+@verb(
+    "a card in another language: MMG as a polynomial, other conventions, other programs",
+    Output("-o", None, "Write the new file.", lambda result, path: result.files(path), required=True),
+    choices={"to": LANGUAGES},
+)
+def convert(
+    ship: Vessel,
+    to: Language = "abkowitz",
+    *,
+    scaling: Literal["prime", "prime_ii", "bis", "dimensional"] | None = None,
+    rudder_sign: Literal["port", "starboard"] | None = None,
+    origin_m: NumberArgument = 0.0,
+    scatter: Scatter | None = None,
+) -> ConversionResult:
+    """Write a ship's card in another language.
+
+    An MMG ship becomes a polynomial by least squares over the motions of standard manoeuvres; between polynomial cards
+    the conversions of scaling, rudder sign and origin are exact. Files of other programs are written from the equations
+    themselves.
+
+    Parameters
+    ----------
+    ship : Vessel
+    to : str
+        Language of the new file.
+    scaling : str, optional
+        Scaling of the new card; by default as it is, ``prime`` for a fit.
+    rudder_sign : str, optional
+        Side to which a positive rudder of the new card turns the ship.
+    origin_m : float
+        New origin forward of the old one, m.
+    scatter : float, optional
+        Spread of the motions of a fit about standard manoeuvres, as a share of their usual spread; by default 0.3.
+
+    Raises
+    ------
+    InputError
+        The card is at fault or cannot be had in that language.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> made = t2s.convert("mariner", scaling="dimensional")
+    >>> round(made.ship.turn(35).figures["tactical_diameter_lengths"], 1)
+    6.4
+    """
+    from tank2sim.apps.programs.conventions import Conventions
+    from tank2sim.apps.programs.convert_result import (
+        ConversionResult,
+        ConversionStudy,
+        ConvertedFigure,
+        PolynomialRange,
+    )
+    from tank2sim.apps.programs.languages import converted
+    from tank2sim.cards.examination import doubts
+
+    made, notices = converted(ship.card, to, Conventions(scaling, rudder_sign, origin_m), scatter)
+    fit = (
+        None
+        if made.fit is None
+        else PolynomialRange(
+            residuals_percent={name: 100 * value for name, value in made.fit.residuals.items()},
+            ranges={name: (low, high) for name, (low, high) in made.fit.ranges.items()},
+        )
+    )
+    figures = []
+    for one in made.changes:
+        error = 100 * (one.after / one.before - 1) if one.before and one.after is not None else None
+        figures.append(ConvertedFigure(one.manoeuvre, one.figure, one.before, one.after, error))
+    study = ConversionStudy(
+        ship=ship.name,
+        from_kind=ship.card.model.kind,
+        to=to,
+        made=LANGUAGES[to],
+        fit=fit,
+        figures=tuple(figures),
+        notices=(*doubts(ship.card), *notices),
+    )
+    return ConversionResult(study, made, made.card, str(ship.card.source))

@@ -1,0 +1,144 @@
+"""Result of ``convert``: a ship's card in another language."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from tank2sim.answer.parts import Cell, Section, table
+from tank2sim.answer.result import Result
+from tank2sim.apps.programs.languages import ConvertedText
+from tank2sim.cards import Card
+from tank2sim.files import write_together
+
+
+@dataclass(frozen=True)
+class PolynomialRange:
+    """A polynomial fitted to an MMG ship.
+
+    Parameters
+    ----------
+    residuals_percent : dict
+        Force to the root mean square of its residual, % of its own.
+    ranges : dict
+        ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
+    """
+
+    residuals_percent: dict[str, float]
+    ranges: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class ConvertedFigure:
+    """A figure of a standard manoeuvre before and after; None where the run was too short for it."""
+
+    manoeuvre: str
+    figure: str
+    before: float | None
+    after: float | None
+    error_percent: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConversionStudy:
+    """A ship in another language.
+
+    Parameters
+    ----------
+    ship, from_kind, to : str
+        Name of the ship, kind of its card, and the language.
+    made : str
+        The language in words.
+    fit : PolynomialRange or None
+    figures : tuple of ConvertedFigure
+    notices : tuple of str
+    """
+
+    ship: str
+    from_kind: str
+    to: str
+    made: str
+    fit: PolynomialRange | None
+    figures: tuple[ConvertedFigure, ...]
+    notices: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConversionResult(Result[ConversionStudy]):
+    """A ship in another language.
+
+    Parameters
+    ----------
+    study : ConversionStudy
+    made : ConvertedText, optional
+        None if the result was read from its JSON.
+    card : Card, optional
+        The card that was made; None for a file of another program. ``ship`` is its ship.
+    source : str
+        Card that was converted.
+    """
+
+    study: ConversionStudy
+    made: ConvertedText | None = None
+    card: Card | None = None
+    source: str = ""
+    command: ClassVar[str] = "convert"
+
+    @property
+    def text(self) -> str:
+        """The file."""
+        return self._made.text
+
+    @property
+    def _made(self) -> ConvertedText:
+        if self.made is None:
+            raise LookupError("the JSON of a conversion does not hold its file")
+        return self.made
+
+    def files(self, path: str | Path) -> dict[Path, str | bytes]:
+        """The file at `path`, with the covariance of a card next to it."""
+        made = self._made
+        return {Path(path): made.text} if made.card is None else made.card.files(Path(path))
+
+    def save(self, path: str | Path) -> None:
+        """Write :meth:`files`, all or none.
+
+        Raises
+        ------
+        InputError
+            A file cannot be written.
+        """
+        write_together(self.files(path), inputs=[Path(self.source)])
+
+    @property
+    def title(self) -> str:
+        """The ship and the language."""
+        return f"{self.study.ship}: {self.study.to}"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """What was made of what, and how well a fit follows."""
+        line, fit = f"{self.study.ship} ({self.study.from_kind}): {self.study.made}", self.study.fit
+        if fit is None:
+            return (line,)
+        residuals = ", ".join(f"{name} {value:.1f} %" for name, value in fit.residuals_percent.items())
+        low, high = fit.ranges["u"]
+        widest = {name: max(map(abs, fit.ranges[name])) for name in ("drift_deg", "yaw_rate_prime", "rudder_deg")}
+        envelope = (
+            f"u {low:.2g} to {high:.2g} u0, drift to {widest['drift_deg']:.3g} deg, r' to "
+            f"{widest['yaw_rate_prime']:.2g}, rudder to {widest['rudder_deg']:.3g} deg"
+        )
+        return line, f"Fitted over {envelope} at nominal revolutions; residuals of the forces: {residuals}"
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Figures of standard manoeuvres before and after."""
+        if not self.study.figures:
+            return []
+        rows: list[list[Cell]] = [
+            [one.manoeuvre, one.figure, one.before, one.after, one.error_percent] for one in self.study.figures
+        ]
+        heads = ("manoeuvre", "figure", "card", self.study.to, "error (%)")
+        return [Section(heading="Standard manoeuvres", tables=[table("Standard manoeuvres", heads, rows)])]

@@ -1,0 +1,162 @@
+"""A ship's card in another language: a polynomial for an MMG ship, other conventions, other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from tank2sim.apps.programs.conventions import Conventions, in_conventions
+from tank2sim.apps.programs.mmg_programs import mmgdynamics_text, shipmmg_text
+from tank2sim.apps.programs.polynomial_fit import (
+    SCATTER,
+    FigureChange,
+    PolynomialFit,
+    figure_changes,
+    fit_polynomial,
+    manoeuvre_motions,
+    polynomial_card,
+    scattered_motions,
+)
+from tank2sim.apps.programs.program_code import mss_function, pvs_class
+from tank2sim.apps.programs.robotics import (
+    VRX_MASSES,
+    VRX_TERMS,
+    craft_changes,
+    gazebo_model,
+    gazebo_text,
+    vrx_model,
+    vrx_text,
+)
+from tank2sim.cards import Card, CraftCard, ManoeuvringCard
+from tank2sim.cards.card import MmgCard, manoeuvring_card
+from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
+from tank2sim.dynamics import build
+from tank2sim.errors import ArgumentError
+
+_OF_CRAFT = ("small_craft", "gazebo", "vrx")
+_OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
+
+
+@dataclass(frozen=True)
+class ConvertedText:
+    """A card in another language: the text, the card if it is one, the fit and the figures that changed."""
+
+    text: str
+    card: ManoeuvringCard | CraftCard | None = None
+    fit: PolynomialFit | None = None
+    changes: tuple[FigureChange, ...] = ()
+
+
+def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -> tuple[ConvertedText, tuple[str, ...]]:
+    """A card in another language, and notices.
+
+    Parameters
+    ----------
+    card : Card
+    to : str
+        Language, as of ``convert``.
+    wanted : Conventions
+        Of the new card.
+    scatter : float, optional
+        Spread of the motions of a fit about standard manoeuvres.
+
+    Raises
+    ------
+    InputError
+        The card cannot be had in that language.
+    """
+    if isinstance(card, CraftCard):
+        return _of_craft(card, to, wanted)
+    given = _of_ship(card, to)
+    if abs(wanted.origin_m) > given.ship.length_m:
+        raise ArgumentError("origin_m", f"{wanted.origin_m:g}", "is more than a length from midships", "give it in m")
+    if to not in ("abkowitz", "mmg"):
+        if not wanted.unchanged:
+            raise ArgumentError("to", to, "has conventions of its own", "leave scaling, rudder sign and origin out")
+        return _program(given, to)
+    if to == "mmg" and not isinstance(given, MmgCard):
+        problem = f"is {given.model.kind}: without thrust and rudder force its terms cannot be split into MMG's"
+        raise given.fault("model.kind", problem, "convert an MMG card to abkowitz, not the other way")
+    notices: tuple[str, ...] = ()
+    if wanted.origin_m:
+        notices = (
+            "U of the new origin scales the numbers now: a difference of second order in the distance and r'",
+            "figures, positions and speeds of the new card are those of its own origin",
+        )
+    if to == "abkowitz" and isinstance(given, MmgCard):
+        return _fitted(given, wanted, SCATTER if scatter is None else scatter, notices)
+    if to == "abkowitz" and given.model.kind == "linear":
+        changed = parse_card(changed_text(given.text, given.source, {"model.kind": "abkowitz"}), given.source)
+        assert isinstance(changed, ManoeuvringCard)
+        given, notices = changed, (*notices, "third-order terms that the card does not have are zero")
+    made = in_conventions(given, wanted)
+    build(made)
+    return ConvertedText(made.text, made), notices
+
+
+def _of_ship(card: Card, to: str) -> ManoeuvringCard:
+    """The card of a ship; raises InputError if it is none, or the language is one of small craft."""
+    if to in _OF_CRAFT:
+        raise card.fault("model.kind", f"is {card.model.kind}, and {to} is for small_craft", "use mss or pvs")
+    return manoeuvring_card(card)
+
+
+def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[str, ...]]:
+    if to not in _OF_CRAFT:
+        problem = "is small_craft, whose damping is not a polynomial about a speed"
+        raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")
+    if wanted.rudder_sign is not None or wanted.origin_m:
+        raise ArgumentError("to", to, "has neither a rudder nor another origin", "leave rudder sign and origin out")
+    if to == "small_craft":
+        if wanted.scaling not in (None, "dimensional", "prime"):
+            raise ArgumentError("scaling", wanted.scaling or "", "is not of a small craft", "give dimensional or prime")
+        made = craft_in_scaling(card, wanted.scaling or card.model.scaling)
+        return ConvertedText(made.text, made), ()
+    if wanted.scaling is not None:
+        raise ArgumentError("to", to, "has conventions of its own", "leave the scaling out")
+    text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
+    notices = []
+    if card.effects:
+        notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+    if to == "gazebo":
+        notices.append(
+            "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
+            "dead band, nor the lag of the card"
+        )
+    else:
+        lost = [name for name, value in card.derivatives.items() if value and name not in (*VRX_TERMS, *VRX_MASSES)]
+        also = f", and {', '.join(lost)}" if lost else ""
+        notices.append(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}")
+    changes = craft_changes(card, model(card))
+    return ConvertedText(text(card), changes=changes), tuple(notices)
+
+
+def _fitted(
+    card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[str, ...]
+) -> tuple[ConvertedText, tuple[str, ...]]:
+    bare = build(card)
+    model = build(replace(card, effects=())) if card.effects else bare
+    fit = fit_polynomial(card, model, scattered_motions(model, manoeuvre_motions(model), scatter))
+    polynomial = polynomial_card(card, fit)
+    changes = figure_changes(bare, build(polynomial))
+    made = in_conventions(polynomial, wanted)
+    if fit.covariance is not None:
+        carried = "standard errors are those of the MMG card's numbers, carried through the fit with their covariance"
+        notices = (*notices, f"{carried}; what the fit itself misses is in the table alone")
+    return ConvertedText(made.text, made, fit, changes), notices
+
+
+def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[str, ...]]:
+    if to in _OF_MMG:
+        if not isinstance(card, MmgCard):
+            raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
+        notices = [
+            f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
+            "more tightly than the card"
+        ]
+        if card.effects:
+            notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+        if card.ship.beam_m is None:
+            notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
+        return ConvertedText(_OF_MMG[to](card)), tuple(notices)
+    write = mss_function if to == "mss" else pvs_class
+    return ConvertedText(write(card, build(card))), ()

@@ -1,0 +1,1 @@
+"""Rigs and bodies other than ships: accelerating tows, the yaw rig, underwater gliders."""

@@ -1,0 +1,67 @@
+"""The card of an underwater glider: paper 5 (Kulikovsky and Velikanov 2012)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tank2sim.cards.card import Card
+from tank2sim.cards.form import (
+    BodyModel,
+    BodySection,
+    CardSection,
+    Environment,
+    Mass,
+    Positive,
+    TimeConstant,
+)
+
+
+class GliderModel(BodyModel):
+    """``[model]`` of an underwater glider."""
+
+    kind: Literal["glider"]
+
+
+class Glider(CardSection):
+    """``[glider]``: mass, size and coefficients of an underwater glider, SI, incidence in rad.
+
+    C_L = ``lift_slope`` alpha + ``lift_quadratic`` alpha |alpha|; C_D = ``drag_zero`` + ``drag_quadratic`` alpha^2;
+    both with ``reference_area_m2``. ``mass_kg`` is that of hull and ballast, ``buoyancy_kg`` the size of the net
+    buoyancy (displaced mass less own mass) with which it usually glides.
+    """
+
+    mass_kg: Mass
+    volume_m3: Positive
+    buoyancy_kg: Mass
+    hull_mass_kg: Mass | None = None
+    reference_area_m2: Annotated[float, Field(ge=1e-6, le=1e6)]
+    lift_slope: Annotated[float, Field(ge=1e-3, le=1e4)]
+    lift_quadratic: Annotated[float, Field(ge=0.0, le=1e4)]
+    drag_zero: Annotated[float, Field(ge=1e-6, le=1e3)]
+    drag_quadratic: Annotated[float, Field(ge=1e-3, le=1e4)]
+    added_mass_axial_kg: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
+    added_mass_normal_kg: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
+    buoyancy_time_constant_s: TimeConstant = 10.0
+    pitch_time_constant_s: TimeConstant = 5.0
+    roll_time_constant_s: TimeConstant = 5.0
+
+
+class GliderForm(CardSection):
+    """The card of an underwater glider, as in its file."""
+
+    format: Literal["tank2sim-ship/1"]
+    ship: BodySection
+    environment: Environment = Environment()
+    model: GliderModel
+    glider: Glider
+
+
+@dataclass(frozen=True)
+class GliderCard(Card):
+    """Card of an underwater glider: paper 5 (Kulikovsky and Velikanov 2012), SI."""
+
+    model: GliderModel
+    glider: Glider

@@ -1,0 +1,138 @@
+"""Paths of a glider as sequences of steady glides, equations (13) to (25) of paper 5, corrected and as printed.
+
+    dphi_i = v_i cos(epsilon_i) t_i / R_i                                                                (13), (14)
+    X_n = X_{n-1} + R_n (sin dphi_n cos phi_{n-1} - (1 - cos dphi_n) sin phi_{n-1})                            (23)
+    Z_n = Z_{n-1} + R_n (sin dphi_n sin phi_{n-1} + (1 - cos dphi_n) cos phi_{n-1})                            (25)
+    Y_n = Y_{n-1} + v_n t_n sin(epsilon_n),          phi_n = phi_{n-1} + dphi_n                          (22), (15)
+
+with R of the sign of the turn, and X += v cos(epsilon) t cos(phi), Z += v cos(epsilon) t sin(phi) without roll. The
+print has dphi = v t / R, and R multiplies only the first product of (23) and (25). X is north here, Z east, Y the
+height.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tank2sim.apps.rigs.glider.card import GliderCard
+from tank2sim.apps.rigs.glider.programme import GlideProgramme, ProgrammeStep
+from tank2sim.apps.rigs.glider.steady import SteadyGlide, glide_as_printed, glide_at_pitch, steady_glide
+from tank2sim.arrays import Array, Columns
+from tank2sim.errors import InputError
+from tank2sim.records.thinning import drawn_columns
+
+_POINTS_OF_AN_ARC = 60
+
+
+class PathPoint(NamedTuple):
+    """Time (s), north, east, height (m) and heading (rad, clockwise, continuous)."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+    height_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class GlidePath:
+    """A path of steady glides.
+
+    Parameters
+    ----------
+    glides : tuple of SteadyGlide
+        One for each step.
+    durations_s : tuple of float
+        Durations of the steps.
+    places : tuple of PathPoint
+        The start, and the end of each step.
+    """
+
+    glides: tuple[SteadyGlide, ...]
+    durations_s: tuple[float, ...]
+    places: tuple[PathPoint, ...]
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path through the water."""
+        return math.fsum(glide.speed_mps * time for glide, time in zip(self.glides, self.durations_s, strict=True))
+
+    def orders(self) -> list[dict[str, float]]:
+        """The orders of the same glides for the transient model."""
+        return [
+            {"buoyancy.command": glide.buoyancy_kg, "pitch.command": glide.pitch_rad, "roll.command": glide.roll_rad}
+            for glide in self.glides
+        ]
+
+    def sampled(self) -> Array:
+        """The path in points dense enough for a chart, (n, 5) in the order of :class:`PathPoint`."""
+        rows: list[PathPoint] = [self.places[0]]
+        for glide, duration, begin in zip(self.glides, self.durations_s, self.places, strict=False):
+            parts = _POINTS_OF_AN_ARC if glide.turn_rate_radps else 1
+            rows += [_after(begin, glide, duration * part / parts) for part in range(1, parts + 1)]
+        return np.array(rows)
+
+    def histories(self) -> Columns:
+        """Columns of the path in points dense enough for a chart: ``t_s``, ``x_m``, ``y_m``, ``height_m``."""
+        rows = self.sampled()
+        return drawn_columns({name: rows[:, k] for k, name in enumerate(("t_s", "x_m", "y_m", "height_m"))}, len(rows))
+
+
+def fly(card: GliderCard, programme: GlideProgramme, *, as_printed: bool = False) -> GlidePath:
+    """The path of a programme.
+
+    Raises
+    ------
+    InputError
+        A step cannot be flown; the message names its line and the limit.
+    """
+    glides = tuple(_glide(card, programme.source, step, as_printed) for step in programme.steps)
+    return path_of(glides, [step.duration_s for step in programme.steps])
+
+
+def path_of(glides: Sequence[SteadyGlide], durations_s: Sequence[float]) -> GlidePath:
+    """The path of glides with their durations, from the origin, heading north."""
+    places = [PathPoint(0.0, 0.0, 0.0, 0.0, 0.0)]
+    for glide, duration in zip(glides, durations_s, strict=True):
+        places.append(_after(places[-1], glide, duration))
+    return GlidePath(tuple(glides), tuple(durations_s), tuple(places))
+
+
+def _glide(card: GliderCard, source: str, step: ProgrammeStep, as_printed: bool) -> SteadyGlide:
+    try:
+        if not step.is_pitch:
+            equations = glide_as_printed if as_printed else steady_glide
+            return equations(card, step.angle_rad, roll_rad=step.roll_rad, buoyancy_kg=step.buoyancy_kg)
+        if as_printed:
+            raise InputError(source, "column pitch_deg", "is not in the printed equations", "give path_angle_deg")
+        return glide_at_pitch(card, step.angle_rad, roll_rad=step.roll_rad, buoyancy_kg=step.buoyancy_kg)
+    except InputError as error:
+        place = f"{step.place}, {error.place}" if step.place else error.place
+        raise InputError(source, place, error.problem, error.remedy) from None
+
+
+def _after(begin: PathPoint, glide: SteadyGlide, duration: float) -> PathPoint:
+    change = glide.turn_rate_radps * duration
+    height = begin.height_m + glide.climb_mps * duration
+    cos, sin = math.cos(begin.heading_rad), math.sin(begin.heading_rad)
+    if not glide.turn_rate_radps:
+        # (13) in print has the whole speed along the ground
+        run = (glide.speed_mps if glide.as_printed else glide.horizontal_speed_mps) * duration
+        ahead, aside = run, 0.0
+        across = aside
+    else:
+        radius = math.copysign(glide.turning_radius_m, change)
+        ahead, aside = radius * math.sin(change), radius * (1 - math.cos(change))
+        across = 1 - math.cos(change) if glide.as_printed else aside
+    return PathPoint(
+        begin.time_s + duration,
+        begin.north_m + ahead * cos - across * sin,
+        begin.east_m + ahead * sin + across * cos,
+        height,
+        begin.heading_rad + change,
+    )

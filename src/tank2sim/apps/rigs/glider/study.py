@@ -1,0 +1,469 @@
+"""Study of a glider: steady glides, paths, best glides, and comparison with the transient model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from tank2sim.apps.rigs.glider.card import GliderCard
+from tank2sim.apps.rigs.glider.path import GlidePath, fly
+from tank2sim.apps.rigs.glider.programme import GlideProgramme
+from tank2sim.apps.rigs.glider.quasi_steady_error import SwingError, swing_errors
+from tank2sim.apps.rigs.glider.steady import (
+    SteadyGlide,
+    ballast_kg,
+    force_residual,
+    glide_as_printed,
+    smallest_angle,
+    steady_glide,
+)
+from tank2sim.apps.rigs.glider.transient import (
+    Compared,
+    ProgrammeError,
+    compare_with_steady,
+    equilibrium,
+    quasi_steady_error,
+)
+from tank2sim.arrays import Array, Columns, Number, Unbounded
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import NO_COMPILER, Integrator
+
+_STEEPEST = math.radians(89.5)
+
+
+def glide_polar(
+    card: GliderCard, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None, points: int = 200
+) -> tuple[SteadyGlide, ...]:
+    """Dives from the smallest angle to almost straight down; `buoyancy_kg` is a magnitude, by default the card's."""
+    least = smallest_angle(card, roll_rad)
+    # Closer where the path is shallow: speed and incidence change there as the root of the angle above the smallest.
+    angles = least + (_STEEPEST - least) * np.linspace(0, 1, points) ** 2
+    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
+    return tuple(steady_glide(card, -angle, roll_rad=roll_rad, buoyancy_kg=-size) for angle in angles.tolist())
+
+
+def best_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
+    """The dive of largest range for its depth: the smallest angle, at the greatest ratio of lift to drag."""
+    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
+    return steady_glide(card, -smallest_angle(card), buoyancy_kg=-size)
+
+
+def fastest_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
+    """The dive with the greatest speed over the ground, v cos(epsilon). Its angle does not depend on the buoyancy."""
+    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
+    found = minimize_scalar(
+        lambda angle: -steady_glide(card, -angle).horizontal_speed_mps,
+        bounds=(smallest_angle(card), _STEEPEST),
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
+    return steady_glide(card, -float(found.x), buoyancy_kg=-size)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """Range of a glider with a budget of ballast water that it can expel.
+
+    Parameters
+    ----------
+    path_angle_rad, buoyancy_kg, speed_mps : float
+        Path angle, buoyancy and speed of its dives and climbs, without sign.
+    depth_m : float
+        Depth of the dives and climbs.
+    budget_kg : float
+        Total ballast that the pump can expel.
+    cycles : float
+        Number of dives with their climbs; each takes in 2 |m0| at the surface and expels it at depth.
+    range_m, duration_s : float
+        Over the ground; turning points take neither time nor distance.
+    energy_J : float
+        Work of expelling the budget against the pressure at depth, budget g h, without losses.
+    """
+
+    path_angle_deg: float
+    buoyancy_kg: float
+    speed_mps: float
+    depth_m: float
+    budget_kg: float
+    cycles: float
+    range_m: float
+    duration_s: float
+    energy_J: float
+
+
+def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:
+    """The range of dives and climbs at the angle and net buoyancy of a glide.
+
+    Raises
+    ------
+    InputError
+        Budget or depth is not positive, or the glide has no buoyancy or turns.
+    """
+    for name, value in (("--budget-kg", budget_kg), ("--depth-m", depth_m)):
+        if not 0 < value < math.inf:
+            raise InputError(name, "", f"is {value:g}", "a positive number was expected")
+    if not glide.buoyancy_kg or glide.turn_rate_radps:
+        raise InputError(card.source, "range", "a glide without buoyancy or with roll has no range", "give another")
+    size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
+    cycles = budget_kg / (2 * size)
+    return Range(
+        path_angle_deg=math.degrees(steep),
+        buoyancy_kg=size,
+        speed_mps=glide.speed_mps,
+        depth_m=depth_m,
+        budget_kg=budget_kg,
+        cycles=cycles,
+        range_m=cycles * 2 * depth_m / math.tan(steep),
+        duration_s=cycles * 2 * depth_m / abs(glide.climb_mps),
+        energy_J=budget_kg * card.environment.gravity_mps2 * depth_m,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlideQuestion:
+    """Settings of the study.
+
+    Parameters
+    ----------
+    angles_rad : tuple of float
+        Paths of steady glides, + up, which all have `roll_rad` and a net buoyancy of the size `buoyancy_kg` (by default
+        the card's).
+    programme : GlideProgramme, optional
+        To be flown, by the steady glides and by the transient model.
+    as_printed : bool
+        True for the paper's equations in addition to the corrected ones.
+    budget_kg, depth_m : float, optional
+        Ballast that can be expelled, and the depth of the dives, for the range. Both or neither.
+    views : bool
+        True for the polar and the error of the quasi-steady assumption against the speed of a programme.
+    """
+
+    angles_rad: tuple[float, ...] = ()
+    roll_rad: float = 0.0
+    buoyancy_kg: float | None = None
+    programme: GlideProgramme | None = None
+    as_printed: bool = False
+    budget_kg: float | None = None
+    depth_m: float | None = None
+    views: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlideState:
+    """A steady glide.
+
+    Parameters
+    ----------
+    path_angle_deg, pitch_deg : float
+        + up.
+    incidence_deg : float
+        + when the flow comes from below.
+    roll_deg : float
+        + starboard side down.
+    buoyancy_kg : float
+        Net buoyancy, + light.
+    speed_mps, horizontal_speed_mps, climb_mps : float
+        Along the path, over the ground, and + up.
+    lift_coefficient, drag_coefficient, lift_N, drag_N : float
+        The lift has the sign of the incidence.
+    turning_radius_m : float
+        Without sign; infinite without roll.
+    turn_rate_degps : float
+        + to starboard.
+    as_printed : bool
+        Whether it is by the equations as printed in the paper.
+    """
+
+    path_angle_deg: float
+    pitch_deg: float
+    incidence_deg: float
+    roll_deg: float
+    buoyancy_kg: float
+    speed_mps: float
+    horizontal_speed_mps: float
+    climb_mps: float
+    lift_coefficient: float
+    drag_coefficient: float
+    lift_N: float
+    drag_N: float
+    turning_radius_m: Unbounded
+    turn_rate_degps: float
+    as_printed: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class BalancedGlide(GlideState):
+    """A steady glide, and the force (N) by which lift and drag of (6) and (7) are off balance in it."""
+
+    force_residual_N: tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleGlide(BalancedGlide):
+    """A steady glide at an angle that was given.
+
+    Parameters
+    ----------
+    turning_radius_with_added_mass_m : float
+        Turning radius of the transient model, which has the added mass; infinite without roll.
+    ballast_kg : float, optional
+        Ballast that gives the net buoyancy; None if the card does not state the mass of the hull.
+    """
+
+    turning_radius_with_added_mass_m: Unbounded
+    ballast_kg: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepGlide(GlideState):
+    """The steady glide of a step of a programme."""
+
+    duration_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlideDesign:
+    """Dives with the card's buoyancy: the shallowest, the fastest over the ground, and ranges on a budget of ballast.
+
+    Ranges are of these two and of the given glides that do not turn.
+    """
+
+    smallest_angle_deg: float
+    best_glide: GlideState
+    fastest_glide: GlideState
+    ranges: tuple[Range, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathPlace:
+    """A place of a path: north, east, height, and heading clockwise from north."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    height_m: float
+    heading_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransientPlace:
+    """A place of the transient motion: north, east, depth; and its speed."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    depth_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TransientPath:
+    """A programme flown by the transient model.
+
+    Parameters
+    ----------
+    path : tuple of TransientPlace
+        At the start and at the ends of the steps.
+    distance_m : array (steps + 1,)
+        Distance from the path of steady glides there.
+    distance_by_length : float
+        The largest distance, as a share of the length of the path.
+    histories, orders : dict
+        Columns of the motion, and of the orders with their steady glides.
+    """
+
+    path: tuple[TransientPlace, ...]
+    distance_m: Array
+    distance_by_length: Number
+    histories: Columns
+    orders: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class QuasiSteadyErrors:
+    """Errors of steady glides against the length of steps, and against the period of swings."""
+
+    steps: tuple[ProgrammeError, ...]
+    swings: tuple[SwingError, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GlideStudy:
+    """Steady glides, paths and ranges of a glider.
+
+    Parameters
+    ----------
+    glider, source : str
+        Name, and source of its numbers.
+    buoyancy_kg : float
+        Size of the net buoyancy of the card.
+    states : tuple of AngleGlide
+        Glides at the given angles.
+    design : GlideDesign
+    polar : dict
+        Columns ``path_angle_deg``, ``horizontal_speed_mps``, ``climb_mps``.
+    as_printed : tuple of BalancedGlide
+        The glides by the equations as printed; empty if they were not asked for.
+    steps : tuple of StepGlide
+        Glides of the programme's steps.
+    path, path_as_printed : tuple of PathPlace
+        Start and ends of the steps; empty without a programme.
+    length_m : float, optional
+        Length of the path through the water.
+    path_histories, path_as_printed_histories : dict
+        Columns ``t_s``, ``x_m``, ``y_m``, ``height_m`` to draw.
+    transient : TransientPath, optional
+    quasi_steady_error : QuasiSteadyErrors, optional
+        Only if views were asked for.
+    notices : tuple of str
+    """
+
+    glider: str
+    source: str
+    buoyancy_kg: float
+    states: tuple[AngleGlide, ...]
+    design: GlideDesign
+    polar: Columns
+    as_printed: tuple[BalancedGlide, ...]
+    steps: tuple[StepGlide, ...]
+    path: tuple[PathPlace, ...]
+    length_m: float | None
+    path_histories: Columns
+    path_as_printed: tuple[PathPlace, ...]
+    path_as_printed_histories: Columns
+    transient: TransientPath | None
+    quasi_steady_error: QuasiSteadyErrors | None
+    notices: tuple[str, ...]
+
+
+def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
+    """Run the study.
+
+    Raises
+    ------
+    InputError
+        An angle or a step cannot be flown, or budget and depth are not both given.
+    """
+    model = build(card)
+    glides = tuple(_glides(card, question))
+    printed = _glides(card, question, as_printed=True) if question.as_printed else ()
+    path = fly(card, question.programme) if question.programme else None
+    printed_path = (
+        fly(card, question.programme, as_printed=True) if question.programme and question.as_printed else None
+    )
+    integrator = Integrator(model) if path or question.views else None
+    best, fastest = best_glide(card), fastest_glide(card)
+    polar = [_state(glide) for glide in glide_polar(card)]
+    errors = None
+    if question.views and integrator:
+        errors = QuasiSteadyErrors(steps=quasi_steady_error(card, integrator), swings=swing_errors(card, integrator))
+    return GlideStudy(
+        glider=card.ship.name,
+        source=card.ship.source,
+        buoyancy_kg=card.glider.buoyancy_kg,
+        states=tuple(
+            AngleGlide(
+                **_state_fields(glide),
+                force_residual_N=force_residual(card, glide),
+                turning_radius_with_added_mass_m=_radius(model, glide),
+                ballast_kg=ballast_kg(card, glide.buoyancy_kg),
+            )
+            for glide in glides
+        ),
+        design=GlideDesign(
+            smallest_angle_deg=math.degrees(abs(best.path_angle_rad)),
+            best_glide=_state(best),
+            fastest_glide=_state(fastest),
+            ranges=tuple(_ranges(card, question, (best, fastest, *glides))),
+        ),
+        polar={
+            name: np.array([getattr(state, name) for state in polar])
+            for name in ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
+        },
+        as_printed=tuple(
+            BalancedGlide(**_state_fields(glide), force_residual_N=force_residual(card, glide)) for glide in printed
+        ),
+        steps=tuple(
+            StepGlide(**_state_fields(glide), duration_s=duration)
+            for glide, duration in (zip(path.glides, path.durations_s, strict=True) if path else ())
+        ),
+        path=_places(path),
+        length_m=path.length_m if path else None,
+        path_histories=path.histories() if path else {},
+        path_as_printed=_places(printed_path),
+        path_as_printed_histories=printed_path.histories() if printed_path else {},
+        transient=_transient(compare_with_steady(integrator, path)) if path and integrator else None,
+        quasi_steady_error=errors,
+        notices=(*model.notices, *([NO_COMPILER] if integrator and not integrator.compiled else [])),
+    )
+
+
+def _state_fields(glide: SteadyGlide) -> dict[str, Any]:
+    """Fields of :class:`GlideState`."""
+    angles = ("path_angle", "pitch", "incidence", "roll")
+    found = {f"{name}_deg": math.degrees(getattr(glide, f"{name}_rad")) for name in angles}
+    found |= {"turn_rate_degps": math.degrees(glide.turn_rate_radps)}
+    return found | {part.name: getattr(glide, part.name) for part in fields(GlideState) if part.name not in found}
+
+
+def _state(glide: SteadyGlide) -> GlideState:
+    return GlideState(**_state_fields(glide))
+
+
+def _places(path: GlidePath | None) -> tuple[PathPlace, ...]:
+    return tuple(
+        PathPlace(
+            t_s=place.time_s,
+            x_m=place.north_m,
+            y_m=place.east_m,
+            height_m=place.height_m,
+            heading_deg=math.degrees(place.heading_rad),
+        )
+        for place in (path.places if path else ())
+    )
+
+
+def _transient(found: Compared) -> TransientPath:
+    motion = found.motion
+    named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
+    return TransientPath(
+        path=tuple(
+            TransientPlace(t_s=place.time_s, **{key: motion.at(name, place.time_s) for key, name in named.items()})
+            for place in found.path.places
+        ),
+        distance_m=found.distance_m,
+        distance_by_length=found.share,
+        histories=found.histories(),
+        orders=found.orders(),
+    )
+
+
+def _glides(card: GliderCard, question: GlideQuestion, *, as_printed: bool = False) -> list[SteadyGlide]:
+    equations = glide_as_printed if as_printed else steady_glide
+    found = []
+    for angle in question.angles_rad:
+        size = question.buoyancy_kg
+        buoyancy = None if size is None else math.copysign(size, angle)
+        found.append(equations(card, angle, roll_rad=question.roll_rad, buoyancy_kg=buoyancy))
+    return found
+
+
+def _radius(model: Model, glide: SteadyGlide) -> float:
+    """Turning radius of the transient model, m; inf where the glide does not turn."""
+    return equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
+
+
+def _ranges(card: GliderCard, question: GlideQuestion, glides: tuple[SteadyGlide, ...]) -> list[Range]:
+    budget, depth = question.budget_kg, question.depth_m
+    if budget is None and depth is None:
+        return []
+    if budget is None or depth is None:
+        missing = "--budget-kg" if budget is None else "--depth-m"
+        raise InputError(missing, "", "is missing", "a range needs the ballast to push out and the depth")
+    return [glide_range(card, glide, budget_kg=budget, depth_m=depth) for glide in glides if not glide.turn_rate_radps]

@@ -1,0 +1,219 @@
+"""Findings of an identification from tows for its user, each of a sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from scipy import stats
+
+from tank2sim.apps.rigs.tow.fit import TowFit
+from tank2sim.apps.rigs.tow.output_error import simulated_speeds
+from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.arrays import Array
+from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
+from tank2sim.marks import CHECK
+
+ADDED_SHARES = (0.0, 1.0)
+"""Added mass in surge over the mass with the water inside. A sphere has 0.5, slender bodies less (Lamb 1932, art. 92
+and 114); the upper limit, blunt ends near the surface, is a project choice."""
+
+USUAL_SHARES = (-0.05, 0.7)
+"""The same of usual bodies, with the error of an estimate, by which a foreign unit is recognised (project choice)."""
+
+FOREIGN_UNITS = {
+    "the force is in kgf": 9.80665,
+    "the force is in lbf": 4.4482216,
+    "the force is in kN": 1e3,
+    "the force is in gf": 9.80665e-3,
+    "the mass is in t": 1e-3,
+    "the mass is in lb": 1 / 0.45359237,
+    "the mass is in g": 1e3,
+    "the speeds are in cm/s": 1e2,
+    "the speeds are in mm/s": 1e3,
+    "the speeds are in knots": 3600 / 1852,
+    "the speeds are in km/h": 3.6,
+    "the speeds are in ft/s": 1 / 0.3048,
+    "the times are in ms": 1e-3,
+    "the times are in min": 60.0,
+}
+"""Slips, and the factor by which each makes M over m too small."""
+
+_CORRELATED = 0.99
+_TWO_SIDED_95 = 1.96
+_SIGNIFICANCE = 0.05
+
+
+def tow_findings(
+    tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit], designs: Mapping[str, Array]
+) -> Iterator[str]:
+    """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
+
+    Parameters
+    ----------
+    tows : Tows
+        The readings.
+    force : Polynomial
+        Towing force, N over s.
+    speed : Polynomial
+        v*(t) of the equation error, m/s over s.
+    fits : mapping
+        Method to its fit. The method of the paper is omitted if QR, with the same estimates, is included.
+    designs : mapping
+        Method to its design matrix (rows, free unknowns).
+    """
+    messages = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
+    yield from _identifiability(messages, designs)
+    for fit in messages:
+        yield from _plausibility(fit, tows.top_speed_mps)
+    if any(fit.method != "output_error" for fit in messages):
+        yield from _polynomial_findings(tows, speed, messages[0])
+    if "output_error" in fits:
+        fit = fits["output_error"]
+        speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
+        row = _worst_misfit(tows, speeds, len(fit.estimated))
+        if row is not None:
+            fast = speeds[row] - tows.mean_speed_mps[row]
+            yield (
+                f"output_error: the equation does not follow the tows within their scatter: at {tows.time_s[row]:g} s "
+                f"it is {abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
+                f"{'' if fit.start_delay_s else 'a late start or '}a force that it lacks is likely."
+            )
+    yield from _disagreement(messages)
+
+
+def identifiable_terms(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> tuple[str, ...]:
+    """The largest set of drag terms that all fits (of one model) can distinguish from M and each other.
+
+    Among sets of equal size the one with the lower powers of the speed is taken.
+    """
+    terms = tuple(fits[0].drag_terms)
+    for count in range(len(terms), 0, -1):
+        for chosen in combinations(reversed(terms), count):
+            left = [
+                designs[fit.method][:, [name in chosen or name not in terms for name in fit.estimated]] for fit in fits
+            ]
+            if all(scaled_condition(design) <= COLLINEAR for design in left):
+                return chosen
+    return ()
+
+
+def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator[str]:
+    collinear = [fit for fit in fits if fit.condition_scaled > COLLINEAR**2]
+    if collinear:
+        numbers = " and ".join(f"{fit.condition_scaled:.2g} ({fit.method})" for fit in collinear)
+        yield (
+            f"{', '.join(collinear[-1].estimated)} cannot all be identified from these tows: the scaled condition "
+            f"number is {numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
+            f"(--terms {','.join(identifiable_terms(fits, designs)) or 'none'})."
+        )
+    for fit in fits:
+        if fit.errors is None or fit.correlation is None:
+            continue
+        pairs = [
+            f"{fit.unknowns[i]} and {fit.unknowns[j]} ({fit.correlation[i, j]:+.4f})"
+            for i, j in combinations(range(len(fit.unknowns)), 2)
+            if abs(fit.correlation[i, j]) > _CORRELATED
+        ]
+        if pairs:
+            yield f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known."
+        uncertain = [
+            f"{name} ({value:.3g}, standard error {error:.2g})"
+            for name, value, error in zip(fit.unknowns, fit.values, fit.errors, strict=True)
+            if _TWO_SIDED_95 * error > abs(value)
+        ]
+        if uncertain:
+            yield f"{fit.method}: not distinguishable from zero at 95 %: {', '.join(uncertain)}."
+
+
+def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
+    if fit.values[0] <= 0:
+        yield f"{fit.method}: the mass M is negative ({fit.values[0]:.4g} kg), which no body has; do not use this fit."
+    else:
+        yield from _added_mass(fit)
+    if not np.isfinite(fit.largest_speed_error_mps):
+        yield f"{fit.method}: the speed with these values grows without bound; do not use this fit."
+    speeds = np.linspace(0.0, top_speed_mps, 401)[1:]
+    drags = fit.drag_N(speeds)
+    if drags.min() < 0:
+        yield (
+            f"{fit.method}: the drag is negative over {100 * np.mean(drags < 0):.0f} % of the speeds up to "
+            f"{top_speed_mps:.3g} m/s reached, down to {drags.min():.2g} N at {speeds[drags.argmin()]:.2g} "
+            "m/s; no hull has that."
+        )
+    minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
+    if minus and drags.min() >= 0:
+        yield f"{fit.method}: the drag terms have opposite signs ({minus} negative) and largely cancel each other."
+
+
+def _added_mass(fit: TowFit) -> Iterator[str]:
+    """An added mass that is none, or more than the mass, by more than its error."""
+    mass_kg = fit.estimates["total_mass_kg"] - fit.added_mass_kg
+    share = fit.added_mass_kg / mass_kg
+    error = _TWO_SIDED_95 * fit.standard_errors.get("total_mass_kg", 0.0) / mass_kg
+    low, high = ADDED_SHARES
+    if low - error <= share <= high + error:
+        if share < 0:
+            yield f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
+        return
+    units = [
+        f"{name} (then {(1 + share) * factor - 1:.2g})"
+        for name, factor in FOREIGN_UNITS.items()
+        if USUAL_SHARES[0] <= (1 + share) * factor - 1 <= USUAL_SHARES[1]
+    ]
+    likely = f"; it would fit a body if {' or if '.join(units)}" if units else ""
+    yield (
+        f"{CHECK} {fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
+        f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."
+    )
+
+
+def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[str]:
+    if len(fit.estimated) > len(speed.coef):
+        yield (
+            f"{fit.method}: {len(fit.estimated)} unknowns are estimated from the {len(speed.coef)} coefficients of a "
+            f"speed polynomial of degree {speed.degree()}; the standard errors then reflect the arithmetic, not the "
+            "drag."
+        )
+    speeds = speed(tows.time_s)
+    row = _worst_misfit(tows, speeds, len(speed.coef))
+    if row is not None:
+        yield (
+            f"{fit.method}: a speed polynomial of degree {speed.degree()} does not follow the tows within their "
+            f"scatter: at {tows.time_s[row]:g} s it is off by {abs(speeds[row] - tows.mean_speed_mps[row]):.3g} m/s; "
+            "prefer output_error, which needs no polynomial."
+        )
+
+
+def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
+    """Row of the largest departure of speeds (times,) from the mean of the tows, if it exceeds the scatter.
+
+    The test is the F test of lack of fit, with the scatter of the tows about their mean as pure error. None also with
+    too few repetitions for the test.
+    """
+    moving = tows.time_s > 0
+    counts, mean = tows.counts[moving], tows.mean_speed_mps[moving]
+    pure = float(np.nansum((tows.speed_mps[moving] - mean[:, None]) ** 2))
+    lack = counts * (mean - speeds[moving]) ** 2
+    lack_freedom, pure_freedom = len(mean) - estimates, int(np.sum(counts - 1))
+    if lack_freedom < 1 or pure_freedom < 1 or pure == 0:
+        return None
+    ratio = float(np.sum(lack)) / lack_freedom / (pure / pure_freedom)
+    if stats.f.sf(ratio, lack_freedom, pure_freedom) > _SIGNIFICANCE:
+        return None
+    return int(np.flatnonzero(moving)[np.argmax(lack)])
+
+
+def _disagreement(fits: Sequence[TowFit]) -> Iterator[str]:
+    for first, second in combinations(fits, 2):
+        if first.errors is None or second.errors is None:
+            continue
+        difference = abs(first.values[0] - second.values[0])
+        if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
+            yield (
+                f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
+                "errors explain; this is the accuracy of the mass."
+            )

@@ -1,0 +1,239 @@
+"""Surge mass and drag from tows by output error: comparison of the integrated speeds of (1.5) with all readings."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.polynomial import Polynomial
+from scipy import stats
+from scipy.optimize import least_squares
+
+from tank2sim.apps.rigs.tow.force import as_force, mean_force
+from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients, surge_model
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import column_norms, scaled_condition
+from tank2sim.simulation.scheme import runge_kutta_step
+
+Predictor = Callable[[Array], tuple[Array, Array]]
+
+MOST_STEPS = 5000
+"""Most steps of the integration over a record; a longer record has longer steps than the model's, because its body is
+slower in proportion. Project choice: a thousandth of the rise of the speed is far below any reading error, and a time
+in milliseconds under t_s would otherwise compute for hours."""
+_LATEST_START = 0.5
+"""Upper bound of the start delay as a share of the record: a later start leaves too few readings."""
+
+
+@dataclass(frozen=True)
+class TowOptions:
+    """Assumptions on the tows in addition to (1.5).
+
+    Parameters
+    ----------
+    start_delay : bool
+        Estimate a delay of the start after t = 0, the same in all tows.
+    total_mass_kg : float, optional
+        M, if known: it is not estimated.
+    """
+
+    start_delay: bool = False
+    total_mass_kg: float | None = None
+
+
+AT_ONCE = TowOptions()
+"""A start at t = 0, and M unknown: as in the paper."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutputErrorFit:
+    """The least-squares fit of the integrated speeds.
+
+    Parameters
+    ----------
+    estimates : array, (unknowns,)
+        M (unless known), the drag coefficients, the start delay (if estimated); SI.
+    design : array, (readings, unknowns)
+        Sensitivities of the speeds at the readings to the estimates.
+    residuals_mps : array, (readings,)
+        Fitted speed less reading.
+    """
+
+    estimates: Array
+    design: Array
+    residuals_mps: Array
+
+    @property
+    def scatter_mps(self) -> float:
+        """Standard deviation of a reading about the fitted speed."""
+        return float(np.linalg.norm(self.residuals_mps)) / math.sqrt(self.freedom)
+
+    @property
+    def freedom(self) -> int:
+        """Readings less estimates."""
+        return len(self.residuals_mps) - len(self.estimates)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the estimates, for independent readings of equal variance and a true model."""
+        norms = column_norms(self.design)
+        inverse = np.linalg.pinv(self.design / norms) / norms[:, None]
+        return self.scatter_mps**2 * inverse @ inverse.T
+
+    @property
+    def half_widths(self) -> Array:
+        """Half-widths of the 95 % intervals of the estimates, by Student's t, (unknowns,)."""
+        half: Array = stats.t.ppf(0.975, self.freedom) * np.sqrt(np.diag(self.covariance))
+        return half
+
+    @property
+    def condition_scaled(self) -> float:
+        """Condition number of J'J with a diagonal of ones."""
+        return scaled_condition(self.design) ** 2
+
+    @property
+    def aic(self) -> float:
+        """Akaike's n ln(SSE/n) + 2 k, with n readings and k estimates; lower is better, only differences matter."""
+        n = len(self.residuals_mps)
+        mean_square = max(float(np.mean(self.residuals_mps**2)), np.finfo(float).tiny)
+        return n * math.log(mean_square) + 2 * len(self.estimates)
+
+
+def speed_predictor(
+    times_s: Array, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
+) -> Predictor:
+    """Speeds of (1.5) from rest, and their sensitivities.
+
+    The body is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The
+    force of each integration step is the mean of T over the step, which preserves the impulse.
+
+    Returns
+    -------
+    callable
+        ``predict(estimates) -> (speeds (times,), sensitivities (times, unknowns))`` with estimates = (M, B..., delay),
+        SI; without M if it is known, without delay if it is not estimated. A delay is >= 0.
+    """
+    pull = as_force(force)
+    model = _unit_model()
+    names = [*(["total_mass"] if options.total_mass_kg is None else []), *terms]
+    chosen = [model.parameter_names.index(f"surge.{name}") for name in names]
+    width = len(chosen) + options.start_delay
+    intervals = np.diff(times_s, prepend=0.0)
+    step = max(model.step_s, float(times_s[-1]) / MOST_STEPS)
+    counts = np.ceil(intervals / step - 1e-9).astype(int)
+    along = _sensitive_step(tuple(names), width).mapaccum(int(counts.sum()))
+    mass, row = model.parameter_names.index("surge.total_mass"), model.state_names.index("motion.u")
+    places = np.cumsum(counts)
+
+    def predict(estimates: Array) -> tuple[Array, Array]:
+        parameters = model.parameter_values()
+        if options.total_mass_kg is not None:
+            parameters[mass] = options.total_mass_kg
+        parameters[chosen] = estimates[: len(chosen)]
+        begin = float(estimates[-1]) if options.start_delay else 0.0
+        # The steps between two readings are shorter if the start is between them, and zero before the start.
+        moving = np.diff(np.maximum(times_s, begin), prepend=begin)
+        steps = np.repeat(moving / np.maximum(counts, 1), counts)
+        at = begin + np.cumsum(steps) - steps
+        pulls = (pull(at) + 4 * pull(at + steps / 2) + pull(at + steps)) / 6
+        start = np.zeros((len(model.states), 1 + width))
+        if options.start_delay:
+            start[row, -1] = -float(pull(begin)) / parameters[mass]
+        path = np.asarray(along(start, steps[None, :], pulls[None, :], parameters))[row].reshape(-1, 1 + width)
+        at_times = np.vstack([np.zeros(1 + width), path])[places]
+        at_times[times_s <= begin] = 0.0
+        return at_times[:, 0], at_times[:, 1:]
+
+    return predict
+
+
+@functools.cache
+def _unit_model() -> Model:
+    return surge_model("towed body", SurgeCoefficients(total_mass_kg=1.0), 1.0)
+
+
+@functools.cache
+def _sensitive_step(names: tuple[str, ...], width: int) -> ca.Function:
+    """A step of the states and of their sensitivities to parameters ``surge.*`` and to the start state."""
+    model = _unit_model()
+    chosen = [model.parameter_names.index(f"surge.{name}") for name in names]
+    step = runge_kutta_step(model)
+    x, u, p, h = step.sx_in()
+    following = step(x, u, p, h)
+    sensitivity = ca.SX.sym("S", len(model.states), width)
+    moved = ca.jacobian(following, x) @ sensitivity
+    moved[:, : len(chosen)] += ca.jacobian(following, p)[:, chosen]
+    columns = [ca.horzcat(x, sensitivity), h, u, p], [ca.horzcat(following, moved)]
+    return ca.Function("augmented", *columns, {"cse": True})
+
+
+def simulated_speeds(
+    coefficients: SurgeCoefficients, force: float | Polynomial, times_s: Array, start_delay_s: float = 0.0
+) -> Array:
+    """Speed (times,) in m/s of (1.5) from rest, at times >= 0 that rise."""
+    values = [coefficients.total_mass_kg, coefficients.B1_kgs2pm3, coefficients.B2_kgspm2, coefficients.B3_kgpm]
+    predict = speed_predictor(times_s, force, tuple(DRAG_POWERS), TowOptions(start_delay=True))
+    return predict(np.array([*values, start_delay_s]))[0]
+
+
+def fit_speeds(
+    tows: Tows, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
+) -> OutputErrorFit | None:
+    """Least squares of the integrated speeds against all readings after the release; None if it does not converge.
+
+    Raises
+    ------
+    InputError
+        The readings after the release do not outnumber the estimates.
+    """
+    read = ~np.isnan(tows.speed_mps) & (tows.time_s > 0)[:, None]
+    row_of_reading = np.nonzero(read)[0]
+    readings = tows.speed_mps[read]
+    predict = speed_predictor(tows.time_s, force, terms, options)
+    scale, start, highest = _search(tows, mean_force(as_force(force), tows.time_s), terms, options)
+    if len(readings) <= len(scale):
+        problem = f"{len(readings)} readings after the release do not test {len(scale)} estimates"
+        raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
+
+    @functools.lru_cache(maxsize=2)  # residuals and Jacobian are evaluated at the same point
+    def at(*scaled: float) -> tuple[Array, Array]:
+        speeds, sensitivities = predict(np.array(scaled) * scale)
+        return speeds[row_of_reading] - readings, sensitivities[row_of_reading] * scale
+
+    lowest = np.where(np.isinf(highest), -np.inf, 0.0)
+    found = least_squares(
+        lambda scaled: at(*scaled)[0],
+        start,
+        lambda scaled: at(*scaled)[1],
+        (lowest, highest),
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-12,
+    )
+    if not found.success or not np.isfinite(found.x).all():
+        return None
+    best = np.where(found.active_mask < 0, 0.0, found.x)
+    residuals, design = at(*best)
+    return OutputErrorFit(best * scale, design / scale, residuals)
+
+
+def _search(tows: Tows, force_N: float, terms: tuple[str, ...], options: TowOptions) -> tuple[Array, Array, Array]:
+    """Scale of each unknown, and start and upper bound in that scale; the lower bound of a bounded unknown is 0."""
+    # The mass that gives the last mean speed without drag, and drag terms as large as the force at the top speed.
+    mass = force_N * tows.time_s[-1] / max(tows.mean_speed_mps[-1], 1e-3 * tows.top_speed_mps)
+    drags = [force_N / tows.top_speed_mps ** DRAG_POWERS[term] for term in terms]
+    rows = [(drag, 0.0, np.inf) for drag in drags]
+    if options.total_mass_kg is None:
+        rows.insert(0, (mass, 1.0, np.inf))
+    if options.start_delay:
+        delay = 0.1 * tows.time_s[-1]
+        rows.append((delay, 0.1, _LATEST_START * tows.time_s[-1] / delay))
+    scale, start, highest = np.array(rows).T
+    return scale, start, highest

@@ -1,0 +1,393 @@
+"""Result of ``tow``: surge mass and drag of a towed body, models that the tows determine, and theory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import PurePath
+from typing import TYPE_CHECKING, ClassVar
+
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    records_table,
+    table,
+)
+from tank2sim.answer.result import Result
+from tank2sim.apps.rigs.tow import paper as tow_paper
+from tank2sim.apps.rigs.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
+from tank2sim.apps.rigs.tow.fit import TOW_PARAMETERS, TowFit
+from tank2sim.apps.rigs.tow.force import force_words
+from tank2sim.apps.rigs.tow.identify import tow_card_text
+from tank2sim.apps.rigs.tow.model_selection import TowByTow
+from tank2sim.apps.rigs.tow.study import TowStudy
+from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
+from tank2sim.cards import Card, parse_card
+from tank2sim.identification.conditioning import COLLINEAR
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_LARGEST_CONDITION = COLLINEAR**2
+"""Scaled condition number up to which the unknowns can be distinguished."""
+
+_UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}
+_METHODS = {"paper": "as published", "qr": "least squares", "output_error": "output error"}
+_ESTIMATES = (
+    "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T. The published method and least squares put a polynomial through the mean "
+    "speeds and solve this equation for it; output error integrates the equation and fits all readings. ± is one "
+    "standard error. A force that is wrong by one per cent makes all estimates wrong by one per cent, and the tows "
+    "cannot show it."
+)
+_MODELS = (
+    "A lower AIC is a better fit for the number of unknowns; it counts readings as independent, and differences below "
+    "4 say little. A model whose unknowns cannot be distinguished, or whose drag pushes, is only a curve."
+)
+_ELLIPSES = (
+    "The regions are linearised and take the readings as independent; the points are the same models fitted to single "
+    "tows. A long slanting region means that only a combination of mass and drag is known. Where the two regions part, "
+    "the start decides."
+)
+_THEORY = (
+    "M_s = k* (1 + k₁₁) ρ V, with Lamb's k₁₁ of ellipsoids and the published k* = 0.96 for the free surface. "
+    "The published k₁₁ of 0.156 belongs to a spheroid 2.5 times as long as thick."
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TowResult(Result[TowStudy]):
+    """Surge mass and drag of a towed body, SI.
+
+    Parameters
+    ----------
+    study : TowStudy
+    wanted : str
+        Method whose numbers the card gets.
+    name : str
+        Name of the body on the card.
+    """
+
+    study: TowStudy
+    wanted: str = "output_error"
+    name: str = "body"
+    command: ClassVar[str] = "tow"
+
+    @property
+    def fit(self) -> TowFit:
+        """Estimates of :attr:`method`."""
+        return self.study.methods[self.method]
+
+    @property
+    def method(self) -> str:
+        """Method whose numbers the card gets; ``qr`` where the one asked for did not converge."""
+        return self.wanted if self.wanted in self.study.methods else "qr"
+
+    @property
+    def estimates(self) -> pd.DataFrame:
+        """Estimates, a row each: method, name with unit (``total_mass_kg``), value, standard error."""
+        import pandas as pd
+
+        rows = [
+            (method, name, value, fit.standard_errors.get(name))
+            for method, fit in self.study.methods.items()
+            for name, value in fit.estimates.items()
+        ]
+        return pd.DataFrame(rows, columns=["method", "name", "value", "standard_error"])
+
+    @property
+    def total_mass_kg(self) -> float:
+        """M of :attr:`method`: mass with the water inside and added mass, kg."""
+        return self.fit.estimates["total_mass_kg"]
+
+    @property
+    def added_mass_kg(self) -> float:
+        """M - m of :attr:`method`, kg."""
+        return self.fit.added_mass_kg
+
+    @property
+    def mass_range_kg(self) -> tuple[float, float] | None:
+        """Range of M that these tows determine over all usable models, kg; None if no model is usable."""
+        return self.study.mass_range_kg
+
+    @cached_property
+    def card(self) -> Card:
+        """The card of the body that surges; ``card.save("body.toml")`` writes it.
+
+        Raises
+        ------
+        InputError
+            No body has these estimates: the total mass is not positive.
+        """
+        body = self.study.body
+        source = f"tank2sim tow {PurePath(self.study.tows).name}, method {self.method}"
+        length = body.length_m if body else None
+        text = tow_card_text(self.study, self.fit, name=self.name, source=source, length_m=length)
+        return parse_card(text, "the card found")
+
+    @property
+    def title(self) -> str:
+        """What was done."""
+        return "Surge mass and drag from accelerating tows"
+
+    @property
+    def subtitle(self) -> str:
+        """The tows, the force and the mass."""
+        count = len(self.study.speeds.measured_mps)
+        tows = f"{count} tows" if count > 1 else "one tow"
+        file, force = PurePath(self.study.tows).name, force_words(self.study.force)
+        return f"{file}: {tows}, {force}, m = {self.study.mass_kg:g} kg"
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Total and added mass of the best usable model."""
+        best = self.study.best
+        if best is None:
+            return ("These tows determine no model with a drag that a hull can have. Take more tows, or longer ones.",)
+        mass, half = best.estimates["M"], best.half_widths_95["M"]
+        return (
+            f"The body moves as {mass:.0f} ± {half:.0f} kg (95 %), and {mass - self.study.mass_kg:.0f} kg of it is "
+            f"water. These tows determine {best.label}, and no more.",
+        )
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """The warnings."""
+        return self.study.warnings
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Total and added mass, the range of M, the worst condition number."""
+        study, best, figures = self.study, self.study.best, []
+        if best is not None:
+            mass, half = best.estimates["M"], best.half_widths_95["M"]
+            note = f"± {half:.0f} kg at 95 %; output error of {best.label}"
+            figures.append(KeyFigure(label="Total mass M", value=round(mass), unit="kg", note=note))
+            label, added = "Added mass λ₁₁ = M − m", round(mass - study.mass_kg)
+            figures.append(KeyFigure(label=label, value=added, unit="kg", note="of the same model"))
+        if study.mass_range_kg:
+            low, high = study.mass_range_kg
+            label, value = "Range of M that these tows leave", f"{low / 1000:.2f} to {high / 1000:.2f}"
+            figures.append(KeyFigure(label=label, value=value, unit="t", note="over all usable models"))
+        worst = max(study.methods.values(), key=lambda fit: fit.condition_scaled)
+        condition = float(f"{worst.condition_scaled:.2g}")
+        figures.append(
+            KeyFigure(
+                label=f"Condition number of {', '.join(worst.estimated)}",
+                value=condition,
+                note=f"scaled; at most {_LARGEST_CONDITION:g} distinguishes them",
+                verdict=Verdict.PASSED if condition <= _LARGEST_CONDITION else Verdict.CAUTION,
+                limit=_LARGEST_CONDITION,
+            )
+        )
+        return figures
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Speeds, estimates, models of other size, drag, theory, single tows."""
+        body = self.study.body
+        return [
+            *self._speeds(),
+            self._estimates(),
+            self._models(),
+            *([self._drag(body), self._theory()] if body else []),
+            *self._by_tow(),
+        ]
+
+    def _speeds(self) -> list[Section]:
+        speeds = self.study.speeds
+        if not speeds.simulated_mps:
+            return []
+        chart = Illustration(
+            chart=tow_speed_chart(speeds, title="Speeds of the tows and of the models"),
+            caption=f"The lower panel shows the differences from {next(iter(speeds.simulated_mps))}.",
+            name="measured_and_computed_speeds",
+        )
+        return [Section(heading="Measured and computed speeds", charts=[chart])]
+
+    def _estimates(self) -> Section:
+        fits = self.study.methods.values()
+        names = {key: f"{name} ({_UNITS[name]})" for name, key in TOW_PARAMETERS.items()}
+        names["added_mass_kg"] = "added mass (kg)"
+        rows: list[list[Cell]] = [
+            [words, *(_with_error(fit, key) for fit in fits)]
+            for key, words in names.items()
+            if any(key in fit.estimates for fit in fits)
+        ]
+        for words, field in (
+            ("J of (1.6) (N √s)", "J"),
+            ("condition number, scaled", "condition_scaled"),
+            ("largest speed error (m/s)", "largest_speed_error_mps"),
+        ):
+            rows.append([words, *(f"{getattr(fit, field):.4g}" for fit in fits)])
+        heads = ("", *(_METHODS[method] for method in self.study.methods))
+        tables = [table("Estimates by method", heads, rows), self._polynomials()]
+        return Section(heading="Estimates by method", text=_ESTIMATES, tables=tables)
+
+    def _polynomials(self) -> Table:
+        rows: list[list[Cell]] = []
+        for one in self.study.speed_polynomials:
+            absent = [None] * (3 - one.degree)
+            rows.append([f"{one.degree}", *one.coefficients, *absent, one.rms_mps, one.rms_less_one_mps])
+            if self.study.tows_of_the_paper:
+                values, error = tow_paper.TABLE_2[one.degree]
+                rows.append([f"{one.degree}, printed", *values, *absent, error, None])
+        heads = ("degree", "α₀", "α₁", "α₂", "α₃", "rms (m/s)", "rms by n − 1 (m/s)")
+        notes = ["No single change of the printed readings gives the printed polynomials."]
+        return table(
+            "Polynomials v = α₀ + α₁ t + ... through the mean speeds (m/s over s)",
+            heads,
+            rows,
+            *(notes if self.study.tows_of_the_paper else []),
+            folded=True,
+            on_screen=False,
+        )
+
+    def _models(self) -> Section:
+        study, name, charts = self.study, "what_these_tows_determine", []
+        if study.models:
+            charts.append(Illustration(chart=model_chart(study.models), caption=_MODELS, name=name))
+        if study.confidence_ellipses:
+            chart = ellipse_chart(study.confidence_ellipses, study.tow_by_tow)
+            charts.append(Illustration(chart=chart, caption=_ELLIPSES, name=name))
+        unknowns = [name for name in _UNITS if any(name in model.estimates for model in study.models)]
+        estimates: list[list[Cell]] = [
+            [
+                model.label,
+                *(cell for name in unknowns for cell in (model.estimates.get(name), model.half_widths_95.get(name))),
+            ]
+            for model in study.models
+        ]
+        heads = [head for name in unknowns for head in (f"{name} ({_UNITS[name]})", f"± ({_UNITS[name]})")]
+        rows: list[list[Cell]] = [
+            [
+                model.label,
+                f"{model.estimates['M']:.0f} ± {model.half_widths_95['M']:.0f}",
+                model.scatter_mps,
+                round(model.aic, 1),
+                float(f"{model.condition_scaled:.2g}"),
+                model.drag_nowhere_negative,
+            ]
+            for model in study.models
+        ]
+        columns = [
+            Column(title="model"),
+            Column(title="M ± 95 %", unit="kg"),
+            Column(title="scatter", unit="m/s", digits=3),
+            Column(title="AIC"),
+            Column(title="condition", digits=2),
+            Column(title="drag nowhere negative"),
+        ]
+        return Section(
+            heading="What these tows determine",
+            text="The same readings by output error with fewer and with more unknowns (delay: time from t = 0 to the "
+            "start of the body).",
+            tables=[
+                table("Output error, models of different size", columns, rows, *self._masses_by_tow(), folded=True),
+                table(
+                    "Estimates of these models with 95 % half-widths",
+                    ("model", *heads),
+                    estimates,
+                    folded=True,
+                    on_screen=False,
+                ),
+            ],
+            charts=charts,
+        )
+
+    def _masses_by_tow(self) -> list[str]:
+        return [
+            f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
+            f"out in turn: ± {subset.jackknife_half_widths_95[0]:.0f} kg (95 %)."
+            for label, subset in self.study.tow_by_tow.items()
+        ]
+
+    def _drag(self, body: TowedBody) -> Section:
+        drags = self._drags(body)
+        orders = ("A1 (s²/m²)", "A2 (s/m)", "A3")
+        rows: list[list[Cell]] = [
+            [name, area, *values]
+            for name, drag in drags.items()
+            for area, values in (
+                ("L²", asdict(drag).values()),
+                ("V^(2/3)", asdict(drag.times(body.area_ratio)).values()),
+            )
+        ]
+        chart = Illustration(
+            chart=drag_chart(drags, body, self.study.top_speed_mps),
+            caption=f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {format_number(body.viscosity_m2ps)} "
+            "m²/s. The axes fit the curves that stay above zero; no hull has a coefficient below zero.",
+        )
+        caption = "Drag coefficient C = A1 v² + A2 v + A3"
+        drag_table = table(caption, ("method", "referred to", *orders), rows, folded=True)
+        return Section(heading="Drag coefficient", tables=[drag_table], charts=[chart])
+
+    def _drags(self, body: TowedBody) -> dict[str, DragPolynomial]:
+        """C referred to L^2 by method, by the best usable model, and as printed."""
+        drags = {
+            _METHODS[name]: drag.by_length_squared
+            for name, drag in self.study.drag_coefficients.items()
+            if name != "paper" or "qr" not in self.study.drag_coefficients
+        }
+        if best := self.study.best:
+            drag = drag_polynomial(best.coefficients, body)
+            if drag not in drags.values():
+                drags[f"best usable: {best.label}"] = drag
+        if self.study.tows_of_the_paper:
+            drags["as printed"] = drag_polynomial(tow_paper.SOLUTION, body)
+        return drags
+
+    def _theory(self) -> Section:
+        estimate = ""
+        if best := self.study.best:
+            mass, half = best.estimates["M"], best.half_widths_95["M"]
+            estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
+        fields = {
+            "basis": "body",
+            "k11": "k₁₁",
+            "deep_kg": "(1 + k₁₁) ρ V",
+            "near_surface_kg": "near the surface, M_s",
+        }
+        masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
+        return Section(heading="Mass by theory", text=_THEORY + estimate, tables=[masses])
+
+    def _by_tow(self) -> list[Section]:
+        if not self.study.tow_by_tow:
+            return []
+        return [
+            Section(
+                heading="Tow by tow",
+                text="Each tow by itself, and one left out in turn. These errors hold also where the readings of one "
+                "tow err together.",
+                tables=[_subset_table(label, subset) for label, subset in self.study.tow_by_tow.items()],
+                folded=True,
+            )
+        ]
+
+
+def _with_error(fit: TowFit, key: str) -> Cell:
+    """An estimate and its standard error; each row has a unit of its own, so no decimals in common."""
+    if key not in fit.estimates:
+        return None
+    error = fit.standard_errors.get(key)
+    value = format_number(float(f"{fit.estimates[key]:.5g}"), 5)
+    return f"{value} ± {format_number(float(f'{error:.2g}'), 5)}" if error else value
+
+
+def _subset_table(label: str, subset: TowByTow) -> Table:
+    rows: list[list[Cell]] = [
+        ["all tows", *subset.together],
+        *([f"tow {number} alone", *row] for number, row in enumerate(subset.alone, 1)),
+        *([f"all but tow {number}", *row] for number, row in enumerate(subset.left_out, 1)),
+        ["standard error, one left out in turn", *subset.jackknife_standard_errors],
+        ["95 % half-width, one left out in turn", *subset.jackknife_half_widths_95],
+        ["standard error, spread of the tows", *subset.spread_standard_errors],
+    ]
+    heads = ("tows", *(f"{name} ({_UNITS[name]})" for name in subset.unknowns))
+    return table(label[0].upper() + label[1:], heads, rows, on_screen=False)

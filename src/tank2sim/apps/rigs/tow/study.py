@@ -1,0 +1,323 @@
+"""Study of a towed body: its estimates, and estimates by other models from the same readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from scipy import stats
+
+from tank2sim.apps.rigs.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
+from tank2sim.apps.rigs.tow.fit import DELAY
+from tank2sim.apps.rigs.tow.identify import TowIdentification
+from tank2sim.apps.rigs.tow.model_selection import (
+    SIMPLE,
+    SIMPLE_LATE,
+    FittedModel,
+    TowByTow,
+    best_model,
+    compare_models,
+    mass_range,
+    tow_by_tow,
+)
+from tank2sim.apps.rigs.tow.output_error import simulated_speeds
+from tank2sim.apps.rigs.tow.paper import are_of_the_paper
+from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.theory import (
+    VISCOSITY_M2PS,
+    WATER_KGPM3,
+    DragPolynomial,
+    MassByTheory,
+    TowedBody,
+    drag_polynomial,
+    masses_by_theory,
+)
+from tank2sim.arrays import Array, Columns
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.records.thinning import drawn_columns
+
+_LEVEL = 0.95
+_DEGREES = range(4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedPolynomial:
+    """A row of Table 2: the least-squares polynomial through the mean speeds.
+
+    Parameters
+    ----------
+    degree : int
+    coefficients : tuple of float
+        In rising powers of t, m/s over s.
+    rms_mps : float
+        Root mean square of its errors at the means, by the number n of times, which is the measure of Table 2.
+    rms_less_one_mps : float
+        The same by n - 1.
+    """
+
+    degree: int
+    coefficients: tuple[float, ...]
+    rms_mps: float
+    rms_less_one_mps: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ellipse:
+    """Joint 95 % region of M and B3, linearised: centre and outline (n,), kg and kg/m; the label names the unknowns."""
+
+    label: str
+    centre: tuple[float, float]
+    mass_kg: Array
+    B3_kgpm: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class DragCoefficients:
+    """Drag coefficients C(v) referred to L^2 and to V^(2/3)."""
+
+    by_length_squared: DragPolynomial
+    by_volume_two_thirds: DragPolynomial
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TowSpeeds:
+    """Speeds to draw.
+
+    Parameters
+    ----------
+    t_s : array (n,)
+        Times of the readings.
+    measured_mps : dict
+        Tow to its readings (n,); nan where nothing was read.
+    simulated_t_s : array (m,)
+        Times of the simulations.
+    simulated_mps : dict
+        The best usable model and the methods to their speeds (m,), each motion once.
+    """
+
+    t_s: Array
+    measured_mps: Columns
+    simulated_t_s: Array
+    simulated_mps: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TowStudy(TowIdentification):
+    """Estimates from tows, with alternative models and their spread.
+
+    :class:`.TowIdentification` has the other parameters.
+
+    Parameters
+    ----------
+    tows_of_the_paper : bool
+        Whether these are the tows of Table 1.
+    speed_polynomials : tuple of SpeedPolynomial
+        Degrees 0 to 3 through the mean speeds, as far as the readings test them.
+    models : tuple of FittedModel
+        Models of different size, by output error.
+    mass_range_kg : tuple of two floats, optional
+        Range of M from these tows; None without a usable model.
+    tow_by_tow : dict
+        Single-tow and jackknife estimates by method; empty for fewer than three tows.
+    confidence_ellipses : tuple of Ellipse
+        Regions of M and B3, without and with a start delay.
+    mass_by_theory : tuple of MassByTheory
+        (2.5); empty without the size.
+    speeds : TowSpeeds
+    body : TowedBody, optional
+        Size of the body, if known.
+    drag_coefficients : dict
+        Method to C(v); empty without the size.
+    """
+
+    tows_of_the_paper: bool
+    speed_polynomials: tuple[SpeedPolynomial, ...]
+    models: tuple[FittedModel, ...]
+    mass_range_kg: tuple[float, float] | None
+    tow_by_tow: dict[str, TowByTow]
+    confidence_ellipses: tuple[Ellipse, ...]
+    mass_by_theory: tuple[MassByTheory, ...]
+    speeds: TowSpeeds
+    body: TowedBody | None
+    drag_coefficients: dict[str, DragCoefficients]
+
+    @property
+    def best(self) -> FittedModel | None:
+        """The model of lowest AIC among the plausible ones that these tows determine."""
+        return best_model(self.models)
+
+
+def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = None) -> TowStudy:
+    """The study of a result; with the size of the body also its drag coefficients and the theory.
+
+    Parameters
+    ----------
+    result : TowIdentification
+    tows : Tows
+        Its readings.
+    body : TowedBody, optional
+    """
+    models = compare_models(tows, result.force)
+    near = [model for model in models if model.unknowns in (SIMPLE.unknowns, SIMPLE_LATE.unknowns)]
+    study = TowStudy(
+        **{part.name: getattr(result, part.name) for part in fields(result)},
+        tows_of_the_paper=are_of_the_paper(tows),
+        speed_polynomials=tuple(speed_polynomials(tows)),
+        models=models,
+        mass_range_kg=mass_range(models),
+        tow_by_tow=tow_by_tow(tows, result.force, result.terms, len(result.speed_polynomial) - 1),
+        confidence_ellipses=tuple(confidence_ellipse(model) for model in near),
+        mass_by_theory=masses_by_theory(body) if body else (),
+        speeds=_speeds(result, tows, best_model(models)),
+        body=body,
+        drag_coefficients=_drag_coefficients(result, body) if body else {},
+    )
+    return replace(study, warnings=(*result.warnings, *_notes(study), *_continued(study, tows)))
+
+
+def _drag_coefficients(result: TowIdentification, body: TowedBody) -> dict[str, DragCoefficients]:
+    found = {name: drag_polynomial(fit.coefficients, body) for name, fit in result.methods.items()}
+    return {
+        name: DragCoefficients(by_length_squared=drag, by_volume_two_thirds=drag.times(body.area_ratio))
+        for name, drag in found.items()
+    }
+
+
+def _speeds(result: TowIdentification, tows: Tows, best: FittedModel | None) -> TowSpeeds:
+    """Readings, and speeds of the best usable model and of the methods, each motion once."""
+    time = np.linspace(0.0, float(tows.time_s[-1]), 301)
+    found: Columns = {}
+    if best is not None:
+        delay = best.estimates.get(DELAY, 0.0)
+        found[f"best usable: {best.label}"] = simulated_speeds(best.coefficients, result.force, time, delay)
+    for name in ("output_error", "qr"):
+        if name in result.methods:
+            fit = result.methods[name]
+            speeds = simulated_speeds(fit.coefficients, result.force, time, fit.start_delay_s)
+            if np.isfinite(speeds).all() and not any(np.allclose(speeds, drawn) for drawn in found.values()):
+                found[f"{name.replace('_', ' ')}: {', '.join(fit.unknowns)}"] = speeds
+    columns = drawn_columns({"t_s": time, **found})
+    return TowSpeeds(
+        t_s=tows.time_s,
+        measured_mps={f"tow {number}": speed for number, speed in enumerate(tows.speed_mps.T, start=1)},
+        simulated_t_s=columns.pop("t_s"),
+        simulated_mps=columns,
+    )
+
+
+def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) -> TowedBody | None:
+    """The body from the given values, else from the file of the tows; None if its length is unknown.
+
+    The default volume is the mass of the body, with the water inside, over the density of water: it floats.
+
+    Parameters
+    ----------
+    mass_kg : float
+        m, with the water inside.
+    given : mapping
+        Keys of :data:`tank2sim.apps.rigs.tow.records.BODY_KEYS` to values, None if not given.
+
+    Raises
+    ------
+    InputError
+        A given value is not positive.
+    """
+    for key, value in given.items():
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise InputError("--" + key.replace("_", "-"), "", f"is {value:g}", "a positive number was expected")
+    known = {**tows.body, **{key: value for key, value in given.items() if value is not None}}
+    if "length_m" not in known:
+        return None
+    density = known.get("water_density_kgpm3", WATER_KGPM3)
+    return TowedBody(
+        length_m=known["length_m"],
+        beam_m=known.get("beam_m"),
+        volume_m3=known.get("volume_m3", mass_kg / density),
+        density_kgpm3=density,
+        viscosity_m2ps=known.get("kinematic_viscosity_m2ps", VISCOSITY_M2PS),
+    )
+
+
+def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator[SpeedPolynomial]:
+    """Rows of Table 2, while readings outnumber coefficients."""
+    for degree in degrees:
+        try:
+            fitted = fit_mean_speed(tows, degree).polynomial
+        except InputError:
+            return
+        square = float(np.sum((fitted(tows.time_s) - tows.mean_speed_mps) ** 2))
+        count = len(tows.time_s)
+        coefficients = tuple(float(value) for value in fitted.coef)
+        yield SpeedPolynomial(
+            degree=degree,
+            coefficients=coefficients,
+            rms_mps=(square / count) ** 0.5,
+            rms_less_one_mps=(square / (count - 1)) ** 0.5,
+        )
+
+
+def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
+    """Joint 95 % region of M and B3, the first unknowns of a model, by the linearised covariance and Fisher's F."""
+    radius = np.sqrt(2 * stats.f.ppf(_LEVEL, 2, fitted.freedom))
+    angle = np.linspace(0, 2 * np.pi, points)
+    circle = radius * np.vstack([np.cos(angle), np.sin(angle)])
+    # By the eigenvectors, which also describe a region without width.
+    squares, axes = np.linalg.eigh(fitted.covariance[:2, :2])
+    mass, drag = fitted.estimates["M"], fitted.estimates["B3"]
+    outline = axes * np.sqrt(np.maximum(squares, 0.0)) @ circle
+    return Ellipse(label=fitted.label, centre=(mass, drag), mass_kg=mass + outline[0], B3_kgpm=drag + outline[1])
+
+
+def _continued(study: TowStudy, tows: Tows) -> Iterator[str]:
+    """Notes on tows that end early: the paper's estimate with their polynomial continued to the end."""
+    published = next(iter(study.tow_by_tow.values()), None)
+    for number, alone in enumerate(published.alone if published else ()):
+        single = tows.only(number)
+        if single.time_s[-1] >= tows.time_s[-1] or not np.isfinite(alone).all():
+            continue
+        speed = fit_mean_speed(single, len(study.speed_polynomial) - 1).polynomial
+        problem = discretise(speed, tows.time_s, study.terms, study.force)
+        yield (
+            f"Tow {number + 1} ends at {single.time_s[-1]:g} s: over that time the published method gives M "
+            f"{alone[0]:.0f} kg; with its polynomial continued to the {tows.time_s[-1]:g} s of the other tows, "
+            f"{solve_by_qr(problem)[0]:.0f} kg."
+        )
+
+
+def _notes(study: TowStudy) -> Iterator[str]:
+    span = study.mass_range_kg
+    if span is not None:
+        low, high = span
+        yield (
+            f"These tows determine M only within {low:.0f} to {high:.0f} kg (added mass {low - study.mass_kg:.0f} to "
+            f"{high - study.mass_kg:.0f} kg): 95 % intervals of the plausible models that they determine."
+        )
+    best = min(study.models, key=lambda fitted: fitted.aic, default=None)
+    if best is not None and not best.usable:
+        yield (
+            f"The model of lowest AIC is {best.label}, with "
+            + (
+                "a drag that is negative at some speeds"
+                if not best.drag_nowhere_negative
+                else "unknowns that cannot be separated"
+            )
+            + "; a better fit is not a better model."
+        )
+    late = {model.unknowns: model.aic for model in study.models}
+    if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
+        yield "A start delay explains these tows much better than none (--start-delay)."
+    if any(fit.condition_scaled > COLLINEAR**2 for fit in study.methods.values()):
+        theory = study.mass_by_theory[0].near_surface_kg if study.mass_by_theory else None
+        known = f"{theory:.0f} by (2.5)" if theory is not None else "by theory"
+        if theory is not None and span is not None and not span[0] <= theory <= span[1]:
+            known += ", which these tows contradict"
+        yield f"Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, {known})."
+    if study.force.degree() > 0:
+        yield (
+            f"A card holds one force: the mean, {study.force_N:.4g} N; a simulation of these tows must be given the "
+            "force over time (input tow.force)."
+        )
+    if study.start_delay:
+        yield "A card has no start delay: a simulation of these tows begins later by it."

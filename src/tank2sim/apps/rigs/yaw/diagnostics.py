@@ -1,0 +1,215 @@
+"""Checks before and after an estimate from records of the yaw rig, with notes for the user."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawEstimate
+from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
+from tank2sim.apps.rigs.yaw.records import YawRecord
+from tank2sim.errors import InputError
+from tank2sim.marks import CHECK
+
+_NOT_QUITE_MIRRORED = 0.03
+_FULL = 0.995
+"""Share of the largest current from which the motor counts as saturated."""
+_ANOTHER_UNIT = 20.0
+_STRONG_A = 20.0
+"""More current than a motor of such a rig takes; the paper's has 1 A."""
+_LEAST_A = 1e-9
+"""A current that stays below it turns no body. Project choice: a billionth of what the paper's motor takes (1 A)."""
+_NOT_THE_PROGRAMME = 1.5
+"""A turn that differs from the programme by this factor is an error of units, not of tracking."""
+_PULSE_RAD = 2 * math.pi / 3000
+"""Pulse of the paper's encoder; where (3) holds, the residual is about a quarter of it."""
+_LEAST_ADDED, _MOST_ADDED = 0.02, 10.0
+"""Added inertia over J_zz of bodies on the rig. Project choice: near a round body, and five times the most of ships in
+deep water, for walls, a shallow tank and light models."""
+_APART = 3.0
+_SHARPER = 3.0
+
+
+def check_current(records: tuple[YawRecord, ...]) -> list[str]:
+    """Notes on the files and their currents; InputError for a motor that is saturated or idle."""
+    notes = []
+    for record in records:
+        notes += [f"{record.path.name}: {note}" for note in record.notes]
+        largest = float(np.abs(record.current_A).max())
+        if largest < _LEAST_A:
+            problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
+            raise InputError(record.path, "column current_A", problem, remedy)
+        if largest > _STRONG_A:
+            notes.append(
+                f"{record.path.name}: the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
+            )
+        limit = record.constants.get("max_current_A")
+        if limit is None:
+            continue
+        full = np.abs(record.current_A) >= _FULL * limit
+        for pair in record.programme.pairs():
+            for begin, end in pair:
+                bad = full & (record.time_s >= begin) & (record.time_s <= end)
+                if bad.any():
+                    row = int(np.flatnonzero(bad)[0])
+                    problem = f"reaches the motor's {limit:g} A at {record.time_s[row]:.3f} s, where it is evaluated"
+                    remedy = "run a slower programme, or lower gains"
+                    if largest > _ANOTHER_UNIT * limit:
+                        remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
+                    raise InputError(record.path, "column current_A", problem, remedy)
+        if full.any():
+            first = record.time_s[int(np.flatnonzero(full)[0])]
+            notes.append(
+                f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
+                "evaluated."
+            )
+    return notes
+
+
+def check_turn(record: YawRecord) -> None:
+    """Raise InputError if the turn of the body differs grossly from the programme: its units are then wrong.
+
+    Checked while the rate is constant, where a wrong start_s has little effect.
+    """
+    turn = record.programme
+    for number in range(turn.humps):
+        ends = turn.start_s + number * turn.period_s + turn.rise_s * np.array([1.0, 2.0])
+        programmed = float(abs(np.diff(turn.at(ends).angle_rad)[0]))
+        measured = float(abs(np.diff(np.interp(ends, record.time_s, record.angle_rad))[0]))
+        if not programmed / _NOT_THE_PROGRAMME < measured < programmed * _NOT_THE_PROGRAMME:
+            problem = (
+                f"turns by {measured:.3g} rad from {ends[0]:.2f} to {ends[1]:.2f} s (hump {number + 1}), where the "
+                f"programme turns by {programmed:.3g} rad"
+            )
+            remedy = "check the unit of the angle (phi_rad or phi_deg), max_rate_degps, rise_s and start_s"
+            raise InputError(record.path, "column phi_rad", problem, remedy)
+
+
+def check_sign(record: YawRecord, fit: EnergyFit) -> None:
+    """Raise InputError if the motor works against the motion throughout: angle and current have opposite signs."""
+    if fit.coefficients[0] < 0 and float(fit.balance.work_J.sum()) < 0:
+        problem = "drives the body against its motion throughout, which makes inertia and friction negative"
+        raise InputError(record.path, "column current_A", problem, "give current and angle the same positive sense")
+
+
+def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[str]:
+    """Notes on intervals that are not quite mirror images; InputError beyond the limit."""
+    place = 0
+    for record in records:
+        for number in range(record.programme.humps):
+            if mirror[place] > limit:
+                pair = record.programme.pairs()[number]
+                problem = (
+                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are not mirror images: "
+                    f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
+                    "allowed"
+                )
+                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise --mirror-percent"
+                raise InputError(record.path, "", problem, remedy)
+            place += 1
+    worst = max(mirror)
+    if worst > _NOT_QUITE_MIRRORED:
+        return [
+            f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
+            "two-interval formulas are biased by the difference in dissipation."
+        ]
+    return []
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.2f}-{ends[1]:.2f} s"
+
+
+def check_added_inertia(
+    record: YawRecord, inertia_kgm2: float, added: Mapping[str, tuple[float, float | None]]
+) -> list[str]:
+    """Notes, marked, on an added inertia (kg m2, with its error, by method) that is uncertain or that few bodies have;
+    InputError where all methods make it negative by more than its error: no body has that."""
+    if not added:
+        return []
+    value, error = next(iter(added.values()))
+    doubt = 2 * (error or 0.0)
+    ratio = value / inertia_kgm2
+    if all(each + 2 * (other or 0.0) < 0 for each, other in added.values()):
+        total = value + inertia_kgm2
+        problem = (
+            f"the added inertia is {value:.3g} kg m2, and no body has a negative one: J_zz is {inertia_kgm2:.4g} "
+            f"kg m2, body and water together have {total:.4g}"
+        )
+        remedy = "check J_zz, the torque constant, the unit of the current (A), and that the body in air was the same"
+        raise InputError(record.path, "", problem, remedy)
+    if value < doubt:
+        return [
+            f"{CHECK} the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
+            "kg m2; run a faster programme, more humps, or a body that carries more water."
+        ]
+    if not _LEAST_ADDED - doubt / inertia_kgm2 <= ratio <= _MOST_ADDED + doubt / inertia_kgm2:
+        return [
+            f"{CHECK} the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
+            "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+        ]
+    return []
+
+
+def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[str]:
+    """Notes if (3) does not explain the record's motion, or a single hump cannot show it."""
+    notes = []
+    if misfit_rad is not None and misfit_rad > _PULSE_RAD:
+        notes.append(
+            f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
+            "another effect is missing in the terms, and no standard error includes it."
+        )
+    (first, *further) = records
+    if not further and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
+        notes.append(
+            "One hump of part of a turn does not distinguish a moment of gravity from inertia: give two humps or more "
+            "that begin at other angles."
+        )
+    return notes
+
+
+def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
+    """Notes on the estimates."""
+    best, two = estimates["energy_least_squares"], estimates["two_intervals"]
+    notes = []
+    if two.bias_kgm2 is not None:
+        share = 100 * two.bias_kgm2 / best.total_inertia_kgm2
+        parts = two.bias_from
+        notes.append(
+            f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
+            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals differ in dissipation, "
+            f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
+            "include this bias."
+        )
+    if len(two.by_hump_kgm2) > 1:
+        humps = ", ".join(f"{1e4 * value:.4g}" for value in two.by_hump_kgm2)
+        notes.append(
+            f"It is the mean of {humps} e-4 kg m2 (total), hump by hump; while the controller's gains are still being "
+            "tuned, a hump differs."
+        )
+    for term, (value, error) in best.friction.items():
+        if error is not None and abs(value) < 2 * error:
+            notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
+    return [*notes, *_comparison_notes(best, estimates.get("output_error"))]
+
+
+def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[str]:
+    """Note on the nonlinear least squares, where they are more accurate or disagree with the energy least squares."""
+    if nonlinear is None or not best.inertia_error_kgm2 or not nonlinear.inertia_error_kgm2:
+        return []
+    difference = abs(best.total_inertia_kgm2 - nonlinear.total_inertia_kgm2)
+    error = math.hypot(best.inertia_error_kgm2, nonlinear.inertia_error_kgm2)
+    if difference > _APART * error:
+        return [
+            f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, "
+            f"{difference / error:.2g} times their errors: an effect in the record is missing in the equations of "
+            "both, and in both errors."
+        ]
+    if nonlinear.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
+        return [
+            f"output_error is more accurate, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
+            f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; --method output_error puts it into a card."
+        ]
+    return []

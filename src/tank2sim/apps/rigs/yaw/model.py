@@ -1,0 +1,280 @@
+"""A body that a motor turns in a tank: (3) of paper 3 (Alyshev 2019), with its motor, current loop and encoder.
+
+    (J_zz + lambda) dw/dt = k_t I - f_c sgn w - f_1 w - f_662 w |w|,   T_c dI/dt + I = u
+
+In air lambda and f_662 are zero. Beyond (3), and as the paper's energy method has them: added inertia and damping that
+differ between accelerating (a) and braking (d), lambda_662 |w|^1.5 and f_662 |w|, with sgn(dw/dt) sgn(w) >= 0 for a;
+walls, lambda_66l and f_66l, as functions of the distances of bow and stern; and the moment of gravity of a body mounted
+off the axis. psi and r = w are positive clockwise seen from above, as everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+
+from tank2sim.apps.rigs.yaw.card import TankWalls, YawRig
+from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+
+# A thousandth of a second, the step of a rig's digital controller; the fastest of the model, the knee of the dry
+# friction, is stable up to twenty times that.
+_STEP_S = 0.001
+# Rate at which the dry friction is fully there, rad/s: a thousandth of the paper's. A jump of sgn at zero would let
+# the body at rest tremble by the step of integration.
+_KNEE_RADPS = 2.5e-4
+
+
+_TORQUE_CONSTANT_NMPA = 0.051
+"""Torque constant of the paper's motor, N m/A."""
+
+ELLIPSOID_T1 = YawRig(
+    inertia_kgm2=204.3e-4,
+    added_inertia_kgm2=300.4e-4,
+    coulomb_Nm=7.9e-4,
+    viscous_Nms=117.4e-4,
+    quadratic_Nms2=381.0e-4,
+    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
+)
+"""The paper's ellipsoid in water, its least squares of Tables 1 and 2."""
+SHIP_T1 = YawRig(
+    inertia_kgm2=179.6e-4,
+    added_inertia_kgm2=302.0e-4,
+    coulomb_Nm=9.8e-4,
+    viscous_Nms=43.5e-4,
+    quadratic_Nms2=1434.6e-4,
+    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
+)
+SHIP_T2 = YawRig(
+    inertia_kgm2=179.6e-4,
+    added_inertia_kgm2=531.1e-4,
+    coulomb_Nm=2.7e-4,
+    viscous_Nms=216.7e-4,
+    quadratic_Nms2=1480.9e-4,
+    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
+)
+ELLIPSOID_AIR = YawRig(
+    inertia_kgm2=204.3e-4, coulomb_Nm=10.9e-4, viscous_Nms=7.6e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
+)
+SHIP_AIR = YawRig(
+    inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
+)
+UNKNOWN_RIG = YawRig(inertia_kgm2=1.0, torque_constant_NmpA=1.0)
+"""A rig of which nothing is known: the first two numbers are placeholders for those that are to be found."""
+
+
+def friction(rate: ca.SX, coulomb: ca.SX, viscous: ca.SX, quadratic: ca.SX) -> ca.SX:
+    """Moment against the motion of (3) in N m, at a rate in rad/s.
+
+    Odd in the rate; sgn w is tanh(w / 2.5e-4 rad/s).
+    """
+    return coulomb * ca.tanh(rate / _KNEE_RADPS) + rate * (viscous + quadratic * ca.fabs(rate))
+
+
+def wall_nearness(heading: Any, walls: TankWalls) -> tuple[Any, Any]:
+    """1/(l_a + 1) and 1/(l_f + 1) at a heading (rad): distances, in m, of bow and stern to the nearest wall."""
+    near = []
+    for half in (walls.body_length_m / 2, -walls.body_length_m / 2):
+        x, y = walls.x_m + half * ca.cos(heading), walls.y_m + half * ca.sin(heading)
+        distance = ca.fmin(walls.length_m / 2 - ca.fabs(x), walls.breadth_m / 2 - ca.fabs(y))
+        near.append(1 / (distance + 1))
+    return near[0], near[1]
+
+
+def wall_terms(
+    heading: ca.SX, walls: TankWalls, coefficients: Mapping[str, ca.SX] | None = None
+) -> tuple[ca.SX, ca.SX]:
+    """lambda_66l (kg m2) and f_66l (N m s) at a heading; coefficients by name (``wall.bow_inertia``), or the walls'."""
+    values: Mapping[str, Any] = coefficients or {name: start for name, _, start, _ in _wall_rows(walls)}
+    bow, stern = wall_nearness(heading, walls)
+    return (
+        values["wall.bow_inertia"] * bow + values["wall.stern_inertia"] * stern,
+        values["wall.bow_damping"] * bow + values["wall.stern_damping"] * stern,
+    )
+
+
+def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> Model:
+    """The rig as a model.
+
+    Parameters
+    ----------
+    name : str
+        The body.
+    rig : YawRig
+        Start values of the tunable parameters.
+    with_current_loop : bool
+        The input is ``motor.command`` (A), and the current follows; else the input is ``motor.current`` itself, as a
+        record has it.
+    """
+    parameters = {parameter.name: parameter for parameter in _parameters(rig)}
+    p = {key: parameter.symbol for key, parameter in parameters.items()}
+    heading = State(
+        name="motion.psi",
+        unit="rad",
+        description="Yaw angle of the body, + clockwise seen from above",
+        derivative="motion.psidot",
+        start=p["initial.psi"],
+    )
+    rate = State(
+        name="motion.r",
+        unit="rad/s",
+        description="Yaw rate, + clockwise seen from above",
+        nominal=0.1,
+        derivative="motion.rdot",
+        start=p["initial.r"],
+    )
+    motor = _current_loop(p) if with_current_loop else (_current_input(),)
+    current = motor[0]
+    quantities = [
+        Quantity(name="motion.psidot", unit="rad/s", description="Rate of the yaw angle", value=rate.symbol),
+        *_mechanics(heading.symbol, rate.symbol, current.symbol, p, rig.walls),
+        _encoder(heading.symbol, p),
+        *(variable for variable in motor if isinstance(variable, Quantity)),
+    ]
+    outputs = [heading.name, rate.name, "motion.rdot", "encoder.angle", "moment.motor", "moment.resistance"]
+    return Model(
+        name=name,
+        description="Body turned by a motor about a fixed vertical axis, equation (3) of Alyshev (2019)",
+        states=(heading, rate, *(variable for variable in motor if isinstance(variable, State))),
+        inputs=tuple(variable for variable in motor if isinstance(variable, Input)),
+        parameters=tuple(parameters.values()),
+        quantities=tuple(quantities),
+        outputs=(*outputs, current.name) if with_current_loop else tuple(outputs),
+        step_s=_STEP_S,
+    )
+
+
+def _current_input() -> Input:
+    return Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
+
+
+def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
+    command = Input(name="motor.command", unit="A", description="Current asked of the amplifier, + turns clockwise")
+    current = State(
+        name="motor.current",
+        unit="A",
+        description="Current of the motor, + turns clockwise",
+        derivative="motor.current_rate",
+        start=0.0,
+        trim=command.symbol,
+    )
+    limit = p["motor.max_current"]
+    allowed = ca.fmax(-limit, ca.fmin(limit, command.symbol))
+    loop = Quantity(
+        name="motor.current_rate",
+        unit="A/s",
+        description="Rate of the current: the amplifier's loop is a first-order lag",
+        value=(allowed - current.symbol) / p["motor.lag"],
+    )
+    return current, command, loop
+
+
+def _encoder(heading: ca.SX, p: dict[str, ca.SX]) -> Quantity:
+    pulse = 2 * math.pi / p["encoder.pulses"]
+    return Quantity(
+        name="encoder.angle",
+        unit="rad",
+        description="Yaw angle as the encoder counts it, whole pulses",
+        value=ca.floor(heading / pulse) * pulse,
+    )
+
+
+def _mechanics(
+    heading: ca.SX, rate: ca.SX, current: ca.SX, p: dict[str, ca.SX], walls: TankWalls | None
+) -> tuple[Quantity, ...]:
+    """Moments and the acceleration that they give."""
+    wall_inertia, wall_damping = wall_terms(heading, walls, p) if walls else (ca.SX(0), ca.SX(0))
+    motor = p["motor.torque_constant"] * current
+    gravity = -p["gravity.moment"] * ca.sin(heading - p["gravity.angle"])
+    sign, magnitude = ca.sign(rate), ca.fabs(rate)
+
+    def resistance(quadratic: ca.SX) -> ca.SX:
+        return friction(rate, p["friction.coulomb"], p["friction.viscous"] + wall_damping, quadratic)
+
+    speeding = motor + gravity - resistance(p["friction.quadratic"])
+    # The body accelerates if it does so with the coefficients of accelerating. Where it would brake with these and
+    # accelerate with those of braking, it does neither.
+    accelerates = sign * speeding >= 0
+    slowing = motor + gravity - resistance(p["friction.quadratic_braking"])
+    slowing = sign * ca.fmin(0, sign * slowing)
+    moment = ca.if_else(accelerates, speeding, slowing)
+    rated = ca.if_else(accelerates, p["added.inertia_accelerating"], p["added.inertia_braking"])
+    # |w|^1.5, written so that its derivative at rest is finite.
+    total = p["body.inertia"] + p["added.inertia"] + wall_inertia + rated * magnitude * ca.sqrt(magnitude + 1e-12)
+    resisting = ca.if_else(
+        accelerates, resistance(p["friction.quadratic"]), resistance(p["friction.quadratic_braking"])
+    )
+    return (
+        Quantity(name="moment.motor", unit="N.m", description="Moment of the motor, + clockwise", value=motor),
+        Quantity(name="moment.gravity", unit="N.m", description="Moment of gravity, + clockwise", value=gravity),
+        Quantity(
+            name="moment.resistance",
+            unit="N.m",
+            description="Moment of friction and water, + when it acts counterclockwise",
+            value=resisting,
+        ),
+        Quantity(
+            name="motion.rdot",
+            unit="rad/s2",
+            description="Yaw acceleration, + clockwise",
+            nominal=0.1,
+            value=moment / total,
+        ),
+    )
+
+
+_BOUNDS: dict[str, tuple[float | None, float | None]] = {
+    "body.inertia": (0.0, None),
+    "motor.lag": (1e-3, 1e3),
+    "motor.max_current": (0.0, None),
+    "encoder.pulses": (4.0, 1e9),
+}
+"""Where a parameter means something, if not everywhere."""
+
+
+def _parameters(rig: YawRig) -> tuple[Parameter, ...]:
+    inertia, friction_unit = "kg.m2", "Moment of friction and water that "
+    rows = [
+        ("body.inertia", inertia, rig.inertia_kgm2, "Yaw inertia of the body with the rotor"),
+        ("added.inertia", inertia, rig.added_inertia_kgm2, "Added yaw inertia lambda_661; 0 in air"),
+        ("added.inertia_accelerating", inertia, rig.inertia_accelerating_kgm2, "Further, at 1 rad/s, accelerating"),
+        ("added.inertia_braking", inertia, rig.inertia_braking_kgm2, "Further, at 1 rad/s, braking"),
+        ("friction.coulomb", "N.m", rig.coulomb_Nm, friction_unit + "does not depend on the rate"),
+        ("friction.viscous", "N.m.s", rig.viscous_Nms, friction_unit + "is proportional to the rate"),
+        ("friction.quadratic", "N.m.s2", rig.quadratic_Nms2, friction_unit + "grows as its square, accelerating"),
+        ("friction.quadratic_braking", "N.m.s2", rig.quadratic_braking, "The same, braking"),
+        ("motor.torque_constant", "N.m/A", rig.torque_constant_NmpA, "Moment of the motor per current"),
+        ("motor.lag", "s", rig.current_lag_s, "Time constant of the current loop"),
+        ("motor.max_current", "A", rig.max_current_A, "Largest current asked of the motor"),
+        ("gravity.moment", "N.m", rig.gravity_Nm, "Largest moment of gravity"),
+        ("gravity.angle", "rad", rig.gravity_angle_rad, "Heading at which the body hangs at rest"),
+        ("encoder.pulses", "1", rig.pulses_per_turn, "Pulses of the encoder per turn"),
+    ]
+    rows += _wall_rows(rig.walls) if rig.walls else []
+    starts = [("initial.psi", "rad", "Yaw angle at the beginning"), ("initial.r", "rad/s", "Yaw rate at the beginning")]
+    return (
+        *(
+            Parameter(
+                name=name,
+                unit=unit,
+                start=start,
+                nominal=abs(start) or 1.0,
+                description=description,
+                minimum=_BOUNDS.get(name, (None, None))[0],
+                maximum=_BOUNDS.get(name, (None, None))[1],
+            )
+            for name, unit, start, description in rows
+        ),
+        *(Parameter(name=n, unit=unit, start=0.0, tunable=False, description=text) for n, unit, text in starts),
+    )
+
+
+def _wall_rows(walls: TankWalls) -> list[tuple[str, str, float, str]]:
+    return [
+        ("wall.bow_inertia", "kg.m2", walls.bow_inertia_kgm2, "Added inertia by the wall at the bow"),
+        ("wall.stern_inertia", "kg.m2", walls.stern_inertia_kgm2, "Added inertia by the wall at the stern"),
+        ("wall.bow_damping", "N.m.s", walls.bow_damping_Nms, "Damping by the wall at the bow"),
+        ("wall.stern_damping", "N.m.s", walls.stern_damping_Nms, "Damping by the wall at the stern"),
+    ]

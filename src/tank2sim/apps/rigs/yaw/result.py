@@ -1,0 +1,319 @@
+"""Result of ``yaw``: added yaw inertia and dissipation of a body on the yaw rig, by method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.apps.rigs.yaw.card import YawRigCard
+from tank2sim.apps.rigs.yaw.charts import (
+    angle_residual_chart,
+    balance_chart,
+    energy_residual_chart,
+    estimates_chart,
+    record_chart,
+)
+from tank2sim.apps.rigs.yaw.found_card import (
+    BEST,
+    body_length,
+    known_added_inertia,
+    nrdot_prime,
+    rig_card_text,
+    tank_density,
+    with_nrdot,
+)
+from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, YawIdentification
+from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
+from tank2sim.apps.rigs.yaw.study import YawMethodEstimate, YawStudy
+from tank2sim.cards import Card, parse_card
+from tank2sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_HOW = {
+    "energy_least_squares": "all subintervals, measured speeds, the programme for instruments",
+    "as_many_equations": "as many equations as unknowns: an interval, and sums over three parts",
+    "two_intervals": "an accelerating and a braking interval, measured speeds",
+    "output_error": "equation of motion integrated, fitted to the angle",
+    "energy_least_squares_reference": "all subintervals, the programme's speeds",
+    "two_intervals_reference": "an accelerating and a braking interval, the programme's speeds",
+}
+_ESTIMATES = (
+    "Inertia and dissipation of one accelerating interval. Bars are 95 % intervals of scatter; they do not contain a "
+    "bias that is the same in every pair of intervals."
+)
+_BALANCE = (
+    "Over each part of the intervals the work of the motor is kinetic energy plus the work of friction and water."
+)
+_ANGLE = (
+    "The equation of motion is integrated under the recorded current, each hump from its own start; the recorded angle "
+    "is subtracted."
+)
+_UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class YawResult(Result[YawStudy]):
+    """Added yaw inertia and dissipation of a body on the yaw rig, SI.
+
+    Parameters
+    ----------
+    study : YawStudy
+    method : str
+        Method whose numbers a card gets.
+    identification : YawIdentification, optional
+        None if the result was read from its JSON.
+    rig : YawRigCard, optional
+        What is known of the rig.
+    """
+
+    study: YawStudy
+    method: str = BEST
+    identification: YawIdentification | None = None
+    rig: YawRigCard | None = None
+    command: ClassVar[str] = "yaw"
+
+    @property
+    def _identified(self) -> YawIdentification:
+        if self.identification is None:
+            raise InputError(self.study.records[0], "", "was not read with this result", "evaluate the records again")
+        return self.identification
+
+    def _known_method(self) -> str:
+        if self.method not in self.study.methods:
+            problem = f"{self.method} gave no estimate from these records"
+            raise InputError("--method", "", problem, f"take one of {', '.join(self.study.methods)}")
+        return self.method
+
+    @property
+    def estimates(self) -> pd.DataFrame:
+        """Estimates by method (index) with their standard errors: inertias in kg m2, dissipation B + D in J.
+
+        ``added_inertia_kgm2`` is missing where J_zz is not known; ``total_inertia_kgm2`` is J_zz + lambda661.
+        """
+        import pandas as pd
+
+        columns = [
+            f"{name}{error}_{unit}"
+            for name, unit in (("added_inertia", "kgm2"), ("total_inertia", "kgm2"), ("dissipation", "J"))
+            for error in ("", "_standard_error")
+        ]
+        rows = [
+            (method, *(getattr(found, column) for column in columns)) for method, found in self.study.methods.items()
+        ]
+        return pd.DataFrame(rows, columns=["method", *columns]).set_index("method")
+
+    @property
+    def added_inertia_kgm2(self) -> float | None:
+        """lambda661 by :attr:`method`; None where J_zz is not known."""
+        return self.study.methods[self._known_method()].added_inertia_kgm2
+
+    def nrdot(self, length_m: float | None = None) -> tuple[float, float | None]:
+        """N_rdot' (prime) of the body and its standard error.
+
+        Parameters
+        ----------
+        length_m : float, optional
+            Length of the body; by default as the records state.
+
+        Raises
+        ------
+        InputError
+            The added inertia or the length is not known, or the added inertia is negative.
+        """
+        found, method = self._identified, self._known_method()
+        known_added_inertia(found, method)  # before the length: without it no length helps
+        return nrdot_prime(found, method, body_length(found, length_m), tank_density(found))
+
+    def with_nrdot(self, card: Any, length_m: float | None = None) -> Any:
+        """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
+
+        Parameters
+        ----------
+        card : Ship, Card, str or path
+        length_m : float, optional
+            As in :meth:`nrdot`.
+
+        Raises
+        ------
+        InputError
+            As :meth:`nrdot`, or the card is not one of a ship that manoeuvres.
+        """
+        self.nrdot(length_m)
+        from tank2sim import Ship
+        from tank2sim.dynamics.vessel import as_vessel
+
+        ship, length = as_vessel(card).manoeuvring(), body_length(self._identified, length_m)
+        return Ship(with_nrdot(ship, self._identified, self._known_method(), length))
+
+    def rig_card(self, name: str = "yaw rig") -> Card:
+        """The card of the rig with its body, called `name`.
+
+        Raises
+        ------
+        InputError
+            The method gives no friction, or the added inertia is not known or negative.
+        """
+        found, method = self._identified, self._known_method()
+        source = f"tank2sim yaw {' '.join(record.path.name for record in found.records)}, method {method}"
+        known = self.rig.yaw_rig if self.rig else None
+        return parse_card(rig_card_text(found, method, name=name, source=source, known=known), "the card found")
+
+    @property
+    def title(self) -> str:
+        """What was done."""
+        return "Added yaw inertia by the energy method"
+
+    @property
+    def subtitle(self) -> str:
+        """Records, medium, torque constant and inertia of the body."""
+        study = self.study
+        names = ", ".join(PurePath(record).name for record in study.records)
+        body = ""
+        if study.body_inertia_kgm2 is not None:
+            body = f"; J_zz = {1e4 * study.body_inertia_kgm2:.5g}e-4 kg m2 ({study.body_inertia_source})"
+        return f"{names}: in {study.medium}, k_t = {study.torque_constant_NmpA:.4g} N m/A{body}"
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """The notes."""
+        return self.study.notes
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The inertia by the energy least squares, and the records."""
+        kind, inertia, error = self._best.inertia
+        shown = f"{1e4 * inertia:.4g}" if error is None else f"({1e4 * inertia:.4g} ± {1e4 * error:.2g})"
+        return (
+            f"The {kind} yaw inertia is {shown} · 10⁻⁴ kg m² by the energy least squares; ± is one standard error.",
+            f"{self.subtitle}.",
+        )
+
+    @property
+    def _best(self) -> YawMethodEstimate:
+        return self.study.methods[YAW_METHODS[0]]
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Inertia, dissipation, bias of the two-interval formula, mirror images."""
+        best = self._best
+        kind, inertia, error = best.inertia
+        bias = 100 * (self.study.methods["two_intervals"].bias_against_least_squares_kgm2 or 0.0)
+        bias /= best.total_inertia_kgm2
+        return [
+            KeyFigure(
+                label="Added yaw inertia" if kind == "added" else "Yaw inertia",
+                value=float(f"{1e4 * inertia:.5g}"),
+                unit="10⁻⁴ kg m²",
+                note="energy least squares" + (f", ± {1e4 * error:.2g}" if error is not None else ""),
+            ),
+            KeyFigure(
+                label="Dissipation B + D",
+                value=float(f"{1e4 * best.dissipation_J:.4g}"),
+                unit="10⁻⁴ J",
+                note=f"± {1e4 * (best.dissipation_standard_error_J or 0):.2g}",
+            ),
+            KeyFigure(
+                label="Bias of the two-interval formula",
+                value=float(f"{bias:.2g}"),
+                unit="%",
+                note="of the total inertia",
+                verdict=Verdict.CAUTION if abs(bias) > 1 else Verdict.NONE,
+            ),
+            KeyFigure(
+                label="Mirror images differ by",
+                value=float(f"{100 * max(self.study.mirror_difference):.3g}"),
+                unit="%",
+                note="of the largest rate, in the worst pair",
+            ),
+        ]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Estimates, energy balance, records, residuals, theory."""
+        study = self.study
+        estimates = _chart(estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
+        balance = _chart(balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance")
+        residuals = _chart(energy_residual_chart(study.energy_residuals), "", "energy_balance")
+        records = [
+            _chart(record_chart(name, columns), "", "record_and_programme") for name, columns in study.histories.items()
+        ]
+        sections = [
+            Section(
+                heading="Estimates by method", text=_ESTIMATES, tables=[_estimates(study.methods)], charts=[estimates]
+            ),
+            Section(
+                heading="Energy balance", text=_BALANCE, tables=[_friction(study.methods)], charts=[balance, residuals]
+            ),
+            Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
+        ]
+        if study.angle_residual is not None:
+            chart = _chart(angle_residual_chart(study.angle_residual), "", "nonlinear_least_squares")
+            sections.append(Section(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
+        if study.theory:
+            rows: list[list[Cell]] = [
+                [value.formula, 1e4 * value.value_kgm2, _scaled(value.printed_kgm2), value.remark]
+                for value in study.theory
+            ]
+            heads = ("formula", "added inertia (10⁻⁴ kg m²)", "published, Table 1 (10⁻⁴ kg m²)", "remark")
+            caption = "Added inertia from the form, by (7), (8) and (9) of Alyshev (2019)"
+            sections.append(Section(heading="Theory", tables=[table(caption, heads, rows, digits=5)]))
+        return sections
+
+
+def _chart(chart: Any, caption: str, name: str) -> Illustration:
+    return Illustration(chart=chart, caption=caption, name=name)
+
+
+def _scaled(value: float | None) -> float | None:
+    """A value in 10⁻⁴ of its unit."""
+    return None if value is None else 1e4 * value
+
+
+def _estimates(methods: Mapping[str, YawMethodEstimate]) -> Table:
+    rows: list[list[Cell]] = [
+        [
+            method.replace("_", " "),
+            _scaled(found.added_inertia_kgm2),
+            _scaled(found.added_inertia_standard_error_kgm2),
+            _scaled(found.total_inertia_kgm2),
+            _scaled(found.dissipation_J),
+            _scaled(found.dissipation_standard_error_J),
+            _scaled(found.bias_against_least_squares_kgm2),
+        ]
+        for method, found in methods.items()
+    ]
+    columns = [
+        Column(title="method"),
+        Column(title="added inertia", unit="10⁻⁴ kg m²", digits=5),
+        Column(title="±", digits=3),
+        Column(title="total inertia", unit="10⁻⁴ kg m²", digits=5),
+        Column(title="B + D", unit="10⁻⁴ J"),
+        Column(title="±", digits=3),
+        Column(title="bias", unit="10⁻⁴ kg m²", digits=3),
+    ]
+    notes = [f"{method.replace('_', ' ')}: {_HOW[method]}." for method in methods]
+    return table("Estimates with standard errors", columns, rows, *notes, folded=True)
+
+
+def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
+    """A row for each term, a column for each method that gives it."""
+    given = {name: found for name, found in methods.items() if found.friction}
+    terms = dict.fromkeys(term for found in given.values() for term in found.friction)
+    rows: list[list[Cell]] = []
+    for term in terms:
+        unit = next(unit for name, (_, unit) in ENERGY_TERMS.items() if term == f"{name}_{unit}")
+        cells: list[Cell] = []
+        for found in given.values():
+            value, error = _scaled(found.friction.get(term)), found.friction_standard_errors.get(term)
+            shown = None if value is None else format_number(value)
+            cells.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
+        rows.append([term.removesuffix(f"_{unit}").replace("_", " "), _UNITS[unit], *cells])
+    heads = ("term", "unit", *(name.replace("_", " ") for name in given))
+    return table("Friction and water, times 10⁴", heads, rows, folded=True)

@@ -1,0 +1,268 @@
+"""Study of records of the yaw rig: estimates by method, theory, and the data of the charts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tank2sim.apps.rigs.yaw.energy import EnergyFit
+from tank2sim.apps.rigs.yaw.identify import YawIdentification
+from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
+from tank2sim.apps.rigs.yaw.output_error import AngleFit
+from tank2sim.apps.rigs.yaw.records import YawRecord
+from tank2sim.apps.rigs.yaw.theory import TheoryValue
+from tank2sim.arrays import Array, Columns
+from tank2sim.records.thinning import drawn_columns
+
+_HISTORY_SAMPLES = 900
+"""Samples of a record, enough to show each peak of its signals."""
+
+STAGES = ("accelerating", "braking")
+
+
+@dataclass(frozen=True, kw_only=True)
+class YawMethodEstimate:
+    """Estimates by one method, SI.
+
+    Parameters
+    ----------
+    added_inertia_kgm2, added_inertia_standard_error_kgm2 : float, optional
+        lambda661; None where J_zz is not known.
+    total_inertia_kgm2, total_inertia_standard_error_kgm2 : float
+        J_zz + lambda661 (in air J_zz); no error where the data do not determine it.
+    dissipation_J, dissipation_standard_error_J : float
+        B + D over one interval.
+    friction, friction_standard_errors : dict
+        Term of friction and water with its unit (``coulomb_Nm``) to its value and standard error; empty for a method
+        that does not estimate them.
+    bias_against_least_squares_kgm2 : float, optional
+        Difference of a two-interval formula from the energy least squares of the same records.
+    bias_from_kgm2 : dict
+        Parts of the bias: ``dissipation`` (different in both intervals) and ``speeds`` (w1, w2 differ from w6, w5).
+    total_inertia_by_hump_kgm2 : tuple of float
+        J_zz + lambda661 of each pair of intervals by a two-interval formula, of which the estimate is the mean.
+    """
+
+    added_inertia_kgm2: float | None
+    added_inertia_standard_error_kgm2: float | None
+    total_inertia_kgm2: float
+    total_inertia_standard_error_kgm2: float | None
+    dissipation_J: float
+    dissipation_standard_error_J: float | None
+    friction: dict[str, float]
+    friction_standard_errors: dict[str, float | None]
+    bias_against_least_squares_kgm2: float | None
+    bias_from_kgm2: dict[str, float]
+    total_inertia_by_hump_kgm2: tuple[float, ...]
+
+    @property
+    def inertia(self) -> tuple[str, float, float | None]:
+        """``added`` or, where J_zz is not known, ``total``; that inertia and its standard error, kg m2."""
+        if self.added_inertia_kgm2 is None:
+            return "total", self.total_inertia_kgm2, self.total_inertia_standard_error_kgm2
+        return "added", self.added_inertia_kgm2, self.added_inertia_standard_error_kgm2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnergyBalance:
+    """Work in the parts of the intervals, J: means over all pairs, in order of time.
+
+    Parameters
+    ----------
+    motor_J : dict
+        Stage (:data:`STAGES`) to the work of the motor (parts,).
+    spent_J : dict
+        Term to stage to the work that it takes (parts,).
+    """
+
+    motor_J: dict[str, Array]
+    spent_J: dict[str, dict[str, Array]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyResidual:
+    """Residual work of a subinterval, J, with its stage, hump and mean rate."""
+
+    stage: str
+    hump: int
+    rate_degps: float
+    left_J: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class YawEstimates:
+    """Estimates of a body from records of one medium.
+
+    Parameters
+    ----------
+    records : tuple of str
+        Files.
+    medium : str
+        ``water`` or ``air``.
+    torque_constant_NmpA : float
+    body_inertia_kgm2, body_inertia_standard_error_kgm2, body_inertia_source
+        J_zz, its standard error and its source; None where it is not known, and in air, where it is estimated.
+    added_inertia_kgm2, dissipation_J : dict
+        Method to lambda661 (None where J_zz is not known), and to B + D.
+    methods : dict
+        Method to all its estimates.
+    mirror_difference : tuple of float
+        Difference of the rates of each pair of mirror images, over the largest.
+    histories : dict
+        Record to its columns, to draw.
+    energy_balance : EnergyBalance
+    energy_residuals : tuple of EnergyResidual
+    angle_residual : dict, optional
+        ``t_s`` and ``residual_rad`` of the nonlinear least squares, where they converged.
+    notes : tuple of str
+    """
+
+    records: tuple[str, ...]
+    medium: str
+    torque_constant_NmpA: float
+    body_inertia_kgm2: float | None
+    body_inertia_standard_error_kgm2: float | None
+    body_inertia_source: str | None
+    added_inertia_kgm2: dict[str, float | None]
+    dissipation_J: dict[str, float]
+    methods: dict[str, YawMethodEstimate]
+    mirror_difference: tuple[float, ...]
+    histories: dict[str, Columns]
+    energy_balance: EnergyBalance
+    energy_residuals: tuple[EnergyResidual, ...]
+    angle_residual: Columns | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class YawStudy(YawEstimates):
+    """Estimates of a body; :class:`YawEstimates` has the other parameters.
+
+    Parameters
+    ----------
+    air : YawEstimates, optional
+        Estimates from records in air, if there are records in water as well.
+    theory : tuple of TheoryValue
+        Added inertia from the form of the body.
+    """
+
+    air: YawEstimates | None
+    theory: tuple[TheoryValue, ...]
+
+
+def study_yaw(identified: YawIdentification, theory: Sequence[TheoryValue] = ()) -> YawStudy:
+    """The study of an identification."""
+    air = YawEstimates(**_estimates(identified.air)) if identified.air else None
+    return YawStudy(**_estimates(identified), air=air, theory=tuple(theory))
+
+
+def _estimates(identified: YawIdentification) -> dict[str, Any]:
+    """Fields of :class:`YawEstimates`."""
+    methods = {name: _method(identified, name) for name in identified.estimates}
+    body = identified.body
+    return {
+        "records": tuple(str(record.path) for record in identified.records),
+        "medium": identified.medium,
+        "torque_constant_NmpA": identified.torque_constant_NmpA,
+        "body_inertia_kgm2": body.value_kgm2 if body else None,
+        "body_inertia_standard_error_kgm2": body.error_kgm2 if body else None,
+        "body_inertia_source": body.source if body else None,
+        "added_inertia_kgm2": {name: found.added_inertia_kgm2 for name, found in methods.items()},
+        "dissipation_J": {name: found.dissipation_J for name, found in methods.items()},
+        "methods": methods,
+        "mirror_difference": identified.mirror,
+        "histories": record_histories(identified.records, identified.fit),
+        "energy_balance": energy_balance_means(identified.fit),
+        "energy_residuals": _residuals(identified.fit),
+        "angle_residual": _angle_residual(identified.angle),
+        "notes": identified.notes,
+    }
+
+
+def _method(identified: YawIdentification, method: str) -> YawMethodEstimate:
+    estimate = identified.estimates[method]
+    added, error = identified.added_inertia(method) or (None, None)
+    friction = {f"{term}_{ENERGY_TERMS[term][1]}": found for term, found in estimate.friction.items()}
+    return YawMethodEstimate(
+        added_inertia_kgm2=added,
+        added_inertia_standard_error_kgm2=error,
+        total_inertia_kgm2=estimate.total_inertia_kgm2,
+        total_inertia_standard_error_kgm2=estimate.inertia_error_kgm2,
+        dissipation_J=estimate.dissipation_J,
+        dissipation_standard_error_J=estimate.dissipation_error_J,
+        friction={name: value for name, (value, _) in friction.items()},
+        friction_standard_errors={name: error for name, (_, error) in friction.items()},
+        bias_against_least_squares_kgm2=estimate.bias_kgm2,
+        bias_from_kgm2=dict(estimate.bias_from),
+        total_inertia_by_hump_kgm2=estimate.by_hump_kgm2,
+    )
+
+
+def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, Columns]:
+    """Record name to histories: evaluated rate, rate of the programme, tracking error and current."""
+    found, before = {}, 0
+    for record in records:
+        programme, time = record.programme, record.time_s
+        reference = programme.at(time)
+        rate = np.full(len(time), np.nan)
+        for pair in fit.balance.pairs[before : before + programme.humps]:
+            for interval in pair:
+                inside = (time >= interval.time_s[0]) & (time <= interval.time_s[-1])
+                rate[inside] = np.interp(time[inside], interval.time_s, interval.rate_radps)
+        before += programme.humps
+        offset = record.angle_rad[0] - float(programme.at(time[:1]).angle_rad[0])
+        columns = {
+            "t_s": time,
+            "rate_radps": rate,
+            "programme_rate_radps": reference.rate_radps,
+            "tracking_error_rad": reference.angle_rad + offset - record.angle_rad,
+            "current_A": record.current_A,
+        }
+        found[record.path.name] = drawn_columns(columns, _HISTORY_SAMPLES, peaks=True)
+    return found
+
+
+def energy_balance_means(fit: EnergyFit) -> EnergyBalance:
+    """Work of the motor and of each term in each part of the intervals, means over all pairs."""
+    balance = fit.balance
+    shape = (len(balance.pairs), 2, balance.parts)
+    # Braking parts are numbered as mirror images.
+    order = (slice(None), slice(None, None, -1))
+
+    def stages(values: Array) -> dict[str, Array]:
+        mean = values.reshape(shape).mean(axis=0)
+        return {name: mean[place][order[place]] for place, name in enumerate(STAGES)}
+
+    spent = balance.rows * fit.coefficients
+    return EnergyBalance(
+        motor_J=stages(balance.work_J),
+        spent_J={term: stages(spent[:, column]) for column, term in enumerate(balance.terms)},
+    )
+
+
+def _residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
+    balance, residuals = fit.balance, iter(fit.residuals_J.tolist())
+    return tuple(
+        EnergyResidual(
+            stage=STAGES[interval.braking],
+            hump=interval.number + 1,
+            rate_degps=float(np.degrees(np.mean(interval.part(part, balance.parts).rate_radps))),
+            left_J=next(residuals),
+        )
+        for pair in balance.pairs
+        for interval in pair
+        for part in range(balance.parts)
+    )
+
+
+def _angle_residual(angle: AngleFit | None) -> Columns | None:
+    """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
+    if angle is None:
+        return None
+    time, residual = angle.time_s, angle.residual_rad
+    breaks = np.flatnonzero(np.abs(np.diff(time)) > 1.0) + 1
+    time = np.insert(time, breaks, time[breaks - 1] + 0.01)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual, breaks, np.nan)}, peaks=True)

@@ -1,0 +1,1 @@
+"""Statistics, spectra and filters of a record."""

@@ -1,0 +1,131 @@
+"""A page in which a ship is steered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tank2sim.apps.steering.result import SteeringPageResult, SteeringStudy
+from tank2sim.cards import CraftCard, ManoeuvringCard
+from tank2sim.dynamics.vessel import Vessel
+from tank2sim.errors import InputError
+
+if TYPE_CHECKING:
+    from tank2sim.apps.steering.ghost import Ghost
+    from tank2sim.apps.steering.page import PageShip
+    from tank2sim.apps.steering.scenario import Scenario
+    from tank2sim.dynamics.model import Model
+
+FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
+
+
+def make_steering_page(
+    ship: Vessel,
+    ghost: str | Path | None = None,
+    scenario: str | Path | None = None,
+    view_3d: bool = False,
+    report: Callable[[str], None] = lambda _: None,
+) -> SteeringPageResult:
+    """Make the page, without writing it. Raises as :meth:`.Ship.steering_page`.
+
+    Parameters
+    ----------
+    ship : Vessel
+    ghost : path, optional
+        A measured trial.
+    scenario : path or str, optional
+        GeoJSON file of the waters, or the name of bundled ones.
+    view_3d : bool
+        Whether the page has the view from the bridge.
+    report : callable
+        Called before what takes long.
+    """
+    from tank2sim.apps.steering import ship as page_ship
+    from tank2sim.apps.steering.ghost import ghost_of
+    from tank2sim.apps.steering.members import members_of
+    from tank2sim.apps.steering.scenario import read_scenario
+    from tank2sim.identification.trials.problem.prepare_trials import measured
+
+    card, model = ship.card, ship.model
+    if isinstance(card, CraftCard):
+        if ghost:
+            raise InputError(
+                "--ghost", "", "is a trial with a rudder, and a craft with thrusters has none", "leave it out"
+            )
+        waters = read_scenario(scenario) if scenario else None
+        in_page = _page_ship(card, model, _compiled(model, report))
+        return _result(in_page, None, model.notices, waters, view_3d)
+    if not isinstance(card, ManoeuvringCard):
+        raise InputError(
+            card.source,
+            "",
+            "has no rudder",
+            "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered",
+        )
+    if ghost and scenario:
+        raise InputError("--scenario", "", "goes not with --ghost", "both say where the ship starts: leave one out")
+    waters = read_scenario(scenario) if scenario else None
+    trial = measured([Path(ghost)], card) if ghost else None
+    shown = ghost_of(trial.trials[0], model) if trial else None
+    if shown and shown.by_angle:
+        model = page_ship.ship_following_angle(model)
+    model, autopilot, no_autopilot = _with_autopilot(model)
+    library = _compiled(model, report)
+    notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
+    members = members_of(card, model)
+    in_page = _page_ship(card, model, library, members=tuple(members), autopilot=autopilot)
+    return _result(in_page, shown, notices, waters, view_3d)
+
+
+def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, library: str, **more: Any) -> PageShip:
+    from tank2sim.apps.steering.page import PageShip
+
+    known = {"members": (), "autopilot": ""} | more
+    return PageShip(model=model, library=library, beam_m=card.ship.beam_m, draught_m=card.ship.draught_m, **known)
+
+
+def _result(
+    ship: PageShip, ghost: Ghost | None, notices: Sequence[str], scenario: Scenario | None, view_3d: bool
+) -> SteeringPageResult:
+    from tank2sim.apps.steering.page import steering_page
+
+    said = tuple(dict.fromkeys(notices))
+    html = steering_page(ship, ghost, said, scenario, view_3d)
+    study = SteeringStudy(
+        ship=ship.model.name,
+        ghost=ghost.label if ghost else None,
+        steerable=True,
+        members=len(ship.members),
+        autopilot=ship.autopilot or None,
+        scenario=scenario.name if scenario else None,
+        page_kB=len(html.encode()) / 1e3,
+        notices=said,
+    )
+    return SteeringPageResult(study, html)
+
+
+def _compiled(model: Model, report: Callable[[str], None]) -> str:
+    """The library of a model. Raises InputError without the compiler for WebAssembly."""
+    from tank2sim.apps.steering import ship as page_ship
+    from tank2sim.native.cross import has_compiled
+
+    if not page_ship.has_compiler():
+        problem = "needs a compiler for WebAssembly, which is not installed: without it no ship is in the page"
+        raise InputError("steer", "", problem, "pip install tank2sim[platforms], and write the page again")
+    if not has_compiled(page_ship.WEB):
+        report(FIRST_COMPILATION)
+    return page_ship.ship_in_page(model)
+
+
+def _with_autopilot(model: Model) -> tuple[Model, str, tuple[str, ...]]:
+    """The model with the autopilot of the command ``autopilot`` (PID), how it was designed, and a notice without it."""
+    from tank2sim.analysis.heading.designs import design_heading
+    from tank2sim.dynamics.autopilot_loop import ship_steered_by_either
+
+    try:
+        design = design_heading(model)
+    except InputError as error:
+        return model, "", (f"no autopilot: {error.problem}",)
+    gains = ", ".join(f"{name} {value:.3g}" for name, value in design.gains.items())
+    return ship_steered_by_either(model, design.autopilot), f"{design.source}: {gains}", ()

@@ -1,0 +1,344 @@
+"""The page one steers on: the ship itself in it, rudder and engine, its track, and a measured trial as a ghost."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from tank2sim.answer.page import resource_text
+from tank2sim.apps.steering.ghost import Ghost
+from tank2sim.apps.steering.members import NO_COVARIANCE
+from tank2sim.apps.steering.scenario import Scenario
+from tank2sim.apps.steering.ship import (
+    TOKEN,
+    Control,
+    controls,
+    levers_of,
+    references,
+    shown_in,
+    telegraph_of,
+    thrusters_of,
+)
+from tank2sim.dynamics.model import Input, Model, Parameter
+from tank2sim.errors import InputError
+from tank2sim.escaping import json_in_html
+from tank2sim.fmu.interface import interface
+from tank2sim.version import __version__
+
+LONGEST_ZIGZAG = 150.0
+"""A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
+
+HISTORY = 25.0
+"""Ship lengths that the chart over time shows at first, rounded to :data:`_WINDOWS`. Project choice."""
+
+_WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
+"""Stretches of time, s, that the chart over time may show: round ones, project choice."""
+
+FASTEST_APPROACH = 2.0
+"""Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
+
+SHIP_PREDICTED_S = (60, 120, 180, 240, 300, 360), 180
+"""Times ahead that the page of a ship predicts, and the one at first, s. Project choice."""
+
+CRAFT_PREDICTED_S = (5, 10, 20, 30, 60, 120), 10
+"""The same of a craft with thrusters, which comes through several of its lengths in seconds. Project choice."""
+
+OUTLINES_S, CRAFT_OUTLINES_S = 60, 5
+"""Time between outlines on the predicted curve, s. Project choice."""
+
+PACE, CRAFT_PACE = 5, 1
+"""Times real time of the page at first: a ship takes minutes to answer. Project choice."""
+
+CRAFT_ZIGZAG = 0.25
+"""Difference of revolutions of the zigzag that the page of a craft offers, over the largest. Project choice."""
+
+_TURNING = (10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 600.0, 1200.0, 1800.0)
+"""Ends of the dial of the rate of turn, deg/min, of a craft deg/s: round ones, project choice."""
+
+_USUAL_TURNING = 0.5
+"""Yaw rate in ship lengths, r L/u0, that the dial shows at first: a hard turn of most ships. Project choice."""
+
+_CRAFT_UNITS = {"knots": "m/s", "deg/min": "deg/s"}
+"""Units of a craft in place of those of a ship."""
+
+_DIALS = ("motion.psi", "motion.r", "rudder.angle")
+"""Signals with an instrument of their own."""
+
+_SCRIPTS = tuple(
+    f"{name}.js"
+    for name in (
+        *("ship", "levers", "voyage", "trial", "attempt", "score", "helm", "words"),
+        *("pen", "view", "waters", "track", "history", "instruments", "telegraph", "gamepad", "page"),
+    )
+)
+_VIEW_3D = ("three.min.js", "view3d.js")
+"""three.js (MIT licence, ``three.LICENSE``), and what is seen from the bridge with it. Its release 149 is the last with
+a single file that a plain script element takes without a warning."""
+
+_BEAM = 1 / 7
+"""Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
+
+# signal, what it is called, unit it is shown in, decimals
+_READOUTS = (
+    ("motion.u", "Speed ahead", "knots", 2),
+    ("motion.sog", "Over ground", "knots", 2),
+    ("motion.psi", "Heading", "deg", 1),
+    ("motion.r", "Rate of turn", "deg/min", 1),
+    ("motion.beta", "Drift angle", "deg", 2),
+    ("rudder.angle", "Rudder", "deg", 1),
+    ("propeller.speed_actual", "Engine", "rpm", 1),
+    ("motion.phi", "Heel", "deg", 1),
+    ("validity", "Validity", "", 2),
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PageShip:
+    """What sails in a page.
+
+    Parameters
+    ----------
+    model : Model
+        A ship; for a ghost with a measured rudder angle that of
+        :func:`tank2sim.apps.steering.ship.ship_following_angle`.
+    library : str
+        Of :func:`tank2sim.apps.steering.ship.ship_in_page`.
+    members : sequence of mapping
+        Parameters by name of ships that are steered together with the card's (:mod:`.members`).
+    autopilot : str
+        How the autopilot in the model (:func:`tank2sim.dynamics.autopilot_loop.ship_steered_by_either`) was designed;
+        empty if there is none.
+    beam_m, draught_m : float, optional
+        Of the drawn hull, and of what goes aground; without them the hull has the beam of an ordinary merchant ship,
+        and no depth of a scenario holds it up.
+    """
+
+    model: Model
+    library: str
+    members: Sequence[Mapping[str, float]] = ()
+    autopilot: str = ""
+    beam_m: float | None = None
+    draught_m: float | None = None
+
+
+def steering_page(
+    ship: PageShip,
+    ghost: Ghost | None = None,
+    notices: Sequence[str] = (),
+    scenario: Scenario | None = None,
+    view_3d: bool = False,
+) -> str:
+    """The page as one HTML file.
+
+    Parameters
+    ----------
+    ship : PageShip
+    ghost : Ghost, optional
+        A measured trial.
+    notices : sequence of str
+        What the user should know.
+    scenario : Scenario, optional
+        Waters to steer in.
+    view_3d : bool
+        Whether the page has the view from the bridge.
+
+    Raises
+    ------
+    InputError
+        The model has no rudder.
+    """
+    model = ship.model
+    thrusters = thrusters_of(model)
+    if "rudder.command" not in model.input_names and not thrusters:
+        remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
+        raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    names = [thruster.name for thruster in thrusters]
+    found = _controls(model, ghost)
+    rudder = None if thrusters else found[0]
+    controls_left = found if thrusters else found[1:]
+    levers = levers_of(model)
+    engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
+    set_by_hand = [control for control in controls_left if control is not engine and control.name not in names]
+    environment.trim_blocks = environment.lstrip_blocks = True
+    return environment.get_template("steering/page.html.j2").render(
+        name=model.name,
+        description=model.description,
+        version=__version__,
+        notices=notices,
+        ghost=ghost,
+        controls=set_by_hand,
+        rudder=rudder,
+        engine=engine,
+        levers=levers,
+        thrusters=[control for control in found if control.name in names],
+        zigzag=round(CRAFT_ZIGZAG * (levers[1].maximum or 0.0), -1) if levers else 20,
+        zigzag_most=levers[1].maximum if levers else 89,
+        pace=CRAFT_PACE if levers else PACE,
+        speed_unit=_speed_unit(model),
+        turning_unit=_turning_unit(model),
+        approach=_approach(model, ghost, scenario),
+        windows=_windows(model),
+        telegraph=telegraph_of(model),
+        members=len(ship.members),
+        no_members=NO_COVARIANCE,
+        autopilot=ship.autopilot,
+        scenario=scenario,
+        ahead=_predicted(CRAFT_PREDICTED_S if levers else SHIP_PREDICTED_S),
+        dials=_DIALS,
+        readouts=_readouts(model),
+        fails="steering.failed" in model.input_names,
+        view_3d=view_3d,
+        style=Markup("".join(map(resource_text, _styles(view_3d)))),
+        script=Markup("\n".join(resource_text(f"apps/steering/{name}") for name in _scripts(view_3d))),
+        data=json_in_html(_data(ship, ghost, scenario)),
+    )
+
+
+def _styles(view_3d: bool) -> list[str]:
+    return ["answer/page.css", "apps/steering/page.css", *(["apps/steering/view3d.css"] if view_3d else [])]
+
+
+def _scripts(view_3d: bool) -> list[str]:
+    """The scripts in their order; the view from the bridge goes before the last, which makes the chart."""
+    *parts, page = _SCRIPTS
+    return [*parts, *(_VIEW_3D if view_3d else ()), page]
+
+
+def _data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
+    data = _ship_data(ship, ghost, scenario)
+    # Names the ship, the trial, the scenario and all that moves them: a link with an attempt is of this page alone.
+    return {**data, "id": hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:8]}
+
+
+def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
+    model = ship.model
+    length, speed = _start(model, "ship.length"), _start(model, "ship.speed")
+    gear = [math.degrees(parameter.start) for parameter in model.parameters if parameter.name == "steering.max_angle"]
+    return {
+        "name": model.name,
+        "library": ship.library,
+        "token": TOKEN,
+        "references": references(interface(model), {name for member in ship.members for name in member}),
+        "members": [dict(member) for member in ship.members],
+        "telegraph": [{"name": order.name, "value": order.value} for order in telegraph_of(model)],
+        "turning": _turning(shown_in(model["motion.r"], _turning_unit(model))[1] * _USUAL_TURNING * speed / length),
+        "thrusters": [dataclasses.asdict(thruster) for thruster in thrusters_of(model)],
+        "levers": [dataclasses.asdict(lever) for lever in levers_of(model)],
+        "largestRudder": (levers_of(model)[-1:] or _controls(model, ghost))[0].maximum,
+        "outlines": CRAFT_OUTLINES_S if thrusters_of(model) else OUTLINES_S,
+        "speed": speed,
+        "step": model.step_s,
+        "start": {"initial.u": _start(model, "initial.u")} | _begin(ghost, scenario),
+        "scenario": None if scenario is None else scenario.as_data(),
+        "length": length,
+        "beam": ship.beam_m or length * _BEAM,
+        "draught": ship.draught_m,
+        "longest": LONGEST_ZIGZAG * length / speed,
+        "stop": gear[0] if gear else None,
+        "speeds": {"unit": _speed_unit(model), "factor": shown_in(model["initial.u"], _speed_unit(model))[1]}
+        | {"digits": 2 if thrusters_of(model) else 1},
+        "controls": [dataclasses.asdict(control) for control in _controls(model, ghost)],
+        "readouts": _readouts(model),
+        "ghost": None if ghost is None else {"label": ghost.label, "angle": ghost.by_angle, **_series(ghost)},
+    }
+
+
+def _begin(ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
+    """Start of the ship by parameter: that of a measured trial, or of a scenario."""
+    if scenario is not None:
+        speed = {} if scenario.speed is None else {"initial.u": scenario.speed}
+        return {"initial.psi": scenario.heading, **speed}
+    return dict(ghost.start) if ghost else {}
+
+
+def _controls(model: Model, ghost: Ghost | None) -> list[Control]:
+    """What the user sets: at first as the card has it, or as the trial was."""
+    held = ghost.held if ghost else {}
+    return [dataclasses.replace(control, start=held.get(control.name, control.start)) for control in controls(model)]
+
+
+def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
+    """Stretches that the chart over time may show (s, in words), and the one at first, s."""
+    wanted = HISTORY * _start(model, "ship.length") / _start(model, "ship.speed")
+    place = min(range(1, len(_WINDOWS) - 2), key=lambda index: abs(math.log(_WINDOWS[index] / wanted)))
+    shown = _WINDOWS[place - 1 : place + 3]
+    return [(index, f"{index} s" if index < 120 else f"{index / 60:g} min") for index in shown], _WINDOWS[place]
+
+
+def _predicted(times: tuple[Sequence[int], int]) -> tuple[list[tuple[int, str]], int]:
+    """Times ahead that the page predicts (s, in words), and the one at first, s."""
+    offered, first = times
+    return [(one, f"{one} s" if one < 60 else f"{one / 60:g} min") for one in offered], first
+
+
+def _speed_unit(model: Model) -> str:
+    return _CRAFT_UNITS["knots"] if thrusters_of(model) else "knots"
+
+
+def _turning_unit(model: Model) -> str:
+    return _CRAFT_UNITS["deg/min"] if thrusters_of(model) else "deg/min"
+
+
+def _turning(usual: float) -> list[float]:
+    """Ends of the dial of the rate of turn from the one that holds a usual rate on, deg/min, of a craft deg/s."""
+    return [end for end in _TURNING if end >= usual] or [_TURNING[-1]]
+
+
+def _series(ghost: Ghost) -> dict[str, list[float | None]]:
+    columns = {
+        "t": ghost.time_s,
+        "x": ghost.x_m,
+        "y": ghost.y_m,
+        "psi": ghost.psi_rad,
+        "rudder": ghost.rudder_rad,
+        "engine": ghost.rpm_radps,
+    }
+    return {
+        name: [float(f"{value:.9g}") if math.isfinite(value) else None for value in values]
+        for name, values in columns.items()
+    }
+
+
+def _readouts(model: Model) -> list[dict[str, Any]]:
+    names = {*model.outputs, *model.state_names, *model.input_names}
+    thrusters = thrusters_of(model)
+    units = _CRAFT_UNITS if thrusters else {}
+    wanted = [*_READOUTS]
+    for thruster in thrusters:
+        prefix = thruster.name.removesuffix(".command")
+        wanted += [
+            (f"{prefix}.speed", thruster.label, "rpm", 0),
+            (f"{prefix}.thrust", f"{thruster.label} thrust", "N", 0),
+        ]
+    return [
+        {"name": name, "label": label, "unit": shown, "digits": digits, "factor": shown_in(model[name], shown)[1]}
+        for name, label, unit, digits in wanted
+        for shown in [units.get(unit, unit)]
+        if name in names
+    ]
+
+
+def _approach(model: Model, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
+    """Approach speed of the trial or the scenario, else of the card, and its bounds, knots, of a craft m/s."""
+    factor = shown_in(model["initial.u"], _speed_unit(model))[1]
+    measured = _begin(ghost, scenario).get("initial.u")
+    speed = _start(model, "initial.u") if measured is None else measured
+    fastest = max(FASTEST_APPROACH * _start(model, "ship.fastest"), speed)
+    return {"value": speed * factor, "minimum": min(0.0, speed * factor), "maximum": fastest * factor}
+
+
+def _start(model: Model, name: str) -> float:
+    variable = model[name]
+    assert isinstance(variable, Parameter | Input)
+    return float(variable.start)

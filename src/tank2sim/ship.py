@@ -1,0 +1,656 @@
+"""Ships: a card and its model, with everything that can be asked of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
+
+import numpy as np
+
+from tank2sim.api.autopilot import autopilot
+from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.arguments import (
+    AngleArgument,
+    EnsembleSize,
+    NumberArgument,
+    PositiveArgument,
+    Seed,
+    SpeedArgument,
+    TuningRange,
+    checked,
+)
+from tank2sim.arrays import Array
+from tank2sim.cards import CraftCard, read_card
+from tank2sim.dynamics.vessel import Vessel
+from tank2sim.errors import InputError, close_name
+from tank2sim.executors import PROCESSES
+from tank2sim.files import write_together
+from tank2sim.units import to_si
+
+if TYPE_CHECKING:
+    import control
+    import pandas as pd
+
+    from tank2sim.answer.result import Result
+    from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
+    from tank2sim.apps.rigs.glider.programme import GlideProgramme
+    from tank2sim.apps.rigs.glider.result import GlideResult
+    from tank2sim.apps.steering.result import SteeringPageResult
+    from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
+    from tank2sim.results.craft_stability import CraftStabilityResult
+    from tank2sim.results.fmu import ExportResult
+    from tank2sim.results.influence import InfluenceResult, TuningResult
+    from tank2sim.results.manoeuvre import ManoeuvreResult
+    from tank2sim.results.stability import StabilityResult
+    from tank2sim.simulation.manoeuvres import Manoeuvre
+
+
+AnyResult = TypeVar("AnyResult", bound="Result[Any]")
+
+
+class SimulationOptions(TypedDict, total=False):
+    """Options of every simulated manoeuvre; see :meth:`Ship.simulate`."""
+
+    duration_s: float | None
+    members: EnsembleSize
+    seed: Seed
+    executor: str
+
+
+class Ship(Vessel):
+    """A ship (or another body) as its card describes it.
+
+    Angles are in degrees, speeds in m/s, revolutions in rpm, times in s; rudder, drift and turns are positive to
+    starboard. :func:`load` gives one; a card that was identified or reduced has one, too.
+
+    Parameters
+    ----------
+    card : Card
+        What is known of the ship, SI and radians.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> ship = t2s.load("mariner")
+    >>> round(ship.turn(35).figures["tactical_diameter_lengths"], 1)
+    6.4
+    """
+
+    @checked
+    def with_waves(
+        self,
+        mesh: str | Path,
+        *,
+        metacentric_height_m: float | None = None,
+        roll_gyradius_m: float | None = None,
+        roll_damping: float | None = None,
+        frequencies_radps: Sequence[float] | None = None,
+        directions_deg: Sequence[float] | None = None,
+    ) -> Ship:
+        """The ship with ``[waves]`` on its card, its motions and mean drift in waves, which the effect `waves` needs.
+
+        Computed from the mesh of its hull by potential flow, at rest in deep water (the extra ``tank2sim[waves]``). The
+        radius of gyration in pitch is that of the card's yaw inertia.
+
+        Parameters
+        ----------
+        mesh : str or path
+            Hull in m, at the size of the ship: x forward of midships, y to port, z above the waterline, normals into
+            the water (``gdf``, ``stl`` and others).
+        metacentric_height_m : float, optional
+            By default that of the card.
+        roll_gyradius_m : float, optional
+            Radius of gyration in roll; by default 0.375 of the beam.
+        roll_damping : float, optional
+            Damping of roll over the critical one, in addition to that by waves; by default 0.05.
+        frequencies_radps : sequence of float, optional
+            Rising; by default 24, from waves of 12 L to L/8 or as short as the mesh can show.
+        directions_deg : sequence of float, optional
+            From 0 (head waves) to 180 in equal steps; by default every 15.
+
+        Raises
+        ------
+        InputError
+            Capytaine is not installed, the mesh cannot be read or is of another size, or metacentric height or beam is
+            not known.
+        """
+        from tank2sim.analysis.wave_response import card_in_waves, hull_of
+
+        card = self.manoeuvring()
+        stated = {
+            "metacentric_height_m": metacentric_height_m,
+            "roll_gyradius_m": roll_gyradius_m,
+            "roll_damping": roll_damping,
+            "frequencies_radps": frequencies_radps,
+            "directions_deg": directions_deg,
+        }
+        given = {name: value for name, value in stated.items() if value is not None}
+        return Ship(card_in_waves(card, mesh, hull_of(card, given)))
+
+    @checked
+    def turn(self, rudder_deg: AngleArgument = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+        """Simulate a turning circle: the rudder is put over at t = 0 and held for 540 deg of heading.
+
+        Options are those of :meth:`simulate`.
+        """
+        return self.simulate(f"turn:{rudder_deg:.10g}", **options)
+
+    @checked
+    def zigzag(
+        self, rudder_deg: AngleArgument = 10.0, heading_deg: AngleArgument = 10.0, **options: Unpack[SimulationOptions]
+    ) -> ManoeuvreResult:
+        """Simulate a zigzag: the rudder (negative begins to port) is reversed at each `heading_deg` off the course.
+
+        Options are those of :meth:`simulate`.
+        """
+        return self.simulate(f"zigzag:{rudder_deg:.10g}/{heading_deg:.10g}", **options)
+
+    @checked
+    def pullout(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+        """Simulate a pull-out: a steady turn with `rudder_deg`, then the neutral rudder. Options: :meth:`simulate`."""
+        return self.simulate(f"pullout:{rudder_deg:.10g}", **options)
+
+    @checked
+    def spiral(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+        """Simulate a direct (Dieudonne) spiral, from `rudder_deg` to the other side and back.
+
+        Options are those of :meth:`simulate`.
+        """
+        return self.simulate(f"spiral:{rudder_deg:.10g}", **options)
+
+    @checked
+    def stop(
+        self, revolutions_rpm: NumberArgument | None = None, **options: Unpack[SimulationOptions]
+    ) -> ManoeuvreResult:
+        """Simulate a stop with revolutions astern (rpm, negative or 0), by default full astern.
+
+        Options are those of :meth:`simulate`.
+        """
+        return self.simulate("stop" if revolutions_rpm is None else f"stop:{revolutions_rpm:.10g}", **options)
+
+    @checked
+    def steer(
+        self,
+        orders: pd.DataFrame | Mapping[str, Sequence[Any]] | str | Path,
+        **options: Unpack[SimulationOptions],
+    ) -> ManoeuvreResult:
+        """Simulate orders over time.
+
+        Parameters
+        ----------
+        orders : DataFrame, mapping or path
+            Columns (n,) ``t_s`` (from 0), ``delta_order_deg`` and, with propulsion, ``n_rpm``; each order holds until
+            the next. A path is that of a CSV file.
+        options
+            Those of :meth:`simulate`.
+
+        Raises
+        ------
+        InputError
+            A column is missing, unknown or out of order.
+        """
+        from tank2sim.simulation.manoeuvres import orders_from_columns, read_orders
+
+        if isinstance(orders, str | Path):
+            return self.simulate(read_orders(Path(orders)), **options)
+        if not hasattr(orders, "keys"):
+            problem = f"is of the type {type(orders).__name__}"
+            raise InputError("orders", "", problem, "give a data frame, a mapping of columns or a file")
+        columns: dict[str, Array] = {}
+        for name in orders:
+            si_name, factor = to_si(str(name), 1.0)
+            if si_name in columns:
+                raise InputError("orders", f"column {name}", "is given twice", "give each order once")
+            try:
+                columns[si_name] = factor * np.asarray(orders[name], dtype=float)
+            except (TypeError, ValueError):
+                raise InputError(
+                    "orders", f"column {name}", "holds something else than numbers", "give numbers"
+                ) from None
+        if len({values.shape for values in columns.values()}) > 1 or any(each.ndim != 1 for each in columns.values()):
+            raise InputError("orders", "", "has columns of different lengths", "give an order for each time")
+        return self.simulate(orders_from_columns(columns, "orders"), **options)
+
+    @checked
+    def simulate(
+        self,
+        manoeuvre: str | Manoeuvre,
+        *,
+        duration_s: PositiveArgument | None = None,
+        external: Mapping[str, float] | None = None,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
+        executor: str = PROCESSES,
+    ) -> ManoeuvreResult:
+        """Simulate a manoeuvre in the words of the command line: ``"zigzag:20/20"``, ``"turn:-35"``, ``"stop"``.
+
+        Parameters
+        ----------
+        manoeuvre : str or Manoeuvre
+            Angles of a text in degrees; an object of :mod:`tank2sim.simulation.manoeuvres` has radians.
+        duration_s : float, optional
+            By default as long as the manoeuvre needs.
+        external : mapping, optional
+            Constant force from outside: ``X``, ``Y`` (N, positive forward and to starboard) at ``x``, ``y`` (m, forward
+            of midships and to starboard), and a moment ``N`` (N m, positive to starboard) in addition.
+        members : int
+            Size of an ensemble drawn from the standard errors of the card, for bands of 5, 50 and 95 %; 0 for none.
+        seed : int
+            Of the ensemble.
+        executor : str
+            Who computes the ensemble: ``processes`` or ``dask://host:port``.
+
+        Raises
+        ------
+        InputError
+            The text is not a manoeuvre, the card is not one of a ship with a rudder, the motion leaves all bounds,
+            or `external` has an unknown key or comes with an ensemble.
+        """
+        from tank2sim.api.manoeuvre import simulate_manoeuvre
+        from tank2sim.simulation.manoeuvres import parse_manoeuvre
+
+        if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
+            problem = f"is of the type {type(manoeuvre).__name__}"
+            raise InputError("manoeuvre", "", problem, "give a text, for example 'turn:35'")
+        parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
+        words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
+        ensemble = EnsembleOptions(members, seed, executor)
+        return simulate_manoeuvre(self, parsed, words, duration_s, ensemble, external)
+
+    @checked
+    def stability(
+        self,
+        speed_mps: SpeedArgument | None = None,
+        *,
+        spirals: bool = True,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
+        executor: str = PROCESSES,
+    ) -> StabilityResult | CraftStabilityResult:
+        """Straight-line stability, steady turning and the IMO criteria; of a craft what is not of a rudder.
+
+        Parameters
+        ----------
+        speed_mps : float, optional
+            Of the straight course; by default the speed of the card.
+        spirals : bool
+            Simulate the spirals on the steady-turning diagram.
+        members, seed, executor
+            As in :meth:`simulate`.
+
+        Raises
+        ------
+        InputError
+            The ship holds no straight course; an ensemble of a craft.
+        """
+        if isinstance(self.card, CraftCard):
+            from tank2sim.api.stability import judge_craft_stability
+
+            if members:
+                problem = "is of the IMO criteria, which a craft without a rudder has not"
+                raise InputError("--ensemble", "", problem, "leave it out")
+            return judge_craft_stability(self, speed_mps)
+        from tank2sim.api.stability import judge_stability
+
+        return judge_stability(self, speed_mps, spirals=spirals, ensemble=EnsembleOptions(members, seed, executor))
+
+    @checked
+    def state_space(
+        self,
+        speed_mps: SpeedArgument | None = None,
+        *,
+        states: Iterable[str] | None = None,
+        inputs: Iterable[str] | None = None,
+        outputs: Iterable[str] | None = None,
+    ) -> control.StateSpace:
+        """The linearised model on a straight course as ``control.StateSpace``, its signals named as in the model.
+
+        Parameters
+        ----------
+        speed_mps : float, optional
+            By default the speed of the card.
+        states, inputs, outputs : names, optional
+            Of the model (``motion.r``, ``rudder.command``); by default all of them. SI and radians. States that are
+            left out follow the others at once: without ``rudder.angle`` the rudder is where it is ordered. A state may
+            be an input.
+
+        Raises
+        ------
+        InputError
+            The ship holds no straight course, a signal is unknown, or a state that is left out comes to no rest.
+        """
+        from tank2sim.analysis.linearisation import following_states, state_space, straight_course
+
+        model = self.model
+        point = straight_course(model, speed_mps)
+        kept, given, shown = (None if names is None else list(names) for names in (states, inputs, outputs))
+        known = (*model.state_names, *model.input_names, *model.outputs)
+        for argument, names in (("inputs", given), ("outputs", shown)):
+            for name in names or ():
+                if name not in model:
+                    raise InputError(argument, name, "is not a variable of the model", close_name(name, known))
+        settled = () if kept is None else following_states(model, point, kept, given or ())
+        return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
+
+    @checked
+    def influence(
+        self,
+        figures: str | Sequence[str] = (),
+        *,
+        joint_variation: Mapping[str, float] | None = None,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
+        executor: str = PROCESSES,
+    ) -> InfluenceResult:
+        """Influence coefficients: by how many per cent a figure changes for 10 % more of each number on the card.
+
+        Parameters
+        ----------
+        figures : str or sequence of str
+            ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``, angles in degrees: names are those of
+            :data:`tank2sim.analysis.influence.figures.FIGURE_KINDS`. Of a craft with thrusters
+            ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, ``final_rate_degps@spin:400``, in
+            rpm: :data:`.CRAFT_FIGURE_KINDS`. By default one of each kind.
+        joint_variation : mapping, optional
+            Changes in % of numbers that change together (Kc), by name: ``{"Yv": 0.62, "Nv": 1.7}``.
+        members, seed, executor
+            As in :meth:`simulate`.
+
+        Raises
+        ------
+        InputError
+            A figure or a name is unknown, or the ship does not show a figure.
+        """
+        from tank2sim.api.influence import influence_of_ship
+
+        names = [figures] if isinstance(figures, str) else list(figures)
+        return influence_of_ship(self, names, joint_variation or {}, EnsembleOptions(members, seed, executor))
+
+    @checked
+    def tune(
+        self,
+        targets: str | Sequence[str],
+        *,
+        figures: str | Sequence[str] = (),
+        by: str = "uncertain",
+        within: TuningRange = 3.0,
+        hold: Sequence[str] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        joint_variation: Mapping[str, float] | None = None,
+        members: EnsembleSize = 0,
+        seed: Seed = 0,
+        executor: str = PROCESSES,
+    ) -> TuningResult:
+        """Change the card until figures have the values that a trial or a standard gives.
+
+        Parameters
+        ----------
+        targets : str or sequence of str
+            ``steady_radius_m@20=424``, ``overshoot1_deg@20/20<=25``, ``>=``: figures as in :meth:`influence`.
+        figures : str or sequence of str
+            Further figures to compute.
+        by : str
+            ``uncertain``: the least sum of squared moves in standard errors; ``fewest``: the fewest parameters.
+        within : float
+            Bounds of each move, standard errors of the card.
+        hold : sequence of str
+            Parameters that stay (``Nr``).
+        bounds : mapping, optional
+            Lowest and highest value by name, in the conventions of the card's file, in place of `within`.
+        joint_variation : mapping, optional
+            Parameters that move together only, as in :meth:`influence`.
+        members, seed, executor
+            As in :meth:`simulate`; of the ship before.
+
+        Raises
+        ------
+        InputError
+            A target cannot be read, a name is unknown, or nothing is left to change. Targets that contradict each
+            other are a result, whose card is refused.
+        """
+        from tank2sim.analysis.tuning.result import Means
+        from tank2sim.api.influence import tune_ship
+
+        wanted, further = ([given] if isinstance(given, str) else list(given) for given in (targets, figures))
+        means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
+        return tune_ship(self, wanted, further, means, EnsembleOptions(members, seed, executor))
+
+    @checked
+    def tune_through(self, first: str, second: str) -> TurnTuningResult:
+        """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.
+
+        Parameters
+        ----------
+        first, second : str
+            Points ``RATE@RUDDER``, deg/min to the side of the rudder at deg of rudder, + to starboard (``61@35``,
+            ``20@0`` of an unstable ship), or a radius, ``424m@20``.
+
+        Raises
+        ------
+        InputError
+            A point cannot be read, or no factors between 1/5 and 5 meet both.
+        """
+        from tank2sim.apps.steering_cards.tuning_command import tune_ship_through
+
+        return tune_ship_through(self, first, second)
+
+    autopilot = autopilot
+
+    @checked
+    def glide(
+        self,
+        angles_deg: float | Sequence[float] = (),
+        *,
+        roll_deg: AngleArgument = 0.0,
+        buoyancy_kg: PositiveArgument | None = None,
+        programme: GlideProgramme | str | Path | None = None,
+        as_printed: bool = False,
+        budget_kg: NumberArgument | None = None,
+        depth_m: NumberArgument | None = None,
+        views: bool = False,
+    ) -> GlideResult:
+        """Steady glides of an underwater glider, the path of a programme, and what is best.
+
+        Parameters
+        ----------
+        angles_deg : float or sequence of float
+            Paths of steady glides, + to climb, - to dive.
+        roll_deg : float
+            Of these glides, + starboard side down.
+        buoyancy_kg : float, optional
+            Size of their net buoyancy; by default that of the card.
+        programme : path or GlideProgramme, optional
+            To be flown, by the steady glides and by the transient model: a CSV of steps ``duration_s``,
+            ``path_angle_deg`` or ``pitch_deg``, ``roll_deg``, ``buoyancy_kg``.
+        as_printed : bool
+            Also what the equations of Kulikovsky & Velikanov give as they are printed.
+        budget_kg, depth_m : float, optional
+            Ballast that can be pushed out, and the depth from which, for the range. Both or neither.
+        views : bool
+            Also how wrong steady glides are for programmes of different speed.
+
+        Raises
+        ------
+        InputError
+            The card is not one of a glider, an angle or a step cannot be flown, or the programme is at fault.
+        """
+        from tank2sim.apps.rigs.glider.command import glide_with
+        from tank2sim.apps.rigs.glider.programme import read_programme
+        from tank2sim.apps.rigs.glider.study import GlideQuestion
+
+        angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
+        question = GlideQuestion(
+            angles_rad=tuple(np.radians(angles).tolist()),
+            roll_rad=math.radians(roll_deg),
+            buoyancy_kg=buoyancy_kg,
+            programme=read_programme(programme) if isinstance(programme, str | Path) else programme,
+            as_printed=as_printed,
+            budget_kg=budget_kg,
+            depth_m=depth_m,
+            views=views,
+        )
+        return glide_with(self, question)
+
+    @checked
+    def poster(
+        self,
+        path: str | Path | None = None,
+        *,
+        ballast: Any = None,
+        orders: Mapping[str, float] | None = None,
+    ) -> PosterResult:
+        """The wheelhouse poster (IMO A.601(15), A3); what the card does not state stays blank.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write, which prints on one page.
+        ballast : Ship, Card, str or path, optional
+            The ship in ballast; this is then the loaded condition.
+        orders : mapping, optional
+            Orders of the engine telegraph ahead, with their revolutions in rpm: ``{"Half ahead": 56}``.
+
+        Raises
+        ------
+        InputError
+            The ship does not manoeuvre, an order cannot be shown, the ballast card is of another ship, or the file
+            cannot be written.
+        """
+        from tank2sim.apps.bridge.command import make_poster
+
+        return self._written(make_poster(self, ballast=ballast, order=orders), path)
+
+    @checked
+    def pilot_card(
+        self,
+        path: str | Path | None = None,
+        *,
+        ballast: Any = None,
+        orders: Mapping[str, float] | None = None,
+    ) -> PilotCardResult:
+        """The pilot card (IMO A.601(15), A4). Raises as :meth:`poster`.
+
+        Parameters
+        ----------
+        path, ballast, orders
+            As of :meth:`poster`.
+        """
+        from tank2sim.apps.bridge.command import make_pilot_card
+
+        return self._written(make_pilot_card(self, ballast=ballast, order=orders), path)
+
+    @checked
+    def steering_page(
+        self,
+        path: str | Path | None = None,
+        *,
+        ghost: str | Path | None = None,
+        scenario: str | Path | None = None,
+        view_3d: bool = False,
+    ) -> SteeringPageResult:
+        """A page in which the ship is steered in a browser; it needs no network.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write.
+        ghost : path, optional
+            A measured trial that moves next to the ship.
+        scenario : path or str, optional
+            Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
+        view_3d : bool
+            Whether the page also has the view from the bridge (three.js, 0.6 MB).
+
+        Raises
+        ------
+        InputError
+            The ship has no rudder, the trial is at fault or has no positions, the scenario is at fault, or the file
+            cannot be written.
+        """
+        from tank2sim.apps.steering.command import make_steering_page
+
+        inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
+        return self._written(make_steering_page(self, ghost, scenario, view_3d), path, *inputs)
+
+    def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
+        """Write the page of a result to a path that is not an input, if one is given; return the result."""
+        if path is not None:
+            write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
+        return result
+
+    @checked
+    def to_fmu(
+        self,
+        path: str | Path,
+        *,
+        fmi: Literal[2, 3] = 2,
+        platforms: str = "host",
+        sources: bool = True,
+        osp: bool = False,
+    ) -> ExportResult:
+        """Write the FMU (Model Exchange and Co-Simulation).
+
+        Parameters
+        ----------
+        path : path
+        fmi : int
+            2 or 3.
+        platforms : str
+            ``host``, ``all``, or names of FMI 3 with commas between (``x86_64-linux,x86_64-windows``).
+        sources : bool
+            False: without C sources, ship card and coefficients, which are then constants of the library.
+        osp : bool
+            Also write ``OspSystemStructure.xml`` and the OSP model description next to the FMU, for the Open Simulation
+            Platform.
+
+        Raises
+        ------
+        InputError
+            No compiler is found, or the file cannot be written.
+        """
+        from tank2sim.api.fmu import make_fmu_file
+
+        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources, osp=osp)
+        write_together(made.files, inputs=[Path(self.card.source)])
+        return made
+
+
+@checked
+def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
+    """Read a ship from its card.
+
+    Parameters
+    ----------
+    card : str or path
+        Name of a bundled ship (:func:`ships`), or the TOML file of a card.
+    values : mapping, optional
+        Values in place of the card's, by dotted key: ``{"derivatives.Yv": -0.012}``.
+
+    Raises
+    ------
+    InputError
+        The file is missing or at fault, or the card does not have a key.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> t2s.load("mariner").name
+    'Mariner class'
+    """
+    return Ship(read_card(card, dict(values or {})))
+
+
+def ships() -> pd.DataFrame:
+    """The bundled ships: name (index) as :func:`load` takes it, title, kind of model, length (m) and source.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> "mariner" in t2s.ships().index
+    True
+    """
+    from tank2sim.api.bundled_ships import list_ships
+
+    return list_ships().df
