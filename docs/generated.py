@@ -25,7 +25,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 import tank2sim
-from tank2sim.api.results import RESULT_CLASSES, json_schema
+from tank2sim.api.results import commands_with_results, json_schema
 from tank2sim.apps.design import tank_form
 from tank2sim.cards import form, read_card
 from tank2sim.cli import COMMANDS
@@ -211,7 +211,7 @@ def benchmark_records() -> str:
 def schemas() -> str:
     """The JSON Schema of each command's JSON."""
     parts = []
-    for command in sorted(RESULT_CLASSES):
+    for command in commands_with_results():
         text = json.dumps(json_schema(command), indent=1)
         parts.append(f"## `{command}`\n\n```json\n{text}\n```\n")
     return "\n".join(parts)

@@ -28,7 +28,7 @@ from tank2sim.errors import InputError
 from tank2sim.plugins import PluginWarning, Registry
 from tank2sim.records import reading
 from tank2sim.records.trials import Trial, TrialReader, fault_of
-from tank2sim.simulation.manoeuvres import Zigzag
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
 from .cli.command_line import refused
@@ -526,3 +526,88 @@ def test_an_effect_cannot_take_a_variable_of_the_model() -> None:
         InputError, match=r"ship\.toml.*second_rudder adds rudder\.command, which the model has already"
     ):
         effect.apply(build(card), {"order_rad": 0.1}, card)
+
+
+# -- commands, kinds of cards, readers of logs ---------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.essential
+def test_a_command_of_a_package_has_help_page_json_and_schema(site: Path, work: Path) -> None:
+    listed, helped, ran, read, bad = tank2sim(
+        site,
+        "--help",
+        "turns --help",
+        "turns mariner.toml --rudder -20 35 --json turns.json --page turns.html --plot turns.png",
+        "report turns.json -o again.html",
+        "turns mariner.toml --rudder 400",
+        cwd=work,
+    )
+    assert "turns" in done(listed) and "tactical diameters over rudder angles" in listed.stdout
+    assert "--rudder" in done(helped) and "--json" in helped.stdout
+    done(ran)
+    done(read)
+    found = json.loads((work / "turns.json").read_text())
+    own = simulate(build(parse_card(mariner_text(), "ship.toml")), Turn(math.radians(35))).figures
+    assert found["schema"] == "tank2sim/turns/1" and [turn["rudder_deg"] for turn in found["turns"]] == [-20, 35]
+    assert found["turns"][1]["tactical_diameter_m"] == pytest.approx(own["tactical_diameter_m"], rel=1e-6)
+    assert "Tightest turn" in (work / "again.html").read_text() and (work / "turns.png").stat().st_size > 5000
+    refused(bad, "--rudder", "400")
+    code = "import tank2sim as t2s, json; print(json.dumps(t2s.json_schema('turns')))"
+    assert "turns" in json.loads(done(python(site, code, cwd=work)))["properties"]
+
+
+DRIFTER = """format = "tank2sim-ship/1"
+[ship]
+name = "Drifter"
+source = "made up"
+[model]
+kind = "drifter"
+[drifter]
+mass_kg = 50.0
+drag_kgpm = 4.0
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.essential
+def test_a_kind_of_card_of_a_package_becomes_an_fmu(site: Path, tmp_path: Path) -> None:
+    """Speed from rest under a constant force: v = v_e tanh(t/T), v_e = sqrt(F/B), T = M/sqrt(F B)."""
+    (tmp_path / "drifter.toml").write_text(DRIFTER)
+    (tmp_path / "bad.toml").write_text(DRIFTER.replace("50.0", "-1.0"))
+    exported, checked, bad = tank2sim(
+        site, "export drifter.toml -o drifter.fmu", "check drifter.fmu", "export bad.toml -o bad.fmu", cwd=tmp_path
+    )
+    done(exported)
+    done(checked)
+    refused(bad, "bad.toml", "drifter.mass_kg")
+    force, time_s = 16.0, np.arange(0.0, 30.0, 0.5)
+    result = simulate_fmu(
+        str(tmp_path / "drifter.fmu"), stop_time=29.5, output_interval=0.5, start_values={"drift.force": force}
+    )
+    expected = math.sqrt(force / 4.0) * np.tanh(time_s * math.sqrt(force * 4.0) / 50.0)
+    np.testing.assert_allclose(result["motion.u"], expected, atol=1e-4)
+
+
+@pytest.mark.slow
+def test_a_log_of_a_recorder_is_cut_into_trials_by_its_reader(site: Path, work: Path) -> None:
+    record = columns(work / "zz.csv")
+    lines = ["RECORDER 1"]
+    for place in range(0, len(record["t_s"]), 10):
+        time = 1.7e9 + record["t_s"][place]
+        values = {
+            "heading": record["psi_deg"][place] % 360,
+            "rot": 60 * record["r_degps"][place],
+            "speed": record["u_mps"][place] / KNOT,
+            "rudder": record["delta_deg"][place],
+        }
+        lines += [f"{time:.1f} {name} {value:.5f}" for name, value in values.items()]
+    (work / "voyage.rec").write_text("\n".join(lines) + "\n")
+    (work / "faulty.rec").write_text("RECORDER 1\n1 heading north\n")
+    cut, bad = tank2sim(site, "log voyage.rec -o cut --json log.json", "log faulty.rec -o cut2", cwd=work)
+    done(cut)
+    found = json.loads((work / "log.json").read_text())
+    assert found["logs"][0]["format"] == "recorder" and any(
+        "zigzag" in path.name for path in (work / "cut").glob("*.csv")
+    )
+    refused(bad, "faulty.rec", "line 2")

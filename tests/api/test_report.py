@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.results import RESULT_CLASSES
+from tank2sim.api.results import commands_with_results
 from tests.cli.command_line import refused, tank2sim
 
 
@@ -48,7 +48,7 @@ def test_a_schema_that_is_not_known_is_refused(turn: t2s.ManoeuvreResult, schema
 def test_every_command_of_a_type_exists() -> None:
     from tank2sim.cli import COMMANDS
 
-    types = set(RESULT_CLASSES)
+    types = set(commands_with_results())
     assert types == set(COMMANDS) - {"open", "report"}
 
 

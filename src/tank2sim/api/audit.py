@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tank2sim.results.audit import AuditResult
 
 
-@verb("faults in the data of trials")
+@verb("faults in the data of trials", results=("tank2sim.results.audit:AuditResult",))
 def audit(trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord]) -> AuditResult:
     """Judge the columns of trials by their consistency alone: signs, units, frames, clocks, failed sensors.
 

@@ -54,6 +54,10 @@ def write_controller(
 @verb(
     "heading controllers, designed, simulated and exported",
     Output("--export", FMU, "Write the controller as an FMU.", write_controller, "AP.fmu"),
+    results=(
+        "tank2sim.results.autopilot:AutopilotResult",
+        "tank2sim.results.autopilot:CraftAutopilotResult",
+    ),
 )
 def autopilot(
     ship: Vessel,

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from tank2sim.results.ships import ShipsResult
 
 
-@verb("the bundled ships, by the names that CARD takes", name="ships")
+@verb("the bundled ships, by the names that CARD takes", name="ships", results=("tank2sim.results.ships:ShipsResult",))
 def list_ships() -> ShipsResult:
     """List the bundled ships, by the names that CARD takes."""
     from tank2sim.bundled import bundled_cards

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tank2sim.results.comparison import ComparisonResult
 
 
-@verb("cards of one ship side by side")
+@verb("cards of one ship side by side", results=("tank2sim.results.comparison:ComparisonResult",))
 def compare(
     cards: Sequence[Vessel | Card | str | Path], *, members: SmallEnsemble = VALIDATION_MEMBERS
 ) -> ComparisonResult:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tank2sim.results.fmu import CheckResult, ExportResult
 
 
-@verb("the FMU, Model Exchange and Co-Simulation", name="export")
+@verb("the FMU, Model Exchange and Co-Simulation", name="export", results=("tank2sim.results.fmu:ExportResult",))
 def make_fmu_file(
     ship: Vessel,
     output: Annotated[Path, Written(FMU, "SHIP.fmu")],
@@ -97,6 +97,7 @@ def make_fmu_file(
     "an FMU validated, and compared with its reference",
     exit_code=lambda result: 0 if result.passed else 1,
     name="check",
+    results=("tank2sim.results.fmu:CheckResult",),
 )
 def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.

@@ -21,6 +21,7 @@ def _budget(result: ReductionResult, path: Path) -> dict[Path, str | bytes]:
 @verb(
     "coefficients of the MMG method, from steady tests with thrust and normal force of the rudder",
     Output("-o", CARD, "Write the ship card.", lambda result, path: result.card.files(path), "CARD.toml"),
+    results=("tank2sim.results.mmg_reduction:MmgReductionResult",),
 )
 def reduce_to_mmg(campaign: str | Path) -> MmgReductionResult:
     """Reduce steady captive tests with thrust and rudder normal force to the coefficients of the MMG method.
@@ -59,6 +60,7 @@ def reduce_to_mmg(campaign: str | Path) -> MmgReductionResult:
         "FILE.csv",
     ),
     variants={"mmg": reduce_to_mmg},
+    results=("tank2sim.results.reduction:ReductionResult",),
 )
 def reduce(
     campaign: str | Path,

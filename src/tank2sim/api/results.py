@@ -8,20 +8,14 @@ from typing import Any
 
 from tank2sim.answer.result import Result
 from tank2sim.answer.study import study_schema
+from tank2sim.api.commands import VERBS
+from tank2sim.api.verbs import Verb
 from tank2sim.arguments import checked
 from tank2sim.errors import InputError
 from tank2sim.files import schema_command, schema_name
 
 RESULT_CLASSES: dict[str, tuple[str, ...]] = {
-    "audit": ("results.audit:AuditResult",),
-    "autopilot": ("results.autopilot:AutopilotResult", "results.autopilot:CraftAutopilotResult"),
-    "check": ("results.fmu:CheckResult",),
-    "compare": ("results.comparison:ComparisonResult",),
-    "convention": ("apps.programs.convention_result:ConventionResult",),
-    "convert": ("apps.programs.convert_result:ConversionResult",),
     "demo": ("apps.demo.result:DemoResult",),
-    "design": ("apps.design.result:CampaignDesignResult", "apps.design.result:TrialDesignResult"),
-    "export": ("results.fmu:ExportResult",),
     "gap": ("results.gap:GapResult", "results.gap_fleet:FleetResult"),
     "glide": ("apps.rigs.glider.result:GlideResult",),
     "influence": (
@@ -29,35 +23,36 @@ RESULT_CLASSES: dict[str, tuple[str, ...]] = {
         "apps.steering_cards.result:SteeringModelsResult",
         "apps.steering_cards.tuning_result:TurnTuningResult",
     ),
-    "guess": ("apps.guess.result:GuessResult",),
     "identify": (
         "results.identification:IdentificationResult",
         "results.craft_identification:CraftIdentificationResult",
     ),
     "log": ("apps.logs.result:LogResult",),
-    "reduce": ("results.reduction:ReductionResult", "results.mmg_reduction:MmgReductionResult"),
     "run": ("results.captive_run:CaptiveRunResult",),
-    "pilotcard": ("apps.bridge.result:PilotCardResult",),
-    "poster": ("apps.bridge.result:PosterResult",),
-    "ships": ("results.ships:ShipsResult",),
-    "signals": ("apps.signals.result:SignalsResult",),
     "simulate": ("results.manoeuvre:ManoeuvreResult",),
     "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
     "steer": ("apps.steering.result:SteeringPageResult",),
-    "tow": ("apps.rigs.tow.result:TowResult",),
-    "validate": ("results.validation:ValidationResult", "results.craft_validation:CraftValidationResult"),
     "yaw": ("apps.rigs.yaw.result:YawResult",),
 }
 """Command to its results, each as ``module:class``; a command that has several writes one of them."""
 
 
 def result_classes(command: str) -> list[type[Result[Any]]]:
-    """Return the classes of the results of a command; empty if it writes none."""
+    """Return the classes of the results of a command, those of its variants last; empty if it writes none."""
+    places = [f"tank2sim.{place}" for place in RESULT_CLASSES.get(command, ())]
+    if (verb := VERBS.get(command)) is not None:
+        variants: list[Verb] = [vars(other)["verb"] for other in verb.variants.values()]
+        places += [place for each in (verb, *variants) for place in each.results]
     found = []
-    for place in RESULT_CLASSES.get(command, ()):
+    for place in places:
         module, _, name = place.partition(":")
-        found.append(getattr(importlib.import_module(f"tank2sim.{module}"), name))
+        found.append(getattr(importlib.import_module(module), name))
     return found
+
+
+def commands_with_results() -> list[str]:
+    """Names of the commands that write a result as JSON, in the order of the alphabet."""
+    return sorted({*RESULT_CLASSES, *(name for name, verb in VERBS.items() if verb.results)})
 
 
 @checked
@@ -67,7 +62,7 @@ def json_schema(command: str) -> dict[str, Any]:
     Parameters
     ----------
     command : str
-        A key of :data:`RESULT_CLASSES`.
+        Its name.
 
     Raises
     ------
@@ -80,10 +75,10 @@ def json_schema(command: str) -> dict[str, Any]:
     >>> t2s.json_schema("simulate")["properties"]["schema"]
     {'const': 'tank2sim/simulate/1'}
     """
-    if command not in RESULT_CLASSES:
-        raise KeyError(command)
     shapes, parts = [], {}
-    for kind in result_classes(command):
+    if not (kinds := result_classes(command)):
+        raise KeyError(command)
+    for kind in kinds:
         shape = study_schema(kind.study_type())
         parts.update(shape.pop("$defs", {}))
         shape["properties"] = {"schema": {"const": schema_name(command)}, **shape["properties"]}

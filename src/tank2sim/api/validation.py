@@ -16,7 +16,13 @@ if TYPE_CHECKING:
     from tank2sim.results.validation import ValidationResult
 
 
-@verb("a validation report after ITTC 7.5-02-06-03")
+@verb(
+    "a validation report after ITTC 7.5-02-06-03",
+    results=(
+        "tank2sim.results.validation:ValidationResult",
+        "tank2sim.results.craft_validation:CraftValidationResult",
+    ),
+)
 def validate(
     ship: Vessel,
     trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),

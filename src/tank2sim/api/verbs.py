@@ -73,6 +73,8 @@ class Verb:
     words : str
         A few words for the list of commands.
     outputs : sequence of Output
+    results : sequence of str
+        Classes of the results, ``module:class``: with them JSON is read back and its schema is made.
     texts : mapping
         Argument to a function that makes its value of the words on the command line.
     choices : mapping
@@ -89,6 +91,7 @@ class Verb:
     name: str
     words: str
     outputs: Sequence[Output] = ()
+    results: Sequence[str] = ()
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
     choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     variants: Mapping[str, Callable[..., Any]] = field(default_factory=dict)

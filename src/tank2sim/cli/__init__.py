@@ -29,67 +29,60 @@ from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
 GROUPS = {
-    "Measure": {
-        "design": "the next captive campaign or sea trial, for the certainty of chosen figures",
-        "log": "a vessel's own log, cut into trials",
-        "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
-        "reduce": "captive tests to derivatives",
-        "tow": "surge mass and drag from accelerating tows",
-        "yaw": "added yaw inertia and dissipation from records of a yaw rig",
-        "audit": "faults in the data of trials",
-        "signals": "statistics, spectra and filters of a record",
-    },
-    "Identify": {
-        "identify": "coefficients from free-running trials",
-        "gap": "the physical effect that a card lacks",
-        "guess": "a ship from dimensions and the figures of a wheelhouse poster",
-        "validate": "a validation report after ITTC 7.5-02-06-03",
-        "compare": "cards of one ship side by side",
-    },
-    "Study": {
-        "simulate": "a manoeuvre: turn, zigzag, pull-out, spiral, stop, orders of a file",
-        "stability": "course stability, steady turning, IMO criteria",
-        "autopilot": "heading controllers, designed, simulated and exported",
-        "influence": "sensitivity of manoeuvring figures; tuning",
-        "glide": "an underwater glider: glides, paths, range",
-    },
-    "Export": {
-        "convert": "a card in another language: MMG as a polynomial, other conventions, other programs",
-        "convention": "what a table of derivatives with unstated conventions means",
-        "export": "the FMU, Model Exchange and Co-Simulation",
-        "check": "an FMU validated, and compared with its reference",
-    },
-    "Show": {
-        "ships": "the bundled ships, by the names that CARD takes",
-        "poster": "a wheelhouse poster (A3)",
-        "pilotcard": "a pilot card (A4)",
-        "steer": "a page on which the ship is steered",
-        "report": "one page of any result",
-        "open": "a page, in the browser",
-        "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
-    },
+    "Measure": ("design", "log", "run", "reduce", "tow", "yaw", "audit", "signals"),
+    "Identify": ("identify", "gap", "guess", "validate", "compare"),
+    "Study": ("simulate", "stability", "autopilot", "influence", "glide"),
+    "Export": ("convert", "convention", "export", "check"),
+    "Show": ("ships", "poster", "pilotcard", "steer", "report", "open", "demo"),
 }
-"""Commands by what people do, each with a few words; they are imported when they are called."""
+"""Commands by the work that people do; those of other packages come last."""
 
-COMMANDS = {name: words for group in GROUPS.values() for name, words in group.items()}
+WORDS = {
+    "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
+    "gap": "the physical effect that a card lacks",
+    "glide": "an underwater glider: glides, paths, range",
+    "identify": "coefficients from free-running trials",
+    "influence": "sensitivity of manoeuvring figures; tuning",
+    "log": "a vessel's own log, cut into trials",
+    "open": "a page, in the browser",
+    "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
+    "simulate": "a manoeuvre: turn, zigzag, pull-out, spiral, stop, orders of a file",
+    "stability": "course stability, steady turning, IMO criteria",
+    "steer": "a page on which the ship is steered",
+    "yaw": "added yaw inertia and dissipation from records of a yaw rig",
+}
+"""A few words for each command that is not derived from its function."""
+
+COMMANDS = tuple(name for names in GROUPS.values() for name in names)
+"""Names of the commands of tank2sim."""
+
+
+def _groups() -> dict[str, list[tuple[str, str]]]:
+    """Commands with a few words each, by group."""
+    groups = {
+        title: [(name, WORDS.get(name) or VERBS[name].words) for name in names] for title, names in GROUPS.items()
+    }
+    if others := [(name, verb.words) for name, verb in VERBS.items() if name not in COMMANDS]:
+        groups["Of other packages"] = others
+    return groups
 
 
 class _Commands(click.Group):
     """Commands are imported when they are called, so that ``tank2sim ships`` does not wait for CasADi."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return [name for commands in _groups().values() for name, _ in commands]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        width = max(map(len, COMMANDS))
-        for title, commands in GROUPS.items():
+        width = max(map(len, self.list_commands(ctx)))
+        for title, commands in _groups().items():
             with formatter.section(title):
-                formatter.write_dl([(name.ljust(width), words) for name, words in commands.items()])
+                formatter.write_dl([(name.ljust(width), words) for name, words in commands])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        if cmd_name in VERBS:
+        if cmd_name not in WORDS:
+            if cmd_name not in VERBS.names():
+                return None
             from tank2sim.cli.derived import command_of
 
             return command_of(VERBS[cmd_name])
@@ -108,8 +101,8 @@ class _Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
-            remedy = close_name(args[0], COMMANDS)
+        if args and not args[0].startswith("-") and args[0] not in (known := (*WORDS, *VERBS.names())):
+            remedy = close_name(args[0], known)
             raise click.UsageError(f"{args[0]!r} is not a command; {remedy}", ctx)
         return super().resolve_command(ctx, args)
 

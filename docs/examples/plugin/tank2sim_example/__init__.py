@@ -1,1 +1,1 @@
-"""An effect, a trial reader and a structure that tank2sim finds once this package is installed."""
+"""An effect, readers, a structure, a command and a kind of card that tank2sim finds once this package is installed."""

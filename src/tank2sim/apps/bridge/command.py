@@ -36,7 +36,13 @@ def _parsed_orders(given: Sequence[str]) -> dict[str, float]:
     return found
 
 
-@verb("a wheelhouse poster (A3)", page_required=True, texts={"order": _parsed_orders}, name="poster")
+@verb(
+    "a wheelhouse poster (A3)",
+    page_required=True,
+    texts={"order": _parsed_orders},
+    name="poster",
+    results=("tank2sim.apps.bridge.result:PosterResult",),
+)
 def make_poster(
     ship: Vessel,
     *,
@@ -64,7 +70,13 @@ def make_poster(
     return PosterResult(*_bridges(ship, ballast, order or {}))
 
 
-@verb("a pilot card (A4)", page_required=True, texts={"order": _parsed_orders}, name="pilotcard")
+@verb(
+    "a pilot card (A4)",
+    page_required=True,
+    texts={"order": _parsed_orders},
+    name="pilotcard",
+    results=("tank2sim.apps.bridge.result:PilotCardResult",),
+)
 def make_pilot_card(
     ship: Vessel,
     *,

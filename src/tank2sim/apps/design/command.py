@@ -59,6 +59,7 @@ _PLAN = Output("-o", TABLE, "Write the plan.", lambda result, path: {path: resul
         "DIR",
     ),
     texts={"sensors": _parsed_sensors},
+    results=("tank2sim.apps.design.result:TrialDesignResult",),
 )
 def design_trial(
     ship: Vessel,
@@ -122,6 +123,7 @@ def design_trial(
     texts={"largest": _parsed_range},
     variants={"trial": design_trial},
     name="design",
+    results=("tank2sim.apps.design.result:CampaignDesignResult",),
 )
 def design_campaign(
     ship: Vessel,

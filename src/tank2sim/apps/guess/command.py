@@ -20,6 +20,7 @@ _BYTES = 15_000
     Output(
         "-o", CARD, "Write the card, with its covariance.", lambda result, path: result.card.files(path), "CARD.toml"
     ),
+    results=("tank2sim.apps.guess.result:GuessResult",),
 )
 def guess(
     *,

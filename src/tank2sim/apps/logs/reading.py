@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from tank2sim.apps.logs.ardupilot import looks_like_tlog, read_ardupilot_bin, read_ardupilot_tlog
@@ -14,20 +15,61 @@ from tank2sim.apps.logs.ros import read_ros_bag
 from tank2sim.apps.logs.streams import VesselLog
 from tank2sim.apps.logs.table import read_table_log
 from tank2sim.errors import InputError
+from tank2sim.plugins import Registry
 from tank2sim.records.text_layout import decoded_text
 
 _HEAD_BYTES = 8192
 
-_MAGIC: tuple[tuple[bytes, Callable[[Path], VesselLog]], ...] = (
-    (b"#ROSBAG", read_ros_bag),
-    (b"\x89MCAP0", read_ros_bag),
-    (b"SQLite format 3", read_ros_bag),
-    (b"ULog\x01\x12\x35", read_px4_ulog),
-    (b"\xa3\x95\x80", read_ardupilot_bin),
-)
-"""First bytes of binary formats (their specifications), and the reader."""
 
-_KNOWN = "ROS bags, MCAP, ULog, ArduPilot .bin, .log and .tlog, NMEA 0183, NMEA 2000 (text) and CSV"
+@dataclass(frozen=True)
+class LogReader:
+    """A format of logs and its reader.
+
+    Parameters
+    ----------
+    name : str
+    description : str
+        A few words for messages: ``NMEA 0183``.
+    recognises : callable
+        ``recognises(beginning) -> bool``: whether a file with these first bytes is such a log. Text in UTF-16 is given
+        as Latin-1, and a byte order mark is left out.
+    read : callable
+        ``read(path) -> VesselLog``. Raises InputError if the file is faulty.
+    """
+
+    name: str
+    description: str
+    recognises: Callable[[bytes], bool]
+    read: Callable[[Path], VesselLog]
+
+
+def _begins(*magic: bytes) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(magic)
+
+
+def _is_ardupilot(head: bytes) -> bool:
+    return head.startswith(b"\xa3\x95\x80") or bool(re.search(rb"(?m)^FMT,\s*\d+,\s*\d+,\s*\w+,", head))
+
+
+# First bytes of binary formats are those of their specifications.
+LOG_READERS: Registry[LogReader] = Registry(
+    "tank2sim.log_readers",
+    (
+        LogReader("ros", "ROS bags, MCAP", _begins(b"#ROSBAG", b"\x89MCAP0", b"SQLite format 3"), read_ros_bag),
+        LogReader("px4", "ULog", _begins(b"ULog\x01\x12\x35"), read_px4_ulog),
+        LogReader("ardupilot", "ArduPilot .bin and .log", _is_ardupilot, read_ardupilot_bin),
+        LogReader("mavlink", "ArduPilot .tlog", looks_like_tlog, read_ardupilot_tlog),
+        LogReader("nmea2000", "NMEA 2000 (text)", looks_like_nmea2000, read_nmea2000),
+        LogReader("nmea0183", "NMEA 0183", looks_like_nmea0183, read_nmea0183),
+    ),
+    LogReader,
+)
+"""Built-in readers of logs and those of installed packages; a text that none of them knows is read as a CSV table."""
+
+
+def _known() -> str:
+    return f"known are {', '.join(reader.description for reader in LOG_READERS.values())} and CSV"
+
 
 _RAW = "record the raw frames (candump -L, or the input of the analyzer)"
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
@@ -67,31 +109,17 @@ def read_log(path: Path | str) -> VesselLog:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
     if not head.strip():
         raise InputError(path, "", "is empty", "give a log with values")
-    for magic, reader in _MAGIC:
-        if head.startswith(magic):
-            return reader(path)
-    if looks_like_tlog(head):
-        return read_ardupilot_tlog(path)
-    return _read_text(path, head)
-
-
-def _read_text(path: Path, head: bytes) -> VesselLog:
-    """Read a log of text, whatever its encoding, or refuse it by what it is."""
     text, encoding = decoded_text(head, complete=False)
     plain = text.encode("latin-1", errors="replace") if encoding.startswith("utf-16") else head
     plain = plain.removeprefix(b"\xef\xbb\xbf")
-    for fits, reader in (
-        (re.compile(rb"^FMT,\s*\d+,\s*\d+,\s*\w+,", re.MULTILINE).search, read_ardupilot_bin),
-        (looks_like_nmea2000, read_nmea2000),
-        (looks_like_nmea0183, read_nmea0183),
-    ):
-        if fits(plain):
-            return reader(path)
+    for reader in LOG_READERS.values():
+        if reader.recognises(head) or reader.recognises(plain):
+            return reader.read(path)
     for beginning, problem, remedy in _FOREIGN:
         if re.match(beginning, plain):
-            raise InputError(path, "", problem, f"{remedy}; known are {_KNOWN}")
+            raise InputError(path, "", problem, f"{remedy}; {_known()}")
     if b"\0" in plain and path.suffix.lower() == ".tlog":  # its first message is cut
         return read_ardupilot_tlog(path)
     if b"\0" in plain:
-        raise InputError(path, "", "is of no known format, or its beginning is missing", f"known are {_KNOWN}")
+        raise InputError(path, "", "is of no known format, or its beginning is missing", _known())
     return read_table_log(path)

@@ -31,6 +31,7 @@ Language = Literal["abkowitz", "mmg", "shipmmg", "mmgdynamics", "small_craft", "
     "a card in another language: MMG as a polynomial, other conventions, other programs",
     Output("-o", None, "Write the new file.", lambda result, path: result.files(path), required=True),
     choices={"to": LANGUAGES},
+    results=("tank2sim.apps.programs.convert_result:ConversionResult",),
 )
 def convert(
     ship: Vessel,

@@ -28,6 +28,7 @@ def _written(result: SignalsResult, path: Path) -> dict[Path, str | bytes]:
 @verb(
     "statistics, spectra and filters of a record",
     Output("-o", TABLE, "Write the trial with the filtered column.", _written, "FILTERED.csv"),
+    results=("tank2sim.apps.signals.result:SignalsResult",),
 )
 def signals(
     trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord],

@@ -25,6 +25,7 @@ def _parsed_force(text: str) -> float | list[float]:
     "surge mass and drag from accelerating tows",
     Output("-o", CARD, "Write a surge card.", lambda result, path: result.card.files(path), "CARD.toml"),
     texts={"force_N": _parsed_force},
+    results=("tank2sim.apps.rigs.tow.result:TowResult",),
 )
 def tow(
     tows: str | Path,
