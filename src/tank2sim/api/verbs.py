@@ -75,8 +75,13 @@ class Verb:
         Argument to a function that makes its value of the words on the command line.
     choices : mapping
         Argument to the words of its choices.
+    options : mapping
+        Argument to the option that sets it, where the command line does not take it by position or has another name.
     variants : mapping
-        Flag to another verb, which the command calls with this flag in place of the function.
+        Flag to another verb, which the command calls with this flag in place of the function. An option of the other
+        verb of that name is the flag. The key of a verb that `takes` certain first arguments is their kind in words.
+    takes : callable, optional
+        As a variant, the verb is called if this is true of the first argument as a text.
     page_required : bool
         Whether the page is the result itself, and must be written.
     exit_code : callable
@@ -88,7 +93,9 @@ class Verb:
     outputs: Sequence[Output] = ()
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
     choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    options: Mapping[str, str] = field(default_factory=dict)
     variants: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    takes: Callable[[str], bool] | None = None
     page_required: bool = False
     exit_code: Callable[[Any], int] = lambda _: 0
 

@@ -15,7 +15,7 @@ from rich.table import Table as Grid
 
 from tank2sim.answer.parts import Table, cell_text
 from tank2sim.answer.result import Result
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.escaping import file_name, one_line
 from tank2sim.files import JSON, PICTURE, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
 from tank2sim.marks import marked
@@ -142,6 +142,8 @@ def write_outputs(
     if page:
         contents[page] = result.page()
     if plot and plot.suffix.lower() in PICTURE:
+        if not result.charts():
+            raise ArgumentError("plot", "", "there is no chart to draw", "leave it out")
         contents[plot] = result.picture(ending=plot.suffix)
     elif plot:
         writable_folder(plot)

@@ -59,13 +59,24 @@ def command_of(name: str, verb: Verb) -> click.Command:
         Name of the command.
     verb : Verb
     """
-    others = {flag: other.verb for flag, other in verb.variants.items()}  # type: ignore[attr-defined]
-    own: dict[str | None, click.Parameter] = {}
-    for each in (verb, *others.values()):
-        for parameter in _own_parameters(each):
-            own.setdefault(parameter.name, parameter)
-    flags = [_option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.") for flag, other in others.items()]
+    others: dict[str, Verb] = {flag: other.verb for flag, other in verb.variants.items()}  # type: ignore[attr-defined]
+    own = {parameter.name or "": parameter for parameter in _own_parameters(verb)}
+    for other in others.values():
+        for parameter in _own_parameters(other):
+            if isinstance(parameter, click.Option):
+                parameter.required = False
+            elif other.takes:
+                continue
+            own.setdefault(parameter.name or "", parameter)
     documented, _ = _documented(verb.function)
+    text = "\n\n".join(part for part in (documented.short_description, documented.long_description) if part)
+    if inspect.signature(verb.function).return_annotation == "str":
+        return VerbCommand(name, params=[*own.values()], callback=lambda **given: _print(verb, given), help=text)
+    flags = [
+        _option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.")
+        for flag, other in others.items()
+        if not other.takes and not _argument_of(flag, other)
+    ]
     main = [] if any("-o" in parameter.opts for parameter in own.values()) else ["-o"]
     shared = [
         _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page.",
@@ -76,13 +87,14 @@ def command_of(name: str, verb: Verb) -> click.Command:
         _option(["--quiet"], is_flag=True, help="Print doubts and errors alone."),
         _option(["--verbose"], is_flag=True, help="Print every table."),
     ]  # fmt: skip
-    text = "\n\n".join(part for part in (documented.short_description, documented.long_description) if part)
 
     def run(**given: Any) -> int:
-        chosen = next((flag for flag in others if given[flag]), "")
-        problem = f"does not go with --{chosen}" if chosen else f"needs {' or '.join(f'--{flag}' for flag in others)}"
-        _refuse_foreign(others.get(chosen, verb), problem, own)
-        return _run(others.get(chosen, verb), given)
+        first = next(iter(own), "")
+        chosen = next((flag for flag, other in others.items() if _is_chosen(flag, other, given, first)), "")
+        _refuse_foreign(chosen, verb, others, own)
+        if (called := others.get(chosen, verb)).takes:
+            given[next(iter(inspect.signature(called.function).parameters))] = given[first]
+        return _run(called, given)
 
     return VerbCommand(name, params=[*own.values(), *flags, *shared], callback=run, help=text)
 
@@ -96,12 +108,29 @@ def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
         yield from _output_parameters(output)
 
 
-def _refuse_foreign(verb: Verb, problem: str, known: Mapping[str | None, click.Parameter]) -> None:
+def _argument_of(flag: str, verb: Verb) -> str:
+    """The argument of a variant whose option chooses it; empty if it is chosen by a flag."""
+    return next((argument for argument, option in verb.options.items() if option == f"--{flag}"), "")
+
+
+def _is_chosen(flag: str, verb: Verb, given: Mapping[str, Any], first: str) -> bool:
+    """Whether the command line asks for a variant."""
+    return verb.takes(given[first]) if verb.takes else bool(given[_argument_of(flag, verb) or flag])
+
+
+def _refuse_foreign(chosen: str, verb: Verb, others: Mapping[str, Verb], known: Mapping[str, click.Parameter]) -> None:
     """Refuse options that were given and that belong to another variant of the command."""
-    context, own = click.get_current_context(), {one.name for one in _own_parameters(verb)}
+    context = click.get_current_context()
+    names = {flag: {one.name for one in _own_parameters(other)} for flag, other in {"": verb, **others}.items()}
+    words = {flag: flag if other.takes else f"--{flag}" for flag, other in others.items()}
     for name, parameter in known.items():
-        if name not in own and context.get_parameter_source(name or "") is ParameterSource.COMMANDLINE:
-            raise InputError(parameter.opts[0], "", problem, "leave it out" if "not" in problem else "add it")
+        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if name in names[chosen] or not given or not isinstance(parameter, click.Option):
+            continue
+        if chosen:
+            raise InputError(parameter.opts[0], "", f"does not go with {words[chosen]}", "leave it out")
+        needed = " or ".join(words[flag] for flag in others if name in names[flag])
+        raise InputError(parameter.opts[0], "", f"needs {needed}", "add it")
 
 
 def _documented(function: Callable[..., Any]) -> tuple[Docstring, dict[str, str]]:
@@ -163,23 +192,28 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
                         required=required)]  # fmt: skip
     required = one.default is inspect.Parameter.empty
-    if one.kind is not inspect.Parameter.KEYWORD_ONLY and (required or one.name == _first_list(verb.function)):
+    by_position = one.kind is not inspect.Parameter.KEYWORD_ONLY and one.name not in verb.options
+    if by_position and (required or one.name == _first_list(verb.function)):
         return [click.Argument([one.name], nargs=-1 if several else 1, required=required, type=_type(kind, several))]
     default = None if one.default in (inspect.Parameter.empty, None) else one.default
     if several and isinstance(default, str):
         default = (default,)
     words = "; ".join(f"{choice}: {text}" for choice, text in verb.choices.get(one.name, {}).items())
-    shown: dict[str, Any] = {"help": " ".join(filter(None, (helps.get(one.name), words))), "default": default}
+    text = " ".join(filter(None, (helps.get(one.name), words)))
+    shown: dict[str, Any] = {"help": text, **({"required": True} if required else {"default": default})}
     stem, unit = _stem(one.name)
-    option = f"--{stem.replace('_', '-')}"
-    names = list(dict.fromkeys((option, f"--{one.name.replace('_', '-')}")))
+    option = verb.options.get(one.name) or f"--{stem.replace('_', '-')}"
+    names = list(dict.fromkeys((option, verb.options.get(one.name) or f"--{one.name.replace('_', '-')}")))
     if kind is bool:
         flags = [f"{option}/--no-{option[2:]}"] if one.default else names
         return [_option(flags, name=one.name, is_flag=True, **shown)]
     if one.name in verb.texts:
         several = several or any(get_origin(part) is Mapping for part in _parts(kind))
-        return [_option(names, name=one.name, multiple=bool(several), metavar=stem.upper(), **shown)]
-    metavar = unit.upper().replace("/", "P") if unit else None
+        metavar = f"{stem.upper()} ..." if several else stem.upper()
+        return [_option(names, name=one.name, multiple=bool(several), metavar=metavar, **shown)]
+    metavar = unit.upper().replace("/", "P") if unit else stem.upper() if several else None
+    if several:
+        metavar = f"{metavar} ..."
     shown["show_default"] = default not in (None, "", ())
     return [_option(names, name=one.name, type=_type(kind, several), multiple=bool(several), metavar=metavar, **shown)]
 
@@ -235,6 +269,11 @@ def _output_parameters(output: Output) -> list[click.Parameter]:
         if one.kind is inspect.Parameter.KEYWORD_ONLY:
             found += _parameters((one, kind), helps, Verb(output.write, ""))
     return found
+
+
+def _print(verb: Verb, given: Mapping[str, Any]) -> None:
+    """Call a verb whose result is a text, and print it."""
+    click.echo(verb.function(**_values_for(verb.function, given, verb.texts, (), [])))
 
 
 def _run(verb: Verb, given: dict[str, Any]) -> int:
