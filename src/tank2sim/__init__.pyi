@@ -7,9 +7,6 @@ from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import compare as compare
 from .api.convention import convention as convention
 from .api.conversion import convert as convert
-from .api.craft_identification import (
-    identify_craft as identify_craft,
-)
 from .api.demo import run_demo as run_demo
 from .api.design import (
     design_campaign as design_campaign,
@@ -19,6 +16,7 @@ from .api.design import (
 )
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import find_gap as find_gap
+from .api.gap import find_gaps as find_gaps
 from .api.guess import guess as guess
 from .api.identification import identify as identify
 from .api.log import log as log
@@ -58,6 +56,7 @@ from .results.design import TrialDesignResult as TrialDesignResult
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.gap import GapResult as GapResult
+from .results.gap_fleet import FleetResult as FleetResult
 from .results.glide import GlideResult as GlideResult
 from .results.guess import GuessResult as GuessResult
 from .results.identification import IdentificationResult as IdentificationResult

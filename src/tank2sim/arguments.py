@@ -7,7 +7,7 @@ import functools
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
@@ -97,8 +97,12 @@ Percent = Annotated[float, ArgumentBounds(0, 1000)]
 Scatter = Annotated[float, ArgumentBounds(0, 10, above=True)]
 DrawsArgument = Annotated[int, ArgumentBounds(0, 1000, whole=True)]
 Seed = Annotated[int, ArgumentBounds(0, whole=True)]
-Effects = Annotated[int, ArgumentBounds(1, 4, whole=True)]
-"""That a search names at most: :data:`tank2sim.gap.workflow.MOST_EFFECTS`."""
+MOST_EFFECTS = 4
+"""Effects that a search names at most. Project choice: a day of trials rarely determines more parameters."""
+Effects = Annotated[int, ArgumentBounds(1, MOST_EFFECTS, whole=True)]
+FalseDiscovery = Annotated[float, ArgumentBounds(0.01, 0.5)]
+"""Probability with which an effect that is named alone may be wrong: from the one that even the surest name has
+(:data:`tank2sim.gap.search.model_choice.SUREST`) to a guess."""
 Count = Annotated[int, ArgumentBounds(1, whole=True)]
 ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 """Ships of an ensemble. Project choice: a day of computing."""
@@ -150,6 +154,25 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
         return function(*bound.args, **bound.kwargs)
 
     return call
+
+
+def refuse_set(function: Callable[..., Any], given: Mapping[str, Any], problem: str, *, taken: Collection[str]) -> None:
+    """Raise ArgumentError for an argument of a function, none of `taken`, that differs from its default.
+
+    Parameters
+    ----------
+    function : callable
+    given : mapping
+        Value of each of its arguments.
+    problem : str
+        Why it is refused.
+    taken : collection of str
+        Arguments that may have any value.
+    """
+    for name, one in inspect.signature(function).parameters.items():
+        value = tuple(given[name]) if isinstance(given[name], list) else given[name]
+        if name not in taken and value != one.default:
+            raise ArgumentError(name, "", problem, "leave it out")
 
 
 class UnknownType(type):

@@ -14,11 +14,21 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim import memory
-from tank2sim.arguments import AngleArgument, ArgumentBounds, Count, Effects, Seed, SpeedArgument, bounds_of, checked
+from tank2sim.arguments import (
+    AngleArgument,
+    ArgumentBounds,
+    Count,
+    Effects,
+    FalseDiscovery,
+    Seed,
+    SpeedArgument,
+    bounds_of,
+    checked,
+)
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
 from tank2sim.cli.options import number
-from tank2sim.gap.workflow import MOST_EFFECTS
+from tank2sim.gap.search.model_choice import LIKELY, SUREST
 from tests.cli.command_line import refused, tank2sim
 
 SHIP = t2s.load("mariner")
@@ -93,6 +103,8 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: t2s.identify(SHIP, 5), "trials"),
         (lambda: t2s.identify(SHIP, "x.csv", members=-1), "members"),
         (lambda: t2s.identify(SHIP, "x.csv", piece_s=0.0), "piece_s"),
+        (lambda: t2s.identify(SHIP, "x.csv", posterior="gibbs"), "posterior"),
+        (lambda: t2s.identify(SHIP, "x.csv", structure="kraken"), "structure"),
         (lambda: t2s.find_gap(SHIP, "x.csv", max_effects=9), "max_effects"),
         (lambda: t2s.find_gap(SHIP, "x.csv", workers=0), "workers"),
         (lambda: t2s.validate(SHIP, required_percent=-1), "required_percent"),
@@ -209,7 +221,7 @@ def test_a_rudder_that_looks_like_radians_is_doubted_in_the_first_line(
 
 
 def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
-    assert bounds_of(Effects) == ArgumentBounds(1, MOST_EFFECTS, whole=True)
+    assert bounds_of(FalseDiscovery) == ArgumentBounds(round(1 - SUREST, 9), 1 - LIKELY)
     for kind in (Seed, Count, SpeedArgument, Effects):
         bounds, option = bounds_of(kind), number(kind)
         assert bounds is not None and isinstance(option, click.IntRange | click.FloatRange)

@@ -65,7 +65,6 @@ def test_no_file_has_the_ending_of_another_kind(ending: str, tmp_path: Path) -> 
         "convert mariner --to abkowitz -o x.csv",
         "convert otter --to gazebo -o x.toml",
         "identify mariner zigzag.csv -o x.csv",
-        "identify mariner zigzag.csv --plot x.png",
         "influence mariner -o x.json",
         "guess --length 1 --beam 1 --draught 1 --block 1 --speed 1 -o x.html",
         "reduce captive.toml --budget x.toml",

@@ -1,6 +1,7 @@
 """Winds and currents that differ from trial to trial, or that the trials recorded."""
 
-from __future__ import annotations
+from __future__ import annotationsfrom tank2sim.results.gap import gap_result
+
 
 from dataclasses import replace
 from functools import cache
@@ -13,7 +14,6 @@ import tomlkit
 from gap_truth import Made, Setting, make, sampled, write
 from identify_esso_osaka import spans
 
-from tank2sim.api.gap import gap_result
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import surroundings_by_trial

@@ -1,4 +1,4 @@
-"""A craft's card against trials that did not make it: free-running predictions."""
+"""The card of a craft compared with other trials than those it was identified from: free-running predictions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.api.craft_identification import craft_trial_files
 from tank2sim.cards import CraftCard
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import PREDICTION_LEAD_S, SHORTEST_PREDICTION_S, predict_by_card
@@ -18,23 +17,20 @@ from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.same_record import refuse_copies
 
 
-def validate_craft(
-    card: CraftCard, trials: str | Path | Sequence[str | Path]
-) -> tuple[CraftValidationStudy, CraftCard, tuple[Path, ...]]:
+def validate_craft(card: CraftCard, paths: Sequence[Path]) -> tuple[CraftValidationStudy, CraftCard, tuple[Path, ...]]:
     """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
     Parameters
     ----------
     card : CraftCard
-    trials : path or sequence of paths
-        As those of :func:`tank2sim.identify_craft`.
+    paths : sequence of Path
+        Trials (:func:`.read_craft_trial`).
 
     Raises
     ------
     InputError
         There is no trial, a file is at fault, none is long enough, or the card does not move as the trials do.
     """
-    paths = craft_trial_files(trials)
     if not paths:
         remedy = "give trials that tank2sim log cut and identify did not fit"
         raise InputError("trials", "", "there are none, and a craft is validated by what it did", remedy)

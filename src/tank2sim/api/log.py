@@ -88,4 +88,4 @@ def _identified(craft: Ship, cuts: Sequence[TrialCut]) -> CraftIdentificationRes
     with tempfile.TemporaryDirectory() as name:
         paths = [Path(name) / cut.trial.path.name for cut in taken]
         write_together({path: cut.text for path, cut in zip(paths, taken, strict=True)})
-        return identify_craft(craft, paths)
+        return identify_craft(craft.card, paths, [])

@@ -29,10 +29,14 @@ class Written:
     endings : tuple of str, optional
         As of :class:`Output`.
     metavar : str
+    by_function : bool
+        The function itself writes there (a folder, as its work goes on), and the command requires it. The ``written``
+        of the result are the files.
     """
 
     endings: tuple[str, ...] | None
     metavar: str = "FILE"
+    by_function: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +20,7 @@ from tank2sim import arguments
 from tank2sim.api.verbs import Output, Verb, Written
 from tank2sim.cli.options import OutputFile
 from tank2sim.errors import InputError
+from tank2sim.escaping import one_line
 from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled
 from tank2sim.units import in_words
 
@@ -32,7 +34,7 @@ class VerbCommand(click.Command):
         spread: list[str] = []
         taking = ""
         for word, following in pairwise([*args, "-"]):
-            if word in several and following.startswith("--"):
+            if word in several and following.startswith("-") and not _is_number(following):
                 raise click.UsageError(f"{word} is followed by nothing", ctx)
             if word.startswith("-") and not _is_number(word):
                 taking = word if word in several else ""
@@ -119,13 +121,14 @@ def _is_chosen(flag: str, verb: Verb, given: Mapping[str, Any], first: str) -> b
 
 
 def _refuse_foreign(chosen: str, verb: Verb, others: Mapping[str, Verb], known: Mapping[str, click.Parameter]) -> None:
-    """Refuse options that were given and that belong to another variant of the command."""
+    """Refuse arguments and options that were given and that belong to another variant of the command."""
     context = click.get_current_context()
     names = {flag: {one.name for one in _own_parameters(other)} for flag, other in {"": verb, **others}.items()}
     words = {flag: flag if other.takes else f"--{flag}" for flag, other in others.items()}
+    first = next(iter(known), "")
     for name, parameter in known.items():
         given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if name in names[chosen] or not given or not isinstance(parameter, click.Option):
+        if name in names[chosen] or not given or name == first or context.params[name] in (None, ()):
             continue
         if chosen:
             raise InputError(parameter.opts[0], "", f"does not go with {words[chosen]}", "leave it out")
@@ -188,7 +191,7 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         return [card, change] if required else [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
-        required = one.default is inspect.Parameter.empty
+        required = written.by_function or one.default is inspect.Parameter.empty
         return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
                         required=required)]  # fmt: skip
     required = one.default is inspect.Parameter.empty
@@ -283,7 +286,9 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
 
     values, changes = dict(given), given.get("set", ())
     named = [_value_of(output, values) for output in verb.outputs]
-    refuse_doubled(path for path in (*named, values["page"], values["json"]) if path is not None)
+    outputs = [path for path in (*named, values["page"], values["json"]) if path is not None]
+    refuse_doubled(outputs)
+    _refuse_unplaced(outputs, [values["plot"], *named])
     inputs: list[Path] = []
     with ExitStack() as stack:
         call = _values_for(verb.function, values, verb.texts, changes, inputs)
@@ -291,7 +296,8 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             call["report"] = stack.enter_context(showing_stages(verb.words))
         result = verb.function(**call)
         contents: dict[Path, str | bytes] = {}
-        if any(_written(kind) for _, kind in _arguments(verb.function)):
+        marks = (_written(kind) for _, kind in _arguments(verb.function))
+        if any(mark and not mark.by_function for mark in marks):
             contents |= result.files
         for output in verb.outputs:
             if (path := _value_of(output, values)) is None:
@@ -306,8 +312,17 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             contents |= made
     given_files = {name: values[name] for name in ("page", "plot", "json")}
     written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
-    show_result(result, written, quiet=values["quiet"], verbose=values["verbose"])
-    return verb.exit_code(result)
+    show_result(result, [*result.written, *written], quiet=values["quiet"], verbose=values["verbose"])
+    for fault in result.faults:
+        print(f"tank2sim: {one_line(fault)}", file=sys.stderr)
+    return 2 if result.faults else verb.exit_code(result)
+
+
+def _refuse_unplaced(outputs: Iterable[Path], made: Sequence[Path | None]) -> None:
+    """Refuse, before work that takes long, files in folders that neither exist nor are `made` with the outputs."""
+    for path in outputs:
+        if not path.parent.is_dir() and path.parent not in made:
+            raise InputError(path, "", "cannot be written: its folder does not exist", "give one that exists")
 
 
 def _value_of(output: Output, values: Mapping[str, Any]) -> Path | None:

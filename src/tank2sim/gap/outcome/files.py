@@ -48,25 +48,19 @@ def folder_made(path: Path) -> Iterator[None]:
         raise
 
 
-def refuse_early(folder: Path, json_file: Path | None, inputs: Sequence[Path]) -> None:
-    """Refuse, before the long work, files that could not be written.
+def refuse_early(folder: Path, inputs: Sequence[Path]) -> None:
+    """Refuse, before the long work, a folder of results in which an input would be overwritten.
 
     Parameters
     ----------
     folder : Path
-        Of the results.
-    json_file : Path or None
-        Where the JSON goes, too.
     inputs : sequence of Path
-        Files that must not be overwritten.
     """
     for name in ALWAYS:
         for path in inputs:
             if (folder / name).exists() and (folder / name).samefile(path):
-                remedy = "give another folder with -o"
+                remedy = "give another folder"
                 raise InputError(folder / name, "", f"is an input ({path}), which would be overwritten", remedy)
-    if json_file and not json_file.parent.is_dir():
-        raise InputError(json_file, "", "cannot be written: its folder does not exist", "give one that exists")
 
 
 def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path]) -> list[str]:
