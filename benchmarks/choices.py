@@ -38,7 +38,7 @@ COMMANDS = {
     "analysis.validation": [f"validate mariner {ZIGZAG} {HELD}", "poster mariner -o poster.html"],
     "analysis": ["stability mariner", "stability kvlcc2-captive"],
     "cards": [f"{IDENTIFY} -o new.toml", "simulate new.toml --manoeuvre turn:35 --ensemble 20"],
-    "dynamics.glider": ["glide --angle-deg 25"],
+    "dynamics.glider": ["glide --angles 25"],
     "dynamics": [
         *(f"simulate mariner --manoeuvre {word}" for word in ("turn:35", "pullout:20")),
         "simulate esso-osaka-estimated --manoeuvre stop",

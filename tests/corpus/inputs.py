@@ -267,7 +267,7 @@ RESULTS: dict[str, list[str]] = {
     "validate.json": ["validate", "card.toml", "zigzag.csv", "--members", "0"],
     "influence.json": ["influence", "card.toml", "--figure", "K_per_s"],
     "design.json": ["design", "card.toml", "--figures", "steady_radius_m@20", "--hours", "3", "--draws", "0"],
-    "glide.json": ["glide", "--card", "glider.toml", "--angle-deg", "-30", "--programme", "programme.csv"],
+    "glide.json": ["glide", "glider.toml", "--angles", "-30", "--programme", "programme.csv"],
     "autopilot.json": ["autopilot", "card.toml"],
     "signals.json": ["signals", "zigzag.csv"],
     "identify.json": ["identify", "card.toml", "zigzag.csv", "--holdout", "turn.csv", "--structure", "linear",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from tank2sim.api.autopilot import autopilot
 from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.api.glide import glide
 from tank2sim.arguments import (
     AngleArgument,
     EnsembleSize,
@@ -41,13 +41,11 @@ if TYPE_CHECKING:
     from tank2sim.results.bridge import PilotCardResult, PosterResult
     from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
-    from tank2sim.results.glide import GlideResult
     from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
     from tank2sim.results.stability import StabilityResult
     from tank2sim.results.steering_page import SteeringPageResult
     from tank2sim.results.turn_tuning import TurnTuningResult
-    from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
 
 
@@ -524,61 +522,7 @@ class Ship:
         return tune_ship_through(self, first, second)
 
     autopilot = autopilot
-
-    @checked
-    def glide(
-        self,
-        angles_deg: float | Sequence[float] = (),
-        *,
-        roll_deg: AngleArgument = 0.0,
-        buoyancy_kg: PositiveArgument | None = None,
-        programme: GlideProgramme | str | Path | None = None,
-        as_printed: bool = False,
-        budget_kg: NumberArgument | None = None,
-        depth_m: NumberArgument | None = None,
-        views: bool = False,
-    ) -> GlideResult:
-        """Steady glides of an underwater glider, the path of a programme, and what is best.
-
-        Parameters
-        ----------
-        angles_deg : float or sequence of float
-            Paths of steady glides, + to climb, - to dive.
-        roll_deg : float
-            Of these glides, + starboard side down.
-        buoyancy_kg : float, optional
-            Size of their net buoyancy; by default that of the card.
-        programme : path or GlideProgramme, optional
-            To be flown, by the steady glides and by the transient model: a CSV of steps ``duration_s``,
-            ``path_angle_deg`` or ``pitch_deg``, ``roll_deg``, ``buoyancy_kg``.
-        as_printed : bool
-            Also what the equations of Kulikovsky & Velikanov give as they are printed.
-        budget_kg, depth_m : float, optional
-            Ballast that can be pushed out, and the depth from which, for the range. Both or neither.
-        views : bool
-            Also how wrong steady glides are for programmes of different speed.
-
-        Raises
-        ------
-        InputError
-            The card is not one of a glider, an angle or a step cannot be flown, or the programme is at fault.
-        """
-        from tank2sim.analysis.glide.study import GlideQuestion
-        from tank2sim.api.glide import glide_with
-        from tank2sim.simulation.glide_programme import read_programme
-
-        angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
-        question = GlideQuestion(
-            angles_rad=tuple(np.radians(angles).tolist()),
-            roll_rad=math.radians(roll_deg),
-            buoyancy_kg=buoyancy_kg,
-            programme=read_programme(programme) if isinstance(programme, str | Path) else programme,
-            as_printed=as_printed,
-            budget_kg=budget_kg,
-            depth_m=depth_m,
-            views=views,
-        )
-        return glide_with(self, question)
+    glide = glide
 
     @checked
     def poster(

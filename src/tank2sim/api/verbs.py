@@ -86,6 +86,8 @@ class Verb:
         verb of that name is the flag. The key of a verb that `takes` certain first arguments is their kind in words.
     takes : callable, optional
         As a variant, the verb is called if this is true of the first argument as a text.
+    default_ship : str
+        Name of the bundled ship that the command takes where no card is given; empty if one must be.
     page_required : bool
         Whether the page is the result itself, and must be written.
     exit_code : callable
@@ -100,6 +102,7 @@ class Verb:
     options: Mapping[str, str] = field(default_factory=dict)
     variants: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     takes: Callable[[str], bool] | None = None
+    default_ship: str = ""
     page_required: bool = False
     exit_code: Callable[[Any], int] = lambda _: 0
 

@@ -87,6 +87,7 @@ VERBS = {
     "design": "api.design:design_campaign",
     "export": "api.fmu:make_fmu_file",
     "gap": "api.gap:find_gap",
+    "glide": "api.glide:glide",
     "guess": "api.guess:guess",
     "identify": "api.identification:identify",
     "pilotcard": "api.bridge:make_pilot_card",

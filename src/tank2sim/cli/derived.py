@@ -34,22 +34,27 @@ class VerbCommand(click.Command):
         spread: list[str] = []
         taking = ""
         for word, following in pairwise([*args, "-"]):
-            if word in several and following.startswith("-") and not _is_number(following):
+            if word in several and following.startswith("-") and not _numbers(following):
                 raise click.UsageError(f"{word} is followed by nothing", ctx)
-            if word.startswith("-") and not _is_number(word):
+            numbers = _numbers(word)
+            if word.startswith("-") and not numbers:
                 taking = word if word in several else ""
                 spread += [] if taking else [word]
+            elif taking:
+                spread += [part for value in numbers or [word] for part in (taking, value)]
             else:
-                spread += [taking, word] if taking else [word]
+                spread.append(word)
         return super().parse_args(ctx, spread)
 
 
-def _is_number(word: str) -> bool:
+def _numbers(word: str) -> list[str]:
+    """The numbers of a word like ``25,-30``; empty if it is anything else."""
+    parts = word.split(",")
     try:
-        float(word)
+        list(map(float, parts))
     except ValueError:
-        return False
-    return True
+        return []
+    return parts
 
 
 def command_of(name: str, verb: Verb) -> click.Command:
@@ -71,7 +76,8 @@ def command_of(name: str, verb: Verb) -> click.Command:
                 continue
             own.setdefault(parameter.name or "", parameter)
     documented, _ = _documented(verb.function)
-    text = "\n\n".join(part for part in (documented.short_description, documented.long_description) if part)
+    usual = f"By default CARD is {verb.default_ship}." if verb.default_ship else ""
+    text = "\n\n".join(filter(None, (documented.short_description, documented.long_description, usual)))
     if inspect.signature(verb.function).return_annotation == "str":
         return VerbCommand(name, params=[*own.values()], callback=lambda **given: _print(verb, given), help=text)
     flags = [
@@ -186,9 +192,11 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
     if _is_of("Ship", kind):
         change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
                          "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
-        required = one.default is inspect.Parameter.empty
-        card = click.Argument([one.name], metavar="CARD", required=required)
-        return [card, change] if required else [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+        if one.default is not inspect.Parameter.empty:
+            return [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+        usual = verb.default_ship or None
+        metavar = "[CARD]" if usual else "CARD"
+        return [click.Argument([one.name], metavar=metavar, required=not usual, default=usual), change]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
         required = written.by_function or one.default is inspect.Parameter.empty
