@@ -94,6 +94,7 @@ VERBS = {
     "poster": "api.bridge:make_poster",
     "ships": "api.bundled_ships:list_ships",
     "tow": "api.tow:tow",
+    "yaw": "api.yaw:yaw",
 }
 """Commands that are derived from their function."""
 

@@ -297,6 +297,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
     outputs = [path for path in (*named, values["page"], values["json"]) if path is not None]
     refuse_doubled(outputs)
     _refuse_unplaced(outputs, [values["plot"], *named])
+    _refuse_idle(output for output, path in zip(verb.outputs, named, strict=True) if path is None)
     inputs: list[Path] = []
     with ExitStack() as stack:
         call = _values_for(verb.function, values, verb.texts, changes, inputs)
@@ -331,6 +332,15 @@ def _refuse_unplaced(outputs: Iterable[Path], made: Sequence[Path | None]) -> No
     for path in outputs:
         if not path.parent.is_dir() and path.parent not in made:
             raise InputError(path, "", "cannot be written: its folder does not exist", "give one that exists")
+
+
+def _refuse_idle(outputs: Iterable[Output]) -> None:
+    """Refuse options of files that are not written."""
+    context = click.get_current_context()
+    for output in outputs:
+        for option in _output_parameters(output)[1:]:
+            if context.get_parameter_source(option.name or "") is ParameterSource.COMMANDLINE:
+                raise InputError(option.opts[0], "", f"needs {output.option}", "add it")
 
 
 def _value_of(output: Output, values: Mapping[str, Any]) -> Path | None:

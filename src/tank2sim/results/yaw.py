@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import PurePath
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card, YawRigCard, parse_card
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.yaw.card import (
     BEST,
     body_length,
@@ -72,6 +72,8 @@ class YawResult(Result[YawStudy]):
         What is known of the rig.
     open_ship : callable, optional
         Function that returns the ship of a card, a name or a file.
+    files : mapping, optional
+        Paths and contents of the card's files, if the command writes one.
     """
 
     study: YawStudy
@@ -79,6 +81,7 @@ class YawResult(Result[YawStudy]):
     identification: YawIdentification | None = None
     rig: YawRigCard | None = None
     open_ship: Callable[[Any], Any] | None = None
+    files: Mapping[Path, str | bytes] = field(default_factory=dict)
     command: ClassVar[str] = "yaw"
 
     @property
@@ -90,7 +93,7 @@ class YawResult(Result[YawStudy]):
     def _known_method(self) -> str:
         if self.method not in self.study.methods:
             problem = f"{self.method} gave no estimate from these records"
-            raise InputError("--method", "", problem, f"take one of {', '.join(self.study.methods)}")
+            raise ArgumentError("method", "", problem, f"take one of {', '.join(self.study.methods)}")
         return self.method
 
     @property
