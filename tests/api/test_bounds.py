@@ -87,7 +87,7 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: SHIP.steer({"t_s": 0, "delta_order_deg": 1}), "orders"),
         (lambda: SHIP.steer(np.ones((3, 2))), "orders"),
         (lambda: SHIP.steer(None), "orders"),
-        (lambda: SHIP.poster(orders={"Half ahead": "a"}), "orders: Half ahead"),
+        (lambda: SHIP.poster(order={"Half ahead": "a"}), "order: Half ahead"),
         (lambda: SHIP.save(None), "path"),
         (lambda: SHIP.to_fmu("x.fmu", fmi="2"), "fmi"),
         (lambda: SHIP.replace({"model.speed_mps": None}), SHIP.card.source),

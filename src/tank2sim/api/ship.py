@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
 from tank2sim.api.autopilot import autopilot
+from tank2sim.api.bridge import make_pilot_card, make_poster
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.api.glide import glide
+from tank2sim.api.steering_page import make_steering_page
 from tank2sim.arguments import (
     AngleArgument,
     EnsembleSize,
@@ -36,20 +38,14 @@ if TYPE_CHECKING:
     import control
     import pandas as pd
 
-    from tank2sim.answer.result import Result
     from tank2sim.dynamics.model import Model
-    from tank2sim.results.bridge import PilotCardResult, PosterResult
     from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
     from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
     from tank2sim.results.stability import StabilityResult
-    from tank2sim.results.steering_page import SteeringPageResult
     from tank2sim.results.turn_tuning import TurnTuningResult
     from tank2sim.simulation.manoeuvres import Manoeuvre
-
-
-AnyResult = TypeVar("AnyResult", bound="Result[Any]")
 
 
 class SimulationOptions(TypedDict, total=False):
@@ -523,93 +519,9 @@ class Ship:
 
     autopilot = autopilot
     glide = glide
-
-    @checked
-    def poster(
-        self,
-        path: str | Path | None = None,
-        *,
-        ballast: Any = None,
-        orders: Mapping[str, float] | None = None,
-    ) -> PosterResult:
-        """The wheelhouse poster (IMO A.601(15), A3); what the card does not state stays blank.
-
-        Parameters
-        ----------
-        path : path, optional
-            HTML file to write, which prints on one page.
-        ballast : Ship, Card, str or path, optional
-            The ship in ballast; this is then the loaded condition.
-        orders : mapping, optional
-            Orders of the engine telegraph ahead, with their revolutions in rpm: ``{"Half ahead": 56}``.
-
-        Raises
-        ------
-        InputError
-            The ship does not manoeuvre, an order cannot be shown, the ballast card is of another ship, or the file
-            cannot be written.
-        """
-        from tank2sim.api.bridge import make_poster
-
-        return self._written(make_poster(self, ballast=ballast, order=orders), path)
-
-    @checked
-    def pilot_card(
-        self,
-        path: str | Path | None = None,
-        *,
-        ballast: Any = None,
-        orders: Mapping[str, float] | None = None,
-    ) -> PilotCardResult:
-        """The pilot card (IMO A.601(15), A4). Raises as :meth:`poster`.
-
-        Parameters
-        ----------
-        path, ballast, orders
-            As of :meth:`poster`.
-        """
-        from tank2sim.api.bridge import make_pilot_card
-
-        return self._written(make_pilot_card(self, ballast=ballast, order=orders), path)
-
-    @checked
-    def steering_page(
-        self,
-        path: str | Path | None = None,
-        *,
-        ghost: str | Path | None = None,
-        scenario: str | Path | None = None,
-        view_3d: bool = False,
-    ) -> SteeringPageResult:
-        """A page in which the ship is steered in a browser; it needs no network.
-
-        Parameters
-        ----------
-        path : path, optional
-            HTML file to write.
-        ghost : path, optional
-            A measured trial that moves next to the ship.
-        scenario : path or str, optional
-            Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
-        view_3d : bool
-            Whether the page also has the view from the bridge (three.js, 0.6 MB).
-
-        Raises
-        ------
-        InputError
-            The ship has no rudder, the trial is at fault or has no positions, the scenario is at fault, or the file
-            cannot be written.
-        """
-        from tank2sim.api.steering_page import make_steering_page
-
-        inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
-        return self._written(make_steering_page(self, ghost, scenario, view_3d), path, *inputs)
-
-    def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
-        """Write the page of a result to a path that is not an input, if one is given; return the result."""
-        if path is not None:
-            write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
-        return result
+    poster = make_poster
+    pilot_card = make_pilot_card
+    steering_page = make_steering_page
 
     @checked
     def to_fmu(

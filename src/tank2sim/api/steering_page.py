@@ -2,45 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.api.ship import Ship
-from tank2sim.cards import CraftCard, ManoeuvringCard
-from tank2sim.errors import InputError
-from tank2sim.results.steering_page import SteeringPageResult, SteeringStudy
+from tank2sim.api.verbs import Progress, verb
+from tank2sim.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
+    from tank2sim.api.ship import Ship
+    from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.dynamics.model import Model
     from tank2sim.report.steering.ghost import Ghost
     from tank2sim.report.steering.page import PageShip
     from tank2sim.report.steering.scenario import Scenario
+    from tank2sim.results.steering_page import SteeringPageResult
 
 FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
 
+STEERED_SHIP = "esso-osaka-ship"
+"""Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
 
+
+@verb("a page on which the ship is steered", default_ship=STEERED_SHIP, page_required=True)
 def make_steering_page(
     ship: Ship,
+    *,
     ghost: str | Path | None = None,
     scenario: str | Path | None = None,
     view_3d: bool = False,
-    report: Callable[[str], None] = lambda _: None,
+    report: Progress = lambda _: None,
 ) -> SteeringPageResult:
-    """Make the page, without writing it. Raises as :meth:`.Ship.steering_page`.
+    """Make a page on which a ship is steered in a browser; it needs no network.
 
     Parameters
     ----------
     ship : Ship
+        A ship with a rudder, or a craft with thrusters.
     ghost : path, optional
-        A measured trial.
+        Measured trial that moves next to the ship.
     scenario : path or str, optional
-        GeoJSON file of the waters, or the name of bundled ones.
+        Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
     view_3d : bool
-        Whether the page has the view from the bridge.
+        Also show the view from the bridge (three.js, 0.6 MB).
     report : callable
-        Called before what takes long.
+        Called with the stage that begins.
+
+    Raises
+    ------
+    InputError
+        The ship cannot be steered, the trial is at fault or has no positions, or the scenario is at fault.
     """
+    from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.identification.trials.problem.prepare_trials import measured
     from tank2sim.report.steering import ship as page_ship
     from tank2sim.report.steering.ghost import ghost_of
@@ -50,21 +63,16 @@ def make_steering_page(
     card, model = ship.card, ship.model
     if isinstance(card, CraftCard):
         if ghost:
-            raise InputError(
-                "--ghost", "", "is a trial with a rudder, and a craft with thrusters has none", "leave it out"
-            )
+            problem = "is a trial with a rudder, and a craft with thrusters has none"
+            raise ArgumentError("ghost", "", problem, "leave it out")
         waters = read_scenario(scenario) if scenario else None
         in_page = _page_ship(card, model, _compiled(model, report))
         return _result(in_page, None, model.notices, waters, view_3d)
     if not isinstance(card, ManoeuvringCard):
-        raise InputError(
-            card.source,
-            "",
-            "has no rudder",
-            "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered",
-        )
+        remedy = "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered"
+        raise InputError(card.source, "", "has no rudder", remedy)
     if ghost and scenario:
-        raise InputError("--scenario", "", "goes not with --ghost", "both say where the ship starts: leave one out")
+        raise ArgumentError("scenario", "", "does not go with a ghost: both set the start of the ship", "leave one out")
     waters = read_scenario(scenario) if scenario else None
     trial = measured([Path(ghost)], card) if ghost else None
     shown = ghost_of(trial.trials[0], model) if trial else None
@@ -89,6 +97,7 @@ def _result(
     ship: PageShip, ghost: Ghost | None, notices: Sequence[str], scenario: Scenario | None, view_3d: bool
 ) -> SteeringPageResult:
     from tank2sim.report.steering.page import steering_page
+    from tank2sim.results.steering_page import SteeringPageResult, SteeringStudy
 
     said = tuple(dict.fromkeys(notices))
     html = steering_page(ship, ghost, said, scenario, view_3d)
@@ -105,14 +114,14 @@ def _result(
     return SteeringPageResult(study, html)
 
 
-def _compiled(model: Model, report: Callable[[str], None]) -> str:
+def _compiled(model: Model, report: Progress) -> str:
     """The library of a model. Raises InputError without the compiler for WebAssembly."""
     from tank2sim.native.cross import has_compiled
     from tank2sim.report.steering import ship as page_ship
 
     if not page_ship.has_compiler():
-        problem = "needs a compiler for WebAssembly, which is not installed: without it no ship is in the page"
-        raise InputError("steer", "", problem, "pip install tank2sim[platforms], and write the page again")
+        problem = "needs a compiler for WebAssembly, which is not installed"
+        raise InputError("the page", "", problem, "pip install tank2sim[platforms], and write the page again")
     if not has_compiled(page_ship.WEB):
         report(FIRST_COMPILATION)
     return page_ship.ship_in_page(model)

@@ -93,6 +93,7 @@ VERBS = {
     "pilotcard": "api.bridge:make_pilot_card",
     "poster": "api.bridge:make_poster",
     "ships": "api.bundled_ships:list_ships",
+    "steer": "api.steering_page:make_steering_page",
     "tow": "api.tow:tow",
     "yaw": "api.yaw:yaw",
 }
