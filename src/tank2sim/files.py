@@ -10,7 +10,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -312,6 +312,26 @@ def writable_folder(path: Path) -> Path:
             path, "", f"is not a folder that can be written ({error.strerror})", "choose another with -o"
         ) from None
     return path
+
+
+@contextmanager
+def folder_made(path: Path) -> Iterator[None]:
+    """A folder for outputs, made before the long work that fills it, and removed if that fails.
+
+    Raises
+    ------
+    InputError
+        It cannot be made or written.
+    """
+    made = not path.exists()
+    writable_folder(path)
+    try:
+        yield
+    except BaseException:
+        if made:
+            with suppress(OSError):
+                path.rmdir()
+        raise
 
 
 def _umask() -> int:

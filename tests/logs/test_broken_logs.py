@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.api.log import LogResult, log
+from tank2sim.api.log import log
 from tank2sim.errors import InputError
 from tank2sim.logs.reading import read_log
 from tank2sim.records.reading import read_trial_file
+from tank2sim.results.log import LogResult
 from tests.logs.made_logs import frame, nmea_lines, rmc, sentence, voyage
 from tests.marks import first_fast
 

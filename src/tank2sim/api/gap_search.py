@@ -15,13 +15,13 @@ from tank2sim.cards import Card, ManoeuvringCard, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin
-from tank2sim.files import json_text, parsed_json, read_text, writable_folder, write_together
+from tank2sim.files import folder_made, json_text, parsed_json, read_text, writable_folder, write_together
 from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
 from tank2sim.gap.fleet.search import Fault, ShipTask, fault_of_program, find_at_once, find_in_turn, nonlinear_card
 from tank2sim.gap.fleet.ships import GAP, Fleet, ShipFolder, fleet_in
 from tank2sim.gap.fleet.summary import FleetStudy, ShipSummary, fleet_study, ship_summary
 from tank2sim.gap.inference.fit_all import StageReport
-from tank2sim.gap.outcome.files import folder_made, put, refuse_early
+from tank2sim.gap.outcome.files import put, refuse_early
 from tank2sim.gap.outcome.study import GapStudy
 from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow

@@ -4,46 +4,49 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from tank2sim.api.craft_identification import identify_craft
-from tank2sim.api.ship import Ship, as_ship
-from tank2sim.api.trial import TrialRecord
-from tank2sim.arguments import checked
-from tank2sim.cards import CraftCard
-from tank2sim.errors import InputError
-from tank2sim.files import write_together
-from tank2sim.logs.channels import ChannelSet, read_channels
-from tank2sim.logs.reading import read_log
-from tank2sim.logs.stretches import find_stretches
-from tank2sim.logs.study import study_log
-from tank2sim.logs.trial_files import TrialCut, cut_trials
-from tank2sim.logs.voyage import make_voyage
-from tank2sim.results.craft_identification import CraftIdentificationResult
-from tank2sim.results.log import LogResult
+from tank2sim.api.verbs import Written, verb
+from tank2sim.errors import ArgumentError, InputError
+from tank2sim.files import folder_made, write_together
+
+if TYPE_CHECKING:
+    from tank2sim.api.ship import Ship
+    from tank2sim.logs.channels import ChannelSet
+    from tank2sim.logs.trial_files import TrialCut
+    from tank2sim.results.craft_identification import CraftIdentificationResult
+    from tank2sim.results.log import LogResult
 
 
-@checked
+@verb("a vessel's own log, cut into trials")
 def log(
     files: str | Path | Sequence[str | Path],
+    output: str | Annotated[Path, Written((), "DIR", by_function=True)] | None = None,
     *,
     channels: str | Path | ChannelSet | None = None,
     card: Ship | str | Path | None = None,
 ) -> LogResult:
-    """Read logs of a vessel, find their channels and manoeuvres, and cut these into trials.
+    """Read the logs of one voyage, find which stream is which quantity, and cut its manoeuvres into trials.
 
     Formats: NMEA 0183, NMEA 2000 (candump, Actisense), ROS 1 and ROS 2 bags, MCAP, ArduPilot ``.bin`` and ``.tlog``,
-    PX4 ULog, any CSV. All but CSV need the extra ``tank2sim[logs]``.
+    PX4 ULog, any CSV. All but CSV need the extra ``tank2sim[logs]``. Channels are written to ``channels.toml`` with
+    their confidence; correct that file and run again, and it is used unchanged.
 
     Parameters
     ----------
     files : path or sequence of paths
         Logs of one voyage.
+    output : path, optional
+        Folder for ``channels.toml`` and the trials.
     channels : path or ChannelSet, optional
-        Which stream is which quantity, as ``channels.toml`` has it; by default they are found.
+        File that states which stream is which quantity; by default ``channels.toml`` of the folder if it exists, else
+        the channels are found.
     card : Ship, str or path, optional
-        Of a small craft: what the trials say of each of its coefficients is then in the result.
+        Card of a small craft: states for each coefficient whether these trials determine it, and which five minutes
+        would.
 
     Raises
     ------
@@ -61,25 +64,44 @@ def log(
     >>> list(found.stretches["kind"])[-1]
     'zigzag'
     """
+    from tank2sim.api.ship import as_ship
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.cards import CraftCard
+    from tank2sim.logs.channels import CHANNELS_FILE, ChannelSet, read_channels
+    from tank2sim.logs.reading import read_log
+    from tank2sim.logs.stretches import find_stretches
+    from tank2sim.logs.study import study_log
+    from tank2sim.logs.trial_files import cut_trials
+    from tank2sim.logs.voyage import make_voyage
+    from tank2sim.results.log import LogResult
+
     paths = [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]
     if not paths:
-        raise InputError("log", "", "has no file", "give at least one log")
-    stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
-    craft = None if card is None else as_ship(card)
-    if craft is not None and not isinstance(craft.card, CraftCard):
-        remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
-        raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
-    voyage = make_voyage([read_log(path) for path in paths], stated)
-    found = find_stretches(voyage)
-    cuts = cut_trials(voyage, found)
-    identified = None if craft is None else _identified(craft, cuts)
-    study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
-    trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
-    return LogResult(study, voyage, found, tuple(cuts), trials, identified)
+        raise ArgumentError("files", "", "is empty", "give at least one log")
+    folder = None if output is None else Path(output)
+    if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
+        channels = folder / CHANNELS_FILE
+    with nullcontext() if folder is None else folder_made(folder):
+        stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
+        craft = None if card is None else as_ship(card)
+        if craft is not None and not isinstance(craft.card, CraftCard):
+            remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
+            raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
+        voyage = make_voyage([read_log(path) for path in paths], stated)
+        found = find_stretches(voyage)
+        cuts = cut_trials(voyage, found)
+        identified = None if craft is None else _identified(craft, cuts)
+        study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
+        trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
+        result = LogResult(study, voyage, found, tuple(cuts), trials, identified)
+        return result if folder is None else result.written_to(folder)
 
 
 def _identified(craft: Ship, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
     """Coefficients of a craft from all trials; None without any."""
+    from tank2sim.api.craft_identification import identify_craft
+    from tank2sim.cards import CraftCard
+
     assert isinstance(craft.card, CraftCard)
     turning = any(thruster.max_azimuth_rad is not None for thruster in craft.card.thrusters)
     taken = [cut for cut in cuts if turning or not cut.steered]

@@ -90,6 +90,7 @@ VERBS = {
     "glide": "api.glide:glide",
     "guess": "api.guess:guess",
     "identify": "api.identification:identify",
+    "log": "api.log:log",
     "pilotcard": "api.bridge:make_pilot_card",
     "poster": "api.bridge:make_poster",
     "ships": "api.bundled_ships:list_ships",

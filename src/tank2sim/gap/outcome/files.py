@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from tank2sim.cards.covariance import covariance_file
 from tank2sim.errors import InputError
-from tank2sim.files import writable_folder, write_together
+from tank2sim.files import folder_made, write_together
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE
 
@@ -32,20 +31,6 @@ FOLDERS = (CORRECTED, SURROUNDED)
 """Folders of trials that only some runs write."""
 
 GapFiles = dict[Path, str | bytes]
-
-
-@contextmanager
-def folder_made(path: Path) -> Iterator[None]:
-    """A folder for outputs, made before the long work that fills it, and removed if that fails."""
-    made = not path.exists()
-    writable_folder(path)
-    try:
-        yield
-    except BaseException:
-        if made:
-            with contextlib.suppress(OSError):
-                path.rmdir()
-        raise
 
 
 def refuse_early(folder: Path, inputs: Sequence[Path]) -> None:
