@@ -10,9 +10,9 @@ import jsonschema
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.demo import DemoResult
 from tank2sim.demo import DEMO_STEPS, PAGE
 from tank2sim.demo.run import write_demo
+from tank2sim.results.demo import DemoResult
 
 pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too
 

@@ -30,8 +30,8 @@ class Written:
         As of :class:`Output`.
     metavar : str
     by_function : bool
-        The function itself writes there (a folder, as its work goes on), and the command requires it. The ``written``
-        of the result are the files.
+        The function itself writes there (a folder, as its work goes on), and the command requires it unless it has a
+        default. The ``written`` of the result are the files.
     """
 
     endings: tuple[str, ...] | None

@@ -84,6 +84,7 @@ VERBS = {
     "check": "api.fmu:check_fmu",
     "convention": "api.convention:convention",
     "convert": "api.conversion:convert",
+    "demo": "api.demo:run_demo",
     "design": "api.design:design_campaign",
     "export": "api.fmu:make_fmu_file",
     "gap": "api.gap:find_gap",

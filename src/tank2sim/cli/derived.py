@@ -199,9 +199,10 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         return [click.Argument([one.name], metavar=metavar, required=not usual, default=usual), change]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
-        required = written.by_function or one.default is inspect.Parameter.empty
+        usual = None if one.default is inspect.Parameter.empty else one.default
+        required = usual is None and (written.by_function or one.default is inspect.Parameter.empty)
         return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
-                        required=required)]  # fmt: skip
+                        required=required, default=usual, show_default=bool(usual))]  # fmt: skip
     required = one.default is inspect.Parameter.empty
     by_position = one.kind is not inspect.Parameter.KEYWORD_ONLY and one.name not in verb.options
     if by_position and (required or one.name == _first_list(verb.function)):
