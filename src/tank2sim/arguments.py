@@ -109,6 +109,8 @@ ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 EnsembleSize = Annotated[int, ENSEMBLE]
 SmallEnsemble = Annotated[int, ArgumentBounds(0, 100_000, whole=True)]
 """Ships that are each simulated on trials. Project choice: a day of computing."""
+PROCESSES = "processes"
+"""Executor: processes of this machine."""
 VALIDATION_MEMBERS = 40
 """Ships of an ensemble for deviations of figures: their deviation has an uncertainty of about 15 %. Project choice."""
 REQUIRED_PERCENT = 20.0

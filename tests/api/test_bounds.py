@@ -238,7 +238,7 @@ def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
     "arguments, option",
     [
         ("simulate mariner --manoeuvre turn:35 --duration nan", "--duration"),
-        ("simulate mariner --manoeuvre turn:35 --ensemble 9999999999", "--ensemble"),
+        ("simulate mariner --manoeuvre turn:35 --members 9999999999", "--members"),
         ("stability mariner --speed nan", "--speed"),
         ("autopilot mariner --wave-filter nan", "--wave-filter"),
         ("design mariner --carriage-length nan", "--carriage-length"),

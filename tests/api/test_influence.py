@@ -113,7 +113,7 @@ def test_models_of_a_steering_card_turn_as_the_paper_prints() -> None:
     [
         (lambda ship: ship.influence("steady_radius"), "--figure", "steady_radius"),
         (lambda ship: ship.influence("criterion_C", joint_variation={"Yq": 1.0}), "--agreed", "Yq"),
-        (lambda ship: ship.influence("criterion_C", members=1), "--ensemble", ""),
+        (lambda ship: ship.influence("criterion_C", members=1), "members", ""),
         (lambda ship: ship.tune("steady_radius_m@20"), "--tune", "steady_radius_m@20"),
         (lambda ship: ship.tune([]), "--tune", ""),
         (lambda ship: ship.tune("criterion_C=5e-6", by="luck"), "--by", ""),

@@ -407,7 +407,7 @@ def test_samples_of_the_posterior_are_with_the_card_and_ensembles_take_them(fold
     assert known is not None and known.samples is not None and known.samples.shape == (240, len(entries))
     stated = [card.derivatives[name.partition(".")[2]] for name in known.names]
     np.testing.assert_allclose(known.samples.mean(axis=0), stated, rtol=1e-3, atol=1e-6)
-    simulated = tank2sim("simulate", "sampled.toml", "--manoeuvre", "turn:20", "--ensemble", "20", cwd=folder)
+    simulated = tank2sim("simulate", "sampled.toml", "--manoeuvre", "turn:20", "--members", "20", cwd=folder)
     assert "240 samples of the posterior" in simulated.stdout
 
 

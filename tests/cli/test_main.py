@@ -56,7 +56,7 @@ def test_asked_for_nothing_it_helps(tmp_path) -> None:
         ("tows", "wilinski-zellman/tows.csv", ["tow", "tows", "--terms", "B3", "-o", "tows"]),
         ("ship", "mariner/ship.toml", ["stability", "ship", "--json", "ship"]),
         ("ship", "wilinski-zellman/ship.toml", ["export", "ship", "-o", "ship"]),
-        ("ship", "mariner/ship.toml", ["simulate", "ship", "--manoeuvre", "turn:35", "--out", "ship"]),
+        ("ship", "mariner/ship.toml", ["simulate", "ship", "--manoeuvre", "turn:35", "-o", "ship"]),
     ],
 )
 def test_an_input_is_not_written_over(tmp_path, given, bundled, arguments) -> None:

@@ -80,7 +80,7 @@ def test_validate_tells_each_figure_of_a_real_trial(tmp_path, data) -> None:
 
 @pytest.mark.slow
 def test_a_criterion_beyond_the_card_is_neither_met_nor_probable(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", "--ensemble", "3", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spirals", "--members", "3", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     tables = result.stdout.split("IMO MSC.137(76)")[1:]
     rows = [next(row for row in one.splitlines() if "tactical" in row) for one in tables]

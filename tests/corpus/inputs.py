@@ -262,7 +262,7 @@ RESULTS: dict[str, list[str]] = {
     "audit.json": ["audit", "zigzag.csv"],
     "tow.json": ["tow", "tows.csv"],
     "reduce.json": ["reduce", "captive.toml"],
-    "stability.json": ["stability", "card.toml", "--no-spiral"],
+    "stability.json": ["stability", "card.toml", "--no-spirals"],
     "compare.json": ["compare", "card.toml", "tanker.toml", "--members", "0"],
     "validate.json": ["validate", "card.toml", "zigzag.csv", "--members", "0"],
     "influence.json": ["influence", "card.toml", "--figure", "K_per_s"],

@@ -18,7 +18,7 @@ FAST = ["--structure", "linear", "--members", "0", "--method"]
 
 RECIPES: dict[str, list[Recipe]] = {
     "simulate": [
-        (["card.toml", "--manoeuvre", "turn:35", "--duration", "40", "--out", "run.csv"], ["card.toml"]),
+        (["card.toml", "--manoeuvre", "turn:35", "--duration", "40", "-o", "run.csv"], ["card.toml"]),
         (["card.toml", "--manoeuvre", "zigzag:10/10", "--duration", "40", "--json", "out.json"], ["card.toml"]),
         (["card.toml", "--manoeuvre", "file:orders.csv", "--duration", "40"], ["orders.csv"]),
         (["tanker.toml", "--manoeuvre", "pullout:20", "--duration", "40"], ["tanker.toml"]),
@@ -95,7 +95,7 @@ RECIPES: dict[str, list[Recipe]] = {
     "export": [(["card.toml", "-o", "out.fmu"], ["card.toml"]),
                (["surge.toml", "-o", "out.fmu"], ["surge.toml"])],
     "check": [(["ship.fmu"], ["ship.fmu"]), (["ship.fmu", "--card", "card.toml"], ["card.toml"])],
-    "stability": [(["card.toml", "--no-spiral", "--json", "out.json"], ["card.toml"])],
+    "stability": [(["card.toml", "--no-spirals", "--json", "out.json"], ["card.toml"])],
     "report": [([name, "-o", "out.html"], [name]) for name in RESULTS],
 }  # fmt: skip
 

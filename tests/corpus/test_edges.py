@@ -49,7 +49,7 @@ def test_tows_of_impossible_numbers_are_refused_by_column(folder, column, factor
 def test_a_derivative_that_no_hull_has_is_refused_by_its_key(folder, value):
     text = (folder / "card.toml").read_text().replace("Yv = -1160e-5", f"Yv = {value}")
     (folder / "card.toml").write_text(text)
-    refused(tank2sim("stability", "card.toml", "--no-spiral", cwd=folder), "card.toml", "derivatives.Yv")
+    refused(tank2sim("stability", "card.toml", "--no-spirals", cwd=folder), "card.toml", "derivatives.Yv")
 
 
 def test_a_motion_that_leaves_all_bounds_names_the_card(folder):

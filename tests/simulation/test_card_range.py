@@ -111,7 +111,7 @@ def test_a_command_whose_figures_leave_the_card_says_so_before_it_shows_any(argu
 
 def test_json_names_the_figures_outside_the_card(tmp_path) -> None:
     file = tmp_path / "run.json"
-    invoked("simulate", "kvlcc2-captive", "--manoeuvre", "zigzag:20/20", "--ensemble", "2", "--json", file)
+    invoked("simulate", "kvlcc2-captive", "--manoeuvre", "zigzag:20/20", "--members", "2", "--json", file)
     found = json.loads(file.read_text())
     assert {"overshoot_1_deg", "overshoot_2_deg", "period_s"} <= set(found["outside_card_range"])
     assert found["left_card_range_s"] < 5

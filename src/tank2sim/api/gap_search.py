@@ -11,10 +11,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tank2sim.api.trial import TrialPaths, fitted_and_held, trial_files
+from tank2sim.arguments import PROCESSES
 from tank2sim.cards import Card, ManoeuvringCard, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin
+from tank2sim.executors import check_executor, executing, processes_to_begin
 from tank2sim.files import folder_made, json_text, parsed_json, read_text, writable_folder, write_together
 from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
 from tank2sim.gap.fleet.search import Fault, ShipTask, fault_of_program, find_at_once, find_in_turn, nonlinear_card

@@ -223,7 +223,8 @@ def _computing(
     options: IdentificationOptions, executor: str, workers: int | None, *, held: bool
 ) -> Iterator[Executor | None]:
     """Executor for cross-validation and bootstrap; a cluster also computes the intervals of held-out trials."""
-    from tank2sim.executors import PROCESSES, check_executor, executing
+    from tank2sim.arguments import PROCESSES
+    from tank2sim.executors import check_executor, executing
 
     on_this_machine = check_executor(executor) == PROCESSES
     several = options.structure in (AUTO, AVERAGE)

@@ -13,12 +13,14 @@ from tank2sim.api.autopilot import autopilot
 from tank2sim.api.bridge import make_pilot_card, make_poster
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.api.glide import glide
+from tank2sim.api.manoeuvre import simulate_manoeuvre
+from tank2sim.api.stability import judge_stability
 from tank2sim.api.steering_page import make_steering_page
 from tank2sim.arguments import (
+    PROCESSES,
     AngleArgument,
     EnsembleSize,
     NumberArgument,
-    PositiveArgument,
     Seed,
     SpeedArgument,
     TuningRange,
@@ -30,7 +32,6 @@ from tank2sim.cards.card import manoeuvring_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.errors import InputError, close_name
-from tank2sim.executors import PROCESSES
 from tank2sim.files import write_together
 from tank2sim.units import to_si
 
@@ -39,13 +40,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tank2sim.dynamics.model import Model
-    from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
     from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
-    from tank2sim.results.stability import StabilityResult
     from tank2sim.results.turn_tuning import TurnTuningResult
-    from tank2sim.simulation.manoeuvres import Manoeuvre
 
 
 class SimulationOptions(TypedDict, total=False):
@@ -294,88 +292,9 @@ class Ship:
             raise InputError("orders", "", "has columns of different lengths", "give an order for each time")
         return self.simulate(orders_from_columns(columns, "orders"), **options)
 
-    @checked
-    def simulate(
-        self,
-        manoeuvre: str | Manoeuvre,
-        *,
-        duration_s: PositiveArgument | None = None,
-        external: Mapping[str, float] | None = None,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> ManoeuvreResult:
-        """Simulate a manoeuvre in the words of the command line: ``"zigzag:20/20"``, ``"turn:-35"``, ``"stop"``.
+    simulate = simulate_manoeuvre
 
-        Parameters
-        ----------
-        manoeuvre : str or Manoeuvre
-            Angles of a text in degrees; an object of :mod:`tank2sim.simulation.manoeuvres` has radians.
-        duration_s : float, optional
-            By default as long as the manoeuvre needs.
-        external : mapping, optional
-            Constant force from outside: ``X``, ``Y`` (N, positive forward and to starboard) at ``x``, ``y`` (m, forward
-            of midships and to starboard), and a moment ``N`` (N m, positive to starboard) in addition.
-        members : int
-            Size of an ensemble drawn from the standard errors of the card, for bands of 5, 50 and 95 %; 0 for none.
-        seed : int
-            Of the ensemble.
-        executor : str
-            Who computes the ensemble: ``processes`` or ``dask://host:port``.
-
-        Raises
-        ------
-        InputError
-            The text is not a manoeuvre, the card is not one of a ship with a rudder, the motion leaves all bounds,
-            or `external` has an unknown key or comes with an ensemble.
-        """
-        from tank2sim.api.manoeuvre import simulate_manoeuvre
-        from tank2sim.simulation.manoeuvres import parse_manoeuvre
-
-        if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
-            problem = f"is of the type {type(manoeuvre).__name__}"
-            raise InputError("manoeuvre", "", problem, "give a text, for example 'turn:35'")
-        parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
-        words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
-        ensemble = EnsembleOptions(members, seed, executor)
-        return simulate_manoeuvre(self, parsed, words, duration_s, ensemble, external)
-
-    @checked
-    def stability(
-        self,
-        speed_mps: SpeedArgument | None = None,
-        *,
-        spirals: bool = True,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> StabilityResult | CraftStabilityResult:
-        """Straight-line stability, steady turning and the IMO criteria; of a craft what is not of a rudder.
-
-        Parameters
-        ----------
-        speed_mps : float, optional
-            Of the straight course; by default the speed of the card.
-        spirals : bool
-            Simulate the spirals on the steady-turning diagram.
-        members, seed, executor
-            As in :meth:`simulate`.
-
-        Raises
-        ------
-        InputError
-            The ship holds no straight course; an ensemble of a craft.
-        """
-        if isinstance(self.card, CraftCard):
-            from tank2sim.api.stability import judge_craft_stability
-
-            if members:
-                problem = "is of the IMO criteria, which a craft without a rudder has not"
-                raise InputError("--ensemble", "", problem, "leave it out")
-            return judge_craft_stability(self, speed_mps)
-        from tank2sim.api.stability import judge_stability
-
-        return judge_stability(self, speed_mps, spirals=spirals, ensemble=EnsembleOptions(members, seed, executor))
+    stability = judge_stability
 
     @checked
     def state_space(

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
 
 from tank2sim.arguments import checked
+from tank2sim.errors import ArgumentError
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -105,6 +107,34 @@ class Verb:
     default_ship: str = ""
     page_required: bool = False
     exit_code: Callable[[Any], int] = lambda _: 0
+
+
+def named_numbers(argument: str, example: str) -> Callable[[Sequence[str]], dict[str, float]]:
+    """Return a reader of words ``NAME=NUMBER``, for `texts` of a verb.
+
+    Parameters
+    ----------
+    argument : str
+        The argument that gets the numbers by name.
+    example : str
+        A word with its name and number, for the remedy.
+    """
+
+    def read(given: Sequence[str]) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for text in given:
+            name, _, number = (part.strip() for part in text.partition("="))
+            try:
+                value = float(number)
+            except ValueError:
+                value = math.nan
+            problem = "is not NAME=NUMBER" if not math.isfinite(value) else "is given twice" if name in found else ""
+            if problem or not name:
+                raise ArgumentError(argument, text, problem or "has no name", f"give, for example, {example}")
+            found[name] = value
+        return found
+
+    return read
 
 
 def verb(words: str, *outputs: Output, **more: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:

@@ -94,8 +94,10 @@ VERBS = {
     "log": "api.log:log",
     "pilotcard": "api.bridge:make_pilot_card",
     "poster": "api.bridge:make_poster",
+    "simulate": "api.manoeuvre:simulate_manoeuvre",
     "ships": "api.bundled_ships:list_ships",
     "steer": "api.steering_page:make_steering_page",
+    "stability": "api.stability:judge_stability",
     "tow": "api.tow:tow",
     "yaw": "api.yaw:yaw",
 }

@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from tank2sim.arguments import DEFAULT_MEMBERS, ENSEMBLE, Seed, bounds_of
+from tank2sim.arguments import DEFAULT_MEMBERS, ENSEMBLE, PROCESSES, Seed, bounds_of
 from tank2sim.cli.overrides import parse_changes
-from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
+from tank2sim.executors import EXECUTOR_FORMS
 from tank2sim.files import JSON, PAGE, PICTURE, STANDARD_OUTPUT, refuse_other_ending
 
 Command = Callable[..., Any]
