@@ -71,7 +71,7 @@ def simulate_manoeuvre(
     >>> import tank2sim as t2s
     >>> run = t2s.load("mariner").simulate("turn:35")
     >>> round(run.figures["advance_lengths"], 1)
-    5.1
+    3.5
     """
     from tank2sim.analysis.manoeuvre import study_manoeuvre
     from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions

@@ -52,7 +52,7 @@ def judge_stability(
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> t2s.load("mariner").stability(spirals=False).study.stable
+    >>> t2s.load("mariner").stability(spirals=False).stable
     True
     """
     from tank2sim.analysis.ensemble.results import EnsembleRequest, stability_bands

@@ -221,8 +221,8 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         return [_option(flags, name=one.name, is_flag=True, **shown)]
     if one.name in verb.texts:
         several = several or any(get_origin(part) is Mapping for part in _parts(kind))
-        metavar = f"{stem.upper()} ..." if several else stem.upper()
-        return [_option(names, name=one.name, multiple=bool(several), metavar=metavar, **shown)]
+        shown_as = f"{stem.upper()} ..." if several else stem.upper()
+        return [_option(names, name=one.name, multiple=bool(several), metavar=shown_as, **shown)]
     metavar = unit.upper().replace("/", "P") if unit else stem.upper() if several else None
     if several:
         metavar = f"{metavar} ..."
