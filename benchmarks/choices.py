@@ -34,7 +34,7 @@ IDENTIFY = f"identify mariner {ZIGZAG} {TURN} --holdout {HELD}"
 COMMANDS = {
     "analysis.ensemble": ["simulate mariner --manoeuvre turn:35 --members 60", "stability mariner --members 40"],
     "analysis.heading": ["autopilot mariner --wave-yaw 0.5", "autopilot mariner --wave-filter 0.7"],
-    "analysis.influence": ["influence mariner --figure criterion_C --figure advance_m@35"],
+    "analysis.influence": ["influence mariner --figures criterion_C --figures advance_m@35"],
     "analysis.validation": [f"validate mariner {ZIGZAG} {HELD}", "poster mariner -o poster.html"],
     "analysis": ["stability mariner", "stability kvlcc2-captive"],
     "cards": [f"{IDENTIFY} -o new.toml", "simulate new.toml --manoeuvre turn:35 --members 20"],

@@ -110,7 +110,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     ),
     "influence of a steering card": lambda _: t2s.steering_models("poznyakov-yudin"),
     "influence with targets": _tune,
-    "influence through two points": lambda _: t2s.load("mariner").tune_through("35@35", "1400m@3"),
+    "influence through two points": lambda _: t2s.load("mariner").tune_through(["35@35", "1400m@3"]),
     "guess": lambda _: t2s.guess(
         length_m=160.0,
         beam_m=23.2,

@@ -33,7 +33,7 @@ def test_a_result_that_is_nested_without_end_is_refused(schema: str, depth: int,
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("influence", "mariner", "--agreed", "deep.toml"),
+        ("influence", "mariner", "--joint-variation", "deep.toml"),
         ("influence", "deep.toml"),
         ("simulate", "deep.toml", "--manoeuvre", "turn:35"),
         ("convention", "deep.toml"),

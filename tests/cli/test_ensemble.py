@@ -47,7 +47,7 @@ def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
     assert chances["advance"] == 1 and chances["tactical diameter"] == 0 and found["probability_stable"] == 1
     assert "P(met)" in (tmp_path / "s.html").read_text()
     figure = "steady_radius_m@20"
-    result = tank2sim("influence", "mariner", "--figure", figure, *more, "--page", "i.html", cwd=tmp_path)
+    result = tank2sim("influence", "mariner", "--figures", figure, *more, "--page", "i.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     reported = json.loads((tmp_path / "s.json").read_text())
     spread = reported["ensemble"]["figures"][figure]["standard_deviation"]

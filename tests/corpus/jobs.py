@@ -74,8 +74,8 @@ RECIPES: dict[str, list[Recipe]] = {
                  (["card.toml", "turn.csv", "--members", "0", "--json", "out.json"], ["turn.csv"])],
     "compare": [(["card.toml", "tanker.toml", "--members", "0", "--json", "out.json"], ["card.toml", "tanker.toml"])],
     "influence": [
-        (["card.toml", "--figure", "K_per_s", "criterion_C", "--json", "out.json"], ["card.toml"]),
-        (["card.toml", "--figure", "steady_radius_m@20"], ["card.toml"]),
+        (["card.toml", "--figures", "K_per_s", "criterion_C", "--json", "out.json"], ["card.toml"]),
+        (["card.toml", "--figures", "steady_radius_m@20"], ["card.toml"]),
         (["steering.toml", "--json", "out.json"], ["steering.toml"]),
     ],
     "design": [

@@ -103,7 +103,7 @@ def test_a_result_that_is_no_json_for_a_page_is_refused_by_its_file(folder, text
 
 
 def test_a_notice_that_is_no_text_is_refused_by_its_key(folder):
-    assert tank2sim("influence", "card.toml", "--figure", "K_per_s", "--json", "i.json", cwd=folder).returncode == 0
+    assert tank2sim("influence", "card.toml", "--figures", "K_per_s", "--json", "i.json", cwd=folder).returncode == 0
     content = json.loads((folder / "i.json").read_text())
     (folder / "i.json").write_text(json.dumps({**content, "notices": [1.5]}))
     refused(tank2sim("report", "i.json", "-o", "page.html", cwd=folder), "i.json", "notices")

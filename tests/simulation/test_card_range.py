@@ -98,7 +98,7 @@ def invoked(*arguments):
     [
         ("simulate", "kvlcc2-captive", "--manoeuvre", "turn:35"),
         pytest.param(("stability", "kvlcc2-captive"), marks=pytest.mark.slow),
-        pytest.param(("influence", "kvlcc2-captive", "--figure", "tactical_diameter_m@35"), marks=pytest.mark.slow),
+        pytest.param(("influence", "kvlcc2-captive", "--figures", "tactical_diameter_m@35"), marks=pytest.mark.slow),
         ("compare", "kvlcc2-captive", "kvlcc2-captive", "--members", "0"),
     ],
     ids=lambda arguments: arguments[0],

@@ -11,19 +11,18 @@ import numpy as np
 
 from tank2sim.api.autopilot import autopilot
 from tank2sim.api.bridge import make_pilot_card, make_poster
-from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.api.glide import glide
+from tank2sim.api.influence import find_influence, tune_ship
 from tank2sim.api.manoeuvre import simulate_manoeuvre
 from tank2sim.api.stability import judge_stability
 from tank2sim.api.steering_page import make_steering_page
+from tank2sim.api.turn_tuning import tune_ship_through
 from tank2sim.arguments import (
-    PROCESSES,
     AngleArgument,
     EnsembleSize,
     NumberArgument,
     Seed,
     SpeedArgument,
-    TuningRange,
     checked,
 )
 from tank2sim.arrays import Array
@@ -41,9 +40,7 @@ if TYPE_CHECKING:
 
     from tank2sim.dynamics.model import Model
     from tank2sim.results.fmu import ExportResult
-    from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
-    from tank2sim.results.turn_tuning import TurnTuningResult
 
 
 class SimulationOptions(TypedDict, total=False):
@@ -334,108 +331,9 @@ class Ship:
         settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
-    @checked
-    def influence(
-        self,
-        figures: str | Sequence[str] = (),
-        *,
-        joint_variation: Mapping[str, float] | None = None,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> InfluenceResult:
-        """Influence coefficients: by how many per cent a figure changes for 10 % more of each number on the card.
-
-        Parameters
-        ----------
-        figures : str or sequence of str
-            ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``, angles in degrees: names are those of
-            :data:`tank2sim.analysis.influence.figures.FIGURE_KINDS`. Of a craft with thrusters
-            ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, ``final_rate_degps@spin:400``, in
-            rpm: :data:`.CRAFT_FIGURE_KINDS`. By default one of each kind.
-        joint_variation : mapping, optional
-            Changes in % of numbers that change together (Kc), by name: ``{"Yv": 0.62, "Nv": 1.7}``.
-        members, seed, executor
-            As in :meth:`simulate`.
-
-        Raises
-        ------
-        InputError
-            A figure or a name is unknown, or the ship does not show a figure.
-        """
-        from tank2sim.api.influence import influence_of_ship
-
-        names = [figures] if isinstance(figures, str) else list(figures)
-        return influence_of_ship(self, names, joint_variation or {}, EnsembleOptions(members, seed, executor))
-
-    @checked
-    def tune(
-        self,
-        targets: str | Sequence[str],
-        *,
-        figures: str | Sequence[str] = (),
-        by: str = "uncertain",
-        within: TuningRange = 3.0,
-        hold: Sequence[str] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        joint_variation: Mapping[str, float] | None = None,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> TuningResult:
-        """Change the card until figures have the values that a trial or a standard gives.
-
-        Parameters
-        ----------
-        targets : str or sequence of str
-            ``steady_radius_m@20=424``, ``overshoot1_deg@20/20<=25``, ``>=``: figures as in :meth:`influence`.
-        figures : str or sequence of str
-            Further figures to compute.
-        by : str
-            ``uncertain``: the least sum of squared moves in standard errors; ``fewest``: the fewest parameters.
-        within : float
-            Bounds of each move, standard errors of the card.
-        hold : sequence of str
-            Parameters that stay (``Nr``).
-        bounds : mapping, optional
-            Lowest and highest value by name, in the conventions of the card's file, in place of `within`.
-        joint_variation : mapping, optional
-            Parameters that move together only, as in :meth:`influence`.
-        members, seed, executor
-            As in :meth:`simulate`; of the ship before.
-
-        Raises
-        ------
-        InputError
-            A target cannot be read, a name is unknown, or nothing is left to change. Targets that contradict each
-            other are a result, whose card is refused.
-        """
-        from tank2sim.analysis.tuning.result import Means
-        from tank2sim.api.influence import tune_ship
-
-        wanted, further = ([given] if isinstance(given, str) else list(given) for given in (targets, figures))
-        means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
-        return tune_ship(self, wanted, further, means, EnsembleOptions(members, seed, executor))
-
-    @checked
-    def tune_through(self, first: str, second: str) -> TurnTuningResult:
-        """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.
-
-        Parameters
-        ----------
-        first, second : str
-            Points ``RATE@RUDDER``, deg/min to the side of the rudder at deg of rudder, + to starboard (``61@35``,
-            ``20@0`` of an unstable ship), or a radius, ``424m@20``.
-
-        Raises
-        ------
-        InputError
-            A point cannot be read, or no factors between 1/5 and 5 meet both.
-        """
-        from tank2sim.api.turn_tuning import tune_ship_through
-
-        return tune_ship_through(self, first, second)
-
+    influence = find_influence
+    tune = tune_ship
+    tune_through = tune_ship_through
     autopilot = autopilot
     glide = glide
     poster = make_poster

@@ -85,7 +85,8 @@ class Verb:
         Argument to the option that sets it, where the command line does not take it by position or has another name.
     variants : mapping
         Flag to another verb, which the command calls with this flag in place of the function. An option of the other
-        verb of that name is the flag. The key of a verb that `takes` certain first arguments is their kind in words.
+        verb of that name is the flag. The key of a verb that `takes` certain first arguments is their kind in words;
+        such verbs come first.
     takes : callable, optional
         As a variant, the verb is called if this is true of the first argument as a text.
     default_ship : str

@@ -92,6 +92,7 @@ VERBS = {
     "guess": "api.guess:guess",
     "identify": "api.identification:identify",
     "log": "api.log:log",
+    "influence": "api.influence:find_influence",
     "open": "api.browser:open_page",
     "pilotcard": "api.bridge:make_pilot_card",
     "poster": "api.bridge:make_poster",

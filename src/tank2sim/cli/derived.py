@@ -67,20 +67,25 @@ def command_of(name: str, verb: Verb) -> click.Command:
     verb : Verb
     """
     others: dict[str, Verb] = {flag: other.verb for flag, other in verb.variants.items()}  # type: ignore[attr-defined]
-    own = {parameter.name or "": parameter for parameter in _own_parameters(verb)}
-    for other in others.values():
-        for parameter in _own_parameters(other):
-            if isinstance(parameter, click.Option):
-                parameter.required = False
-            elif other.takes:
-                continue
-            own.setdefault(parameter.name or "", parameter)
+    own: dict[str, click.Parameter] = {}
+    takers: dict[str, list[str]] = {}
+    for flag, each in {"": verb, **others}.items():
+        for parameter in _own_parameters(each):
+            if isinstance(parameter, click.Option) or not (flag and each.takes):
+                own.setdefault(parameter.name or "", parameter)
+                takers.setdefault(parameter.name or "", []).append(flag)
+    for named, flags in takers.items():
+        parameter = own[named]
+        if "" not in flags and isinstance(parameter, click.Option):
+            parameter.required = False
+            if needed := [flag for flag in flags if f"--{flag}" not in parameter.opts]:
+                parameter.help = f"{parameter.help} [only with {_either(needed, others)}]"
     documented, _ = _documented(verb.function)
     usual = f"By default CARD is {verb.default_ship}." if verb.default_ship else ""
     text = "\n\n".join(filter(None, (documented.short_description, documented.long_description, usual)))
     if inspect.signature(verb.function).return_annotation == "str":
         return VerbCommand(name, params=[*own.values()], callback=lambda **given: _print(verb, given), help=text)
-    flags = [
+    switches = [
         _option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.")
         for flag, other in others.items()
         if not other.takes and not _argument_of(flag, other)
@@ -99,12 +104,17 @@ def command_of(name: str, verb: Verb) -> click.Command:
     def run(**given: Any) -> int:
         first = next(iter(own), "")
         chosen = next((flag for flag, other in others.items() if _is_chosen(flag, other, given, first)), "")
-        _refuse_foreign(chosen, verb, others, own)
+        for named, flags in takers.items():
+            if chosen not in flags and named != first and _was_given(named):
+                problem = (
+                    f"does not go with {_either([chosen], others)}" if chosen else f"needs {_either(flags, others)}"
+                )
+                raise InputError(own[named].opts[0], "", problem, "leave it out" if chosen else "add it")
         if (called := others.get(chosen, verb)).takes:
             given[next(iter(inspect.signature(called.function).parameters))] = given[first]
         return _run(called, given)
 
-    return VerbCommand(name, params=[*own.values(), *flags, *shared], callback=run, help=text)
+    return VerbCommand(name, params=[*own.values(), *switches, *shared], callback=run, help=text)
 
 
 def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
@@ -126,25 +136,20 @@ def _is_chosen(flag: str, verb: Verb, given: Mapping[str, Any], first: str) -> b
     return verb.takes(given[first]) if verb.takes else bool(given[_argument_of(flag, verb) or flag])
 
 
-def _refuse_foreign(chosen: str, verb: Verb, others: Mapping[str, Verb], known: Mapping[str, click.Parameter]) -> None:
-    """Refuse arguments and options that were given and that belong to another variant of the command."""
+def _either(flags: Sequence[str], others: Mapping[str, Verb]) -> str:
+    """Variants in words: ``--tune or --through``."""
+    return " or ".join(flag if others[flag].takes else f"--{flag}" for flag in flags)
+
+
+def _was_given(name: str) -> bool:
     context = click.get_current_context()
-    names = {flag: {one.name for one in _own_parameters(other)} for flag, other in {"": verb, **others}.items()}
-    words = {flag: flag if other.takes else f"--{flag}" for flag, other in others.items()}
-    first = next(iter(known), "")
-    for name, parameter in known.items():
-        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if name in names[chosen] or not given or name == first or context.params[name] in (None, ()):
-            continue
-        if chosen:
-            raise InputError(parameter.opts[0], "", f"does not go with {words[chosen]}", "leave it out")
-        needed = " or ".join(words[flag] for flag in others if name in names[flag])
-        raise InputError(parameter.opts[0], "", f"needs {needed}", "add it")
+    on_line = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+    return on_line and context.params[name] not in (None, ())
 
 
 def _documented(function: Callable[..., Any]) -> tuple[Docstring, dict[str, str]]:
     """The docstring of a function, and the description of each parameter in plain text."""
-    plain = re.sub(r":\w+:`[.~]?(?:[\w.]+\.)?(\w+)`|``", lambda found: found[1] or "", function.__doc__ or "")
+    plain = re.sub(r":\w+:`[.~]?(?:[\w.]+\.)?(\w+)`|``?", lambda found: found[1] or "", function.__doc__ or "")
     documented = parse(plain, style=DocstringStyle.NUMPYDOC)
     words = {one.arg_name: " ".join((one.description or "").split()) for one in documented.params}
     return documented, {name.strip(): text for names, text in words.items() for name in names.split(",")}
@@ -337,10 +342,9 @@ def _refuse_unplaced(outputs: Iterable[Path], made: Sequence[Path | None]) -> No
 
 def _refuse_idle(outputs: Iterable[Output]) -> None:
     """Refuse options of files that are not written."""
-    context = click.get_current_context()
     for output in outputs:
         for option in _output_parameters(output)[1:]:
-            if context.get_parameter_source(option.name or "") is ParameterSource.COMMANDLINE:
+            if _was_given(option.name or ""):
                 raise InputError(option.opts[0], "", f"needs {output.option}", "add it")
 
 

@@ -88,12 +88,12 @@ class _Problem:
     def _unknowns(self) -> tuple[Array, Array, Array]:
         """Change of the parameters by the unknowns (k, m), and the bounds of these (m,)."""
         parameters, means = self.study.parameters, self.means
-        held = {find_parameter(parameters, name, "--hold").name for name in means.hold}
-        stated = {find_parameter(parameters, name, "--bound").name: pair for name, pair in means.bounds.items()}
+        held = {find_parameter(parameters, name, "hold").name for name in means.hold}
+        stated = {find_parameter(parameters, name, "bounds").name: pair for name, pair in means.bounds.items()}
         for change in (
             parameter for parameter in parameters if parameter.name in stated and parameter.name in self._agreed
         ):
-            remedy = "leave out the bound, or take the parameter out of --agreed"
+            remedy = "leave out the bound, or take the parameter out of joint_variation"
             raise ArgumentError("bounds", change.short, "moves with the agreed variation alone", remedy)
         columns, ends = [], []
         for place, parameter in enumerate(parameters):
@@ -114,7 +114,7 @@ class _Problem:
             )
             ends.append((-means.within, means.within))
         if not columns:
-            raise ArgumentError("targets", "", "nothing is left to change", "hold fewer parameters, or state --bound")
+            raise ArgumentError("targets", "", "nothing is left to change", "hold fewer parameters, or state bounds")
         lowest, highest = np.array(ends).T
         return np.array(columns).T, lowest, highest
 
