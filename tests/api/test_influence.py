@@ -70,7 +70,7 @@ def test_targets_that_contradict_each_other_are_named_and_their_card_is_refused(
     assert not tuning.reached and tuning.to_dict()["tuned"]["contradiction"] == list(tuning.targets.index)  # type: ignore[index]
     with pytest.raises(t2s.InputError) as refused:
         _ = tuning.card
-    assert refused.value.source == "targets" and "--within" in refused.value.remedy
+    assert refused.value.source == "targets" and "within" in refused.value.remedy
 
 
 @pytest.mark.slow
