@@ -47,7 +47,7 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
         (["compare", "mariner"], "two cards"),
         (["compare", "mariner", "wilinski-zellman"], "manoeuvres"),
         (["poster", "wilinski-zellman", "-o", "w.html"], "model.kind"),
-        (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=RPM"),
+        (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=NUMBER"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Half ahead=-3"], "NAME=RPM"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Full astern=60"], "order astern"),
         (["poster", "esso-osaka-estimated", "-o", "w.html", "--order", "Full=7000000"], "beyond 1,200 revolutions"),

@@ -200,8 +200,8 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
         if one.default is not inspect.Parameter.empty:
             return [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
         usual = verb.default_ship or None
-        metavar = "[CARD]" if usual else "CARD"
-        return [click.Argument([one.name], metavar=metavar, required=not usual, default=usual), change]
+        card = "[CARD]" if usual else "CARD"
+        return [click.Argument([one.name], metavar=card, required=not usual, default=usual), change]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
         usual = None if one.default is inspect.Parameter.empty else one.default
@@ -224,15 +224,13 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
     if kind is bool:
         flags = [f"{option}/--no-{option[2:]}"] if one.default else names
         return [_option(flags, name=one.name, is_flag=True, **shown)]
-    if one.name in verb.texts:
-        several = several or any(get_origin(part) is Mapping for part in _parts(kind))
-        shown_as = f"{stem.upper()} ..." if several else stem.upper()
-        return [_option(names, name=one.name, multiple=bool(several), metavar=shown_as, **shown)]
-    metavar = unit.upper().replace("/", "P") if unit else stem.upper() if several else None
-    if several:
-        metavar = f"{metavar} ..."
-    shown["show_default"] = default not in (None, "", ())
-    return [_option(names, name=one.name, type=_type(kind, several), multiple=bool(several), metavar=metavar, **shown)]
+    read = one.name in verb.texts
+    several = several or (read and any(get_origin(part) is Mapping for part in _parts(kind)))
+    metavar = unit.upper().replace("/", "P") if unit and not read else stem.upper() if several or read else None
+    shown |= {"multiple": bool(several), "metavar": f"{metavar} ..." if several else metavar}
+    if not read:
+        shown |= {"type": _type(kind, several), "show_default": default not in (None, "", ())}
+    return [_option(names, name=one.name, **shown)]
 
 
 def _written(kind: Any) -> Written | None:
