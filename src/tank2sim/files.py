@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tank2sim.errors import InputError
 
 STANDARD_OUTPUT = Path("-")
@@ -425,12 +423,10 @@ def plain_json(value: Any) -> Any:
     match value:
         case Mapping():
             return {str(key): plain_json(item) for key, item in value.items()}
-        case np.ndarray():
+        case _ if hasattr(value, "tolist"):  # arrays and numbers of NumPy
             return plain_json(value.tolist())
         case list() | tuple():
             return [plain_json(item) for item in value]
-        case np.generic():
-            return plain_json(value.item())
         case float():
             return value if math.isfinite(value) else None
         case Path():

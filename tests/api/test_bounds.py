@@ -25,9 +25,8 @@ from tank2sim.arguments import (
     bounds_of,
     checked,
 )
-from tank2sim.cli import COMMANDS
+from tank2sim.cli import COMMANDS, verb_of
 from tank2sim.cli import tank2sim as group
-from tank2sim.cli.options import number
 from tank2sim.gap.search.model_choice import LIKELY, SUREST
 from tests.cli.command_line import refused, tank2sim
 
@@ -222,16 +221,21 @@ def test_a_rudder_that_looks_like_radians_is_doubted_in_the_first_line(
 
 def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
     assert bounds_of(FalseDiscovery) == ArgumentBounds(round(1 - SUREST, 9), 1 - LIKELY)
-    for kind in (Seed, Count, SpeedArgument, Effects):
-        bounds, option = bounds_of(kind), number(kind)
-        assert bounds is not None and isinstance(option, click.IntRange | click.FloatRange)
-        assert (option.min, option.max, option.min_open) == (bounds.low, bounds.high, bounds.above)
+    bounded = 0
     for name in COMMANDS:
         command = group.get_command(click.Context(group), name)
         assert command is not None
-        for option in command.params:
-            if "--seed" in option.opts:
-                assert isinstance(option.type, click.IntRange) and option.type.min == 0, name
+        kinds = {option.name: option.type for option in command.params}
+        function = verb_of(name).function
+        for argument in inspect.signature(function).parameters.values():
+            kind = annotated_kind(argument.annotation, function)
+            for bounds in filter(None, map(bounds_of, get_args(kind) or (kind,))):
+                option = kinds[argument.name]
+                if bounds != ArgumentBounds():
+                    assert isinstance(option, click.IntRange | click.FloatRange), (name, argument.name)
+                    assert (option.min, option.max, option.min_open) == (bounds.low, bounds.high, bounds.above)
+                    bounded += 1
+    assert bounded > 40
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 import tank2sim as t2s
-from tank2sim.cli.options import OutputFile
+from tank2sim.cli.derived import OutputFile
 from tank2sim.files import write_together
 from tests.cli.command_line import refused, tank2sim
 

@@ -1,4 +1,4 @@
-"""The command line: one thin file a command, which reads, calls and prints.
+"""The command line, whose commands are derived from functions of the API.
 
 Every command ends 0 (done), 1 (`check` only: it failed) or 2 (bad input: one line on the error stream).
 """
@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -27,84 +27,66 @@ from tank2sim.escaping import one_line
 from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
+if TYPE_CHECKING:
+    from tank2sim.api.verbs import Verb
+
 GROUPS = {
     "Measure": {
-        "design": "the next captive campaign or sea trial, for the certainty of chosen figures",
-        "log": "a vessel's own log, cut into trials",
-        "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
-        "reduce": "captive tests to derivatives",
-        "tow": "surge mass and drag from accelerating tows",
-        "yaw": "added yaw inertia and dissipation from records of a yaw rig",
-        "audit": "faults in the data of trials",
-        "signals": "statistics, spectra and filters of a record",
+        "design": "api.design:design_campaign",
+        "log": "api.log:log",
+        "run": "api.captive_run:reduce_runs",
+        "reduce": "api.reduction:reduce",
+        "tow": "api.tow:tow",
+        "yaw": "api.yaw:yaw",
+        "audit": "api.audit:audit",
+        "signals": "api.signals:signals",
     },
     "Identify": {
-        "identify": "coefficients from free-running trials",
-        "gap": "the physical effect that a card lacks",
-        "guess": "a ship from dimensions and the figures of a wheelhouse poster",
-        "validate": "a validation report after ITTC 7.5-02-06-03",
-        "compare": "cards of one ship side by side",
+        "identify": "api.identification:identify",
+        "gap": "api.gap:find_gap",
+        "guess": "api.guess:guess",
+        "validate": "api.validation:validate",
+        "compare": "api.comparison:compare",
     },
     "Study": {
-        "simulate": "a manoeuvre: turn, zigzag, pull-out, spiral, stop, orders of a file",
-        "stability": "course stability, steady turning, IMO criteria",
-        "autopilot": "heading controllers, designed, simulated and exported",
-        "influence": "sensitivity of manoeuvring figures; tuning",
-        "glide": "an underwater glider: glides, paths, range",
+        "simulate": "api.manoeuvre:simulate_manoeuvre",
+        "stability": "api.stability:judge_stability",
+        "autopilot": "api.autopilot:autopilot",
+        "influence": "api.influence:find_influence",
+        "glide": "api.glide:glide",
     },
     "Export": {
-        "convert": "a card in another language: MMG as a polynomial, other conventions, other programs",
-        "convention": "what a table of derivatives with unstated conventions means",
-        "export": "the FMU, Model Exchange and Co-Simulation",
-        "check": "an FMU validated, and compared with its reference",
+        "convert": "api.conversion:convert",
+        "convention": "api.convention:convention",
+        "export": "api.fmu:make_fmu_file",
+        "check": "api.fmu:check_fmu",
     },
     "Show": {
-        "ships": "the bundled ships, by the names that CARD takes",
-        "poster": "a wheelhouse poster (A3)",
-        "pilotcard": "a pilot card (A4)",
-        "steer": "a page on which the ship is steered",
-        "report": "one page of any result",
-        "open": "a page, in the browser",
-        "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
+        "ships": "api.bundled_ships:list_ships",
+        "poster": "api.bridge:make_poster",
+        "pilotcard": "api.bridge:make_pilot_card",
+        "steer": "api.steering_page:make_steering_page",
+        "report": "api.report:make_report",
+        "open": "api.browser:open_page",
+        "demo": "api.demo:run_demo",
     },
 }
-"""Commands by what people do, each with a few words; they are imported when they are called."""
+"""Commands by what people do, each with its function, which is imported when it is called."""
 
-COMMANDS = {name: words for group in GROUPS.values() for name, words in group.items()}
+COMMANDS = {name: place for group in GROUPS.values() for name, place in group.items()}
 
 
-VERBS = {
-    "audit": "api.audit:audit",
-    "compare": "api.comparison:compare",
-    "reduce": "api.reduction:reduce",
-    "report": "api.report:make_report",
-    "signals": "api.signals:signals",
-    "validate": "api.validation:validate",
-    "autopilot": "api.autopilot:autopilot",
-    "check": "api.fmu:check_fmu",
-    "convention": "api.convention:convention",
-    "convert": "api.conversion:convert",
-    "demo": "api.demo:run_demo",
-    "design": "api.design:design_campaign",
-    "export": "api.fmu:make_fmu_file",
-    "gap": "api.gap:find_gap",
-    "glide": "api.glide:glide",
-    "guess": "api.guess:guess",
-    "identify": "api.identification:identify",
-    "log": "api.log:log",
-    "influence": "api.influence:find_influence",
-    "open": "api.browser:open_page",
-    "pilotcard": "api.bridge:make_pilot_card",
-    "poster": "api.bridge:make_poster",
-    "simulate": "api.manoeuvre:simulate_manoeuvre",
-    "run": "api.captive_run:reduce_runs",
-    "ships": "api.bundled_ships:list_ships",
-    "steer": "api.steering_page:make_steering_page",
-    "stability": "api.stability:judge_stability",
-    "tow": "api.tow:tow",
-    "yaw": "api.yaw:yaw",
-}
-"""Commands that are derived from their function."""
+def verb_of(command: str) -> Verb:
+    """Return the verb of a command.
+
+    Parameters
+    ----------
+    command : str
+        A key of :data:`COMMANDS`.
+    """
+    module, _, function = COMMANDS[command].partition(":")
+    found: Verb = getattr(importlib.import_module(f"tank2sim.{module}"), function).verb
+    return found
 
 
 class _Commands(click.Group):
@@ -117,19 +99,14 @@ class _Commands(click.Group):
         width = max(map(len, COMMANDS))
         for title, commands in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl([(name.ljust(width), words) for name, words in commands.items()])
+                formatter.write_dl([(name.ljust(width), verb_of(name).words) for name in commands])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        if cmd_name in VERBS:
-            module, _, function = VERBS[cmd_name].partition(":")
-            declared = getattr(importlib.import_module(f"tank2sim.{module}"), function)
-            from tank2sim.cli.derived import command_of
+        from tank2sim.cli.derived import command_of
 
-            return command_of(cmd_name, declared.verb)
-        command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
-        return command
+        return command_of(cmd_name, verb_of(cmd_name))
 
     def invoke(self, ctx: click.Context) -> Any:
         """As of any group; a fault of an argument of the API is called by the option that sets it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 import sys
 import types
@@ -18,11 +19,27 @@ from docstring_parser import Docstring, DocstringStyle, parse
 
 from tank2sim import arguments
 from tank2sim.api.verbs import Output, Verb, Written
-from tank2sim.cli.options import OutputFile
 from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
-from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled
+from tank2sim.files import JSON, PAGE, PICTURE, STANDARD_OUTPUT, refuse_doubled, refuse_other_ending
 from tank2sim.units import in_words
+
+
+class OutputFile(click.Path):
+    """A file to be written, whose name ends as files of its kind do (:mod:`tank2sim.files`); a folder has no ending."""
+
+    def __init__(self, endings: Sequence[str] | None, **more: Any) -> None:
+        super().__init__(path_type=Path, **more)
+        self.endings = endings
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As of any parameter. Raises InputError if the name ends as files of another kind do."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if self.endings == JSON and str(path) == "-":
+            return STANDARD_OUTPUT
+        if self.endings is not None:
+            refuse_other_ending(path, self.endings)
+        return path
 
 
 class VerbCommand(click.Command):
