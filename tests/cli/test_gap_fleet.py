@@ -224,7 +224,7 @@ def test_a_folder_that_holds_a_card_is_one_ship(ships: Path, tmp_path: Path, fin
     [
         (
             ["ships", "--holdout", "ships/alpha/holdout/held.csv", "-o", "out"],
-            ["--holdout", "does not go with a folder of ships"],
+            ["--holdout", "folder of ships"],
         ),
         (["ships", "ships/alpha/slow.csv", "-o", "out"], ["trials", "does not go with a folder of ships"]),
         (["ships", "-o", "ships"], ["ships", "of its own"]),

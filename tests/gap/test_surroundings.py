@@ -1,7 +1,6 @@
 """Winds and currents that differ from trial to trial, or that the trials recorded."""
 
-from __future__ import annotationsfrom tank2sim.results.gap import gap_result
-
+from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
@@ -30,6 +29,7 @@ from tank2sim.gap.search.explanations import search
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.trials import window, with_signals
+from tank2sim.results.gap import gap_result
 
 TRIALS = ("zigzag20_20", "turn35_stbd", "straight")
 HELD = ("turn35_port",)

@@ -36,7 +36,13 @@ _JSON, _PAGE = "fleet.json", "fleet.html"
 def gap_options(
     effects: Sequence[str], without: Sequence[str], max_effects: int, false_discovery: float, workers: int | None
 ) -> GapOptions:
-    """Options of the search from the arguments of :func:`.find_gap`. Raises ArgumentError for an unknown effect."""
+    """Options of the search. Raises ArgumentError for an effect that is not known.
+
+    Parameters
+    ----------
+    effects, without, max_effects, false_discovery, workers
+        As of :func:`.find_gap`.
+    """
     for argument, names in (("effects", effects), ("without", without)):
         for name in names:
             if EFFECTS.get(name) is None:
