@@ -215,7 +215,11 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
                 return _as_kind(name, value, part)
             except ArgumentError as fault:
                 faults.append(fault)
-        raise next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
+        fault = next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
+        kinds = dict.fromkeys(each.remedy.removeprefix("give ") for each in faults if each.remedy.startswith("give a"))
+        raise ArgumentError(
+            fault.source, fault.place, fault.problem, f"give {' or '.join(kinds)}" if kinds else fault.remedy
+        )
     if get_origin(kind) is Annotated:
         bounds = bounds_of(kind)
         return _as_kind(name, value, get_args(kind)[0]) if bounds is None else bounds.checked(name, value)
@@ -248,8 +252,8 @@ def _is_a(value: Any, kind: Any) -> bool:
         return not isinstance(value, int | float | str | bytes | list | tuple | dict | None)
     if kind is Path:
         return isinstance(value, os.PathLike)
-    if kind is Sequence:  # arrays, series, views and sets do as well
-        return isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    if kind is Sequence:  # arrays, series, views and sets do as well; a data frame would be the names of its columns
+        return isinstance(value, Iterable) and not isinstance(value, str | bytes) and not hasattr(value, "columns")
     if kind is None:
         return value is None
     try:

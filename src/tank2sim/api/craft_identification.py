@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tank2sim.cards import CraftCard
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import FreePrediction, fit_craft, predict_free
 from tank2sim.identification.craft.order_response import order_responses
 from tank2sim.identification.craft.problem import craft_driven_by, craft_problem
 from tank2sim.identification.craft.study import study_craft
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
-from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.same_record import refuse_copies
+from tank2sim.records.trials import Trial
 from tank2sim.results.craft_identification import CraftIdentificationResult
 
 
 def identify_craft(
-    card: CraftCard, fitted: Sequence[Path], held: Sequence[Path], progress: SearchReport = silent
+    card: CraftCard, fitted: Sequence[Trial], held: Sequence[Trial], progress: SearchReport = silent
 ) -> CraftIdentificationResult:
     """Identify hull and thrust curves of a craft with thrusters from trials with position, heading and revolutions.
 
@@ -31,7 +30,7 @@ def identify_craft(
     ----------
     card : CraftCard
         Mass and places of the thrusters are taken as exact, all else with the stated standard errors or wide ones.
-    fitted, held : sequence of Path
+    fitted, held : sequence of Trial
         Trials to fit, and trials only to predict (:func:`.read_craft_trial`).
     progress : callable
         Called with each better estimate.
@@ -42,12 +41,9 @@ def identify_craft(
         A file is at fault, or a trial is given twice.
     """
     if not fitted:
-        raise InputError("trials", "", "there are none", "give trial files, or a folder with CSV files")
-    twice = {path.resolve() for path in fitted} & {path.resolve() for path in held}
-    if twice:
-        raise InputError(sorted(twice)[0], "", "is fitted and held out", "give it once")
-    read = [read_craft_trial(path, card.thrusters) for path in (*fitted, *held)]
-    alike = (*refuse_copies(read[: len(fitted)]), *refuse_copies(read[: len(fitted)], read[len(fitted) :]))
+        raise ArgumentError("trials", "", "is empty", "give trials, or a folder with CSV files")
+    read = [*fitted, *held]
+    alike = (*refuse_copies(fitted), *refuse_copies(fitted, held))
     problem, driven_by = craft_problem(card, read), craft_driven_by(card, read)
     runs = problem.runs
     try:
@@ -58,7 +54,7 @@ def identify_craft(
         remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
         raise InputError(card.source, "", "does not move as the trials do, not even roughly", remedy) from None
     predictions = predict_free(fit, runs[len(fitted) :]) if held else []
-    responses = order_responses(card, read[: len(fitted)])
+    responses = order_responses(card, fitted)
     names = [run.name for run in runs[len(fitted) :]]
     found = identified_craft(card, fit, responses)
     held_out: dict[str, FreePrediction | None] = dict.fromkeys(names)

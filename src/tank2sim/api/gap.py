@@ -12,6 +12,8 @@ from tank2sim.arguments import MOST_EFFECTS, Count, Effects, FalseDiscovery
 from tank2sim.bundled import bundled_cards
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.ship import Ship
     from tank2sim.api.trial import TrialRecord
     from tank2sim.results.gap import GapResult
@@ -90,9 +92,9 @@ def find_gaps(
 @verb("the physical effect that a card lacks", variants={"a folder of ships": find_gaps})
 def find_gap(
     ship: Ship,
-    trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
     *,
-    holdout: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),
+    holdout: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
     output: str | Annotated[Path, _FOLDER] | None = None,
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
@@ -113,9 +115,9 @@ def find_gap(
     ----------
     ship : Ship, Card, str or path
         The ship before these trials, a polynomial or an MMG card.
-    trials : path, TrialRecord, or sequence of them
+    trials : path, TrialRecord, DataFrame, or sequence of them
         Trials that name the effect; a folder means the trials in it.
-    holdout : path, TrialRecord, or sequence of them
+    holdout : path, TrialRecord, DataFrame, or sequence of them
         Trials that only prove the effect.
     output : path, optional
         Folder for ``gap.json``, ``improved.toml``, ``report.html``, ``next_test.csv`` and ``corrected/``, in place of

@@ -9,8 +9,9 @@ from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tank2sim.api.trial import TrialPaths, fitted_and_held, trial_files
+from tank2sim.api.trial import fitted_and_held, trial_files
 from tank2sim.cards import Card, ManoeuvringCard, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError, InputError
@@ -29,6 +30,9 @@ from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.results.gap import GapResult, gap_result
 from tank2sim.results.gap_fleet import FleetResult
+
+if TYPE_CHECKING:
+    from tank2sim.api.trial import TrialPaths
 
 _JSON, _PAGE = "fleet.json", "fleet.html"
 
@@ -74,7 +78,7 @@ def search_ship(
     """
     ship = nonlinear_card(card)
     if output is not None:
-        refuse_early(output, [Path(ship.source), *trial_files(trials), *trial_files(holdout)])
+        refuse_early(output, [Path(ship.source), *trial_files(trials), *trial_files(holdout, "holdout")])
     with nullcontext() if output is None else folder_made(output), _workers(executor, options.workers) as pool:
         fitted, held = fitted_and_held(trials, holdout, ship, report_unused=False)  # a search uses them
         fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))

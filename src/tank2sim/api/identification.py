@@ -28,6 +28,8 @@ from tank2sim.identification.trials.options import (
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    import pandas as pd
+
     from tank2sim.api.ship import Ship
     from tank2sim.api.trial import TrialRecord
     from tank2sim.arrays import Array
@@ -51,9 +53,9 @@ def _card_files(result: IdentificationResult | CraftIdentificationResult, path: 
 )
 def identify(
     ship: Ship,
-    trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord],
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame],
     *,
-    holdout: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),
+    holdout: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
     method: TrialMethod = BY_RESIDUALS,
     structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
@@ -80,9 +82,9 @@ def identify(
     ----------
     ship : Ship, Card, str or path
         The ship before the trials; its standard errors say how well each coefficient is known.
-    trials : path, TrialRecord, or sequence of them
+    trials : path, TrialRecord, DataFrame, or sequence of them
         Trials to fit; a folder means the trials in it.
-    holdout : path, TrialRecord, or sequence of them
+    holdout : path, TrialRecord, DataFrame, or sequence of them
         Trials to compare with and not to fit.
     method : str
         How to fit; ``residuals`` is ``kalman`` for trials at sea that show gusts or waves, else ``output_error``.
@@ -136,7 +138,7 @@ def identify(
     """
     given = dict(locals())
     from tank2sim.api.craft_identification import identify_craft
-    from tank2sim.api.trial import fitted_and_held, trial_files
+    from tank2sim.api.trial import craft_trials_of, fitted_and_held
     from tank2sim.cards import CraftCard
     from tank2sim.identification.trials.identify import identify_trials
     from tank2sim.identification.trials.problem.structures import STRUCTURES
@@ -147,7 +149,9 @@ def identify(
     if isinstance(ship.card, CraftCard):
         taken = {"ship", "trials", "holdout", "report"}
         refuse_set(identify, given, "is not for a craft with thrusters", taken=taken)
-        return identify_craft(ship.card, trial_files(trials), trial_files(holdout), progress)
+        thrusters = ship.card.thrusters
+        to_fit, to_predict = craft_trials_of(trials, thrusters), craft_trials_of(holdout, thrusters, "holdout")
+        return identify_craft(ship.card, to_fit, to_predict, progress)
     card = ship.manoeuvring()
     if structure not in (known := (*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)):
         raise ArgumentError("structure", "", f"{structure!r} is not known", close_name(structure, known))

@@ -14,8 +14,11 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import folder_made, write_together
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.ship import Ship
     from tank2sim.logs.channels import ChannelSet
+    from tank2sim.logs.streams import VesselLog
     from tank2sim.logs.trial_files import TrialCut
     from tank2sim.results.craft_identification import CraftIdentificationResult
     from tank2sim.results.log import LogResult
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
 
 @verb("a vessel's own log, cut into trials")
 def log(
-    files: str | Path | Sequence[str | Path],
+    files: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame],
     output: str | Annotated[Path, Written((), "DIR", by_function=True)] | None = None,
     *,
     channels: str | Path | ChannelSet | None = None,
@@ -37,8 +40,8 @@ def log(
 
     Parameters
     ----------
-    files : path or sequence of paths
-        Logs of one voyage.
+    files : path, DataFrame, or sequence of them
+        Logs of one voyage; a data frame is read as a CSV file of its columns.
     output : path, optional
         Folder for ``channels.toml`` and the trials.
     channels : path or ChannelSet, optional
@@ -68,15 +71,18 @@ def log(
     from tank2sim.api.trial import TrialRecord
     from tank2sim.cards import CraftCard
     from tank2sim.logs.channels import CHANNELS_FILE, ChannelSet, read_channels
-    from tank2sim.logs.reading import read_log
     from tank2sim.logs.stretches import find_stretches
     from tank2sim.logs.study import study_log
     from tank2sim.logs.trial_files import cut_trials
     from tank2sim.logs.voyage import make_voyage
+    from tank2sim.records.csv_table import is_frame
     from tank2sim.results.log import LogResult
 
-    paths = [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]
-    if not paths:
+    if isinstance(files, str | Path) or is_frame(files):
+        named = {"files": files}
+    else:
+        named = {f"files[{number}]": file for number, file in enumerate(files)}
+    if not named:
         raise ArgumentError("files", "", "is empty", "give at least one log")
     folder = None if output is None else Path(output)
     if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
@@ -87,7 +93,7 @@ def log(
         if craft is not None and not isinstance(craft.card, CraftCard):
             remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
             raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
-        voyage = make_voyage([read_log(path) for path in paths], stated)
+        voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
         found = find_stretches(voyage)
         cuts = cut_trials(voyage, found)
         identified = None if craft is None else _identified(craft, cuts)
@@ -97,9 +103,23 @@ def log(
         return result if folder is None else result.written_to(folder)
 
 
+def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:
+    """A log; a data frame goes through a file, for a log may have dates, units and words in any form."""
+    from tank2sim.logs.reading import read_log
+    from tank2sim.records.csv_table import is_frame
+
+    if not is_frame(file):
+        return read_log(Path(file))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.csv"
+        file.to_csv(path, index=file.index.name is not None)
+        return replace(read_log(path), path=Path(name))
+
+
 def _identified(craft: Ship, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
     """Coefficients of a craft from all trials; None without any."""
     from tank2sim.api.craft_identification import identify_craft
+    from tank2sim.api.trial import craft_trials_of
     from tank2sim.cards import CraftCard
 
     assert isinstance(craft.card, CraftCard)
@@ -110,4 +130,4 @@ def _identified(craft: Ship, cuts: Sequence[TrialCut]) -> CraftIdentificationRes
     with tempfile.TemporaryDirectory() as name:
         paths = [Path(name) / cut.trial.path.name for cut in taken]
         write_together({path: cut.text for path, cut in zip(paths, taken, strict=True)})
-        return identify_craft(craft.card, paths, [])
+        return identify_craft(craft.card, craft_trials_of(paths, craft.card.thrusters), [])

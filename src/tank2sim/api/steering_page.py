@@ -10,7 +10,10 @@ from tank2sim.api.verbs import Progress, verb
 from tank2sim.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.ship import Ship
+    from tank2sim.api.trial import TrialRecord
     from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.dynamics.model import Model
     from tank2sim.report.steering.ghost import Ghost
@@ -28,7 +31,7 @@ STEERED_SHIP = "esso-osaka-ship"
 def make_steering_page(
     ship: Ship,
     *,
-    ghost: str | Path | None = None,
+    ghost: str | Path | TrialRecord | pd.DataFrame | None = None,
     scenario: str | Path | None = None,
     view_3d: bool = False,
     report: Progress = lambda _: None,
@@ -39,7 +42,7 @@ def make_steering_page(
     ----------
     ship : Ship
         A ship with a rudder, or a craft with thrusters.
-    ghost : path, optional
+    ghost : path, TrialRecord or DataFrame, optional
         Measured trial that moves next to the ship.
     scenario : path or str, optional
         Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
@@ -53,6 +56,7 @@ def make_steering_page(
     InputError
         The ship cannot be steered, the trial is at fault or has no positions, or the scenario is at fault.
     """
+    from tank2sim.api.trial import trials_of
     from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.identification.trials.problem.prepare_trials import measured
     from tank2sim.report.steering import ship as page_ship
@@ -62,7 +66,7 @@ def make_steering_page(
 
     card, model = ship.card, ship.model
     if isinstance(card, CraftCard):
-        if ghost:
+        if ghost is not None:
             problem = "is a trial with a rudder, and a craft with thrusters has none"
             raise ArgumentError("ghost", "", problem, "leave it out")
         waters = read_scenario(scenario) if scenario else None
@@ -71,10 +75,10 @@ def make_steering_page(
     if not isinstance(card, ManoeuvringCard):
         remedy = "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered"
         raise InputError(card.source, "", "has no rudder", remedy)
-    if ghost and scenario:
+    if ghost is not None and scenario:
         raise ArgumentError("scenario", "", "does not go with a ghost: both set the start of the ship", "leave one out")
     waters = read_scenario(scenario) if scenario else None
-    trial = measured([Path(ghost)], card) if ghost else None
+    trial = None if ghost is None else measured(trials_of(ghost, "ghost"), card)
     shown = ghost_of(trial.trials[0], model) if trial else None
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)

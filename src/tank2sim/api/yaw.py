@@ -14,6 +14,8 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD, write_together
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.ship import Ship
     from tank2sim.cards import Card, YawRigCard
     from tank2sim.dynamics.yaw_theory import FloatingBody
@@ -69,12 +71,12 @@ def write_yaw_card(
     Output("-o", CARD, "Write the card of the ship, or a card of the rig.", write_yaw_card, "CARD.toml"),
 )
 def yaw(
-    records: Sequence[str | Path] | str | Path,
+    records: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame],
     *,
     inertia_kgm2: PositiveArgument | None = None,
     inertia_error_kgm2: NonNegativeArgument | None = None,
     torque_constant_NmpA: PositiveArgument | None = None,
-    reference: str | Path | None = None,
+    reference: str | Path | pd.DataFrame | None = None,
     reference_inertia_kgm2: PositiveArgument | None = None,
     rig: Ship | Card | str | Path | None = None,
     terms: str | Sequence[str] | None = None,
@@ -94,15 +96,15 @@ def yaw(
 
     Parameters
     ----------
-    records : path or sequence of paths
-        CSV files of the records.
+    records : path, DataFrame, or sequence of them
+        CSV files of the records; the ``attrs`` of a data frame are its comments.
     inertia_kgm2 : float, optional
         J_zz of body and rotor, kg m2; by default from records in air, or as the file says.
     inertia_error_kgm2 : float, optional
         Standard error of J_zz, kg m2.
     torque_constant_NmpA : float, optional
         k_t, N m/A; by default as the records say.
-    reference : path, optional
+    reference : path or DataFrame, optional
         Record in air of a body of known inertia, from which k_t is taken.
     reference_inertia_kgm2 : float, optional
         Inertia of the body of the reference, kg m2.
@@ -148,6 +150,7 @@ def yaw(
     from tank2sim.dynamics.yaw_theory import theory_values
     from tank2sim.identification.yaw.identify import YawOptions, identify_yaw, parse_yaw_terms, torque_constant
     from tank2sim.identification.yaw.study import study_yaw
+    from tank2sim.records.csv_table import is_frame, table_or_path
     from tank2sim.records.yaw import read_yaw_record
     from tank2sim.results.yaw import YawResult
 
@@ -156,7 +159,7 @@ def yaw(
         raise ArgumentError(missing, "", "is missing", "give both, the reference and its inertia, or neither")
     error = 0.0
     if reference is not None and reference_inertia_kgm2 is not None:
-        in_air = identify_yaw([read_yaw_record(reference)])
+        in_air = identify_yaw([read_yaw_record(table_or_path(reference, "reference"))])
         torque_constant_NmpA, error = torque_constant(in_air, reference_inertia_kgm2)
     known = None if rig is None else _rig_card(rig, "rig")
     options = YawOptions(
@@ -169,7 +172,10 @@ def yaw(
         mirror_limit=mirror_percent / 100,
     )
     body = _floating_body(theory) if theory else None
-    paths = [Path(path) for path in ([records] if isinstance(records, str | Path) else records)]
+    if isinstance(records, str | Path) or is_frame(records):
+        sources = [table_or_path(records, "records")]
+    else:
+        sources = [table_or_path(source, f"records[{number}]") for number, source in enumerate(records)]
 
     def result(read: Sequence[YawRecord]) -> YawResult:
         found = identify_yaw(read, options)
@@ -185,20 +191,21 @@ def yaw(
     if simulate is None:
         if given := next((name for name, value in rest.items() if value), ""):
             raise ArgumentError(given, "", "is of a simulated rig", "give the card to simulate as well")
-        return result([read_yaw_record(path) for path in paths])
-    if len(paths) != 1:
-        raise ArgumentError("simulate", "", f"has {len(paths)} records to write", "give the name of one")
+        return result([read_yaw_record(source) for source in sources])
+    path = sources[0] if sources else None
+    if len(sources) != 1 or not isinstance(path, Path):
+        raise ArgumentError("simulate", "", f"has {len(sources)} records to write", "give the name of one file")
     card = _rig_card(simulate, "simulate")
-    record, text = _simulated(card, paths[0], medium, controller, similar_to, noise_A)
+    record, text = _simulated(card, path, medium, controller, similar_to, noise_A)
     try:
         found = result([record])
     except InputError as fault:
-        if fault.source != str(paths[0]):
+        if fault.source != str(path):
             raise
         raise InputError(
             card.source, fault.place, f"the record simulated of it: {fault.problem}", fault.remedy
         ) from None
-    write_together({paths[0]: text}, inputs=[Path(card.source)])
+    write_together({path: text}, inputs=[Path(card.source)])
     return _with_notice(found, _similarity(record, similar_to)) if similar_to else found
 
 
