@@ -32,13 +32,13 @@ RESULTS = ROOT / "docs" / "static" / "project_choices.json"
 ZIGZAG, TURN, HELD = "trials/zigzag.csv", "trials/turn.csv", "trials/held_out.csv"
 IDENTIFY = f"identify mariner {ZIGZAG} {TURN} --holdout {HELD}"
 COMMANDS = {
-    "analysis.ensemble": ["simulate mariner --manoeuvre turn:35 --ensemble 60", "stability mariner --ensemble 40"],
+    "analysis.ensemble": ["simulate mariner --manoeuvre turn:35 --members 60", "stability mariner --members 40"],
     "analysis.heading": ["autopilot mariner --wave-yaw 0.5", "autopilot mariner --wave-filter 0.7"],
-    "analysis.influence": ["influence mariner --figure criterion_C --figure advance_m@35"],
+    "analysis.influence": ["influence mariner --figures criterion_C --figures advance_m@35"],
     "analysis.validation": [f"validate mariner {ZIGZAG} {HELD}", "poster mariner -o poster.html"],
     "analysis": ["stability mariner", "stability kvlcc2-captive"],
-    "cards": [f"{IDENTIFY} -o new.toml", "simulate new.toml --manoeuvre turn:35 --ensemble 20"],
-    "dynamics.glider": ["glide --angle-deg 25"],
+    "cards": [f"{IDENTIFY} -o new.toml", "simulate new.toml --manoeuvre turn:35 --members 20"],
+    "dynamics.glider": ["glide --angles 25"],
     "dynamics": [
         *(f"simulate mariner --manoeuvre {word}" for word in ("turn:35", "pullout:20")),
         "simulate esso-osaka-estimated --manoeuvre stop",
@@ -61,8 +61,8 @@ COMMANDS = {
     "records.tows": ["tow tows.csv --force-N 11.63 --mass-kg 2243"],
     "records.audit": ["audit faulty.csv", f"audit {ZIGZAG}"],
     "records": [f"{IDENTIFY}", "audit faulty.csv", "reduce campaign/campaign.toml"],
-    "simulation.ensemble": ["simulate mariner --manoeuvre turn:35 --ensemble 60"],
-    "simulation.bands": ["simulate mariner --manoeuvre turn:35 --ensemble 60"],
+    "simulation.ensemble": ["simulate mariner --manoeuvre turn:35 --members 60"],
+    "simulation.bands": ["simulate mariner --manoeuvre turn:35 --members 60"],
     "simulation": [
         *(f"simulate mariner --manoeuvre {word}" for word in ("turn:35", "zigzag:10/10", "spiral:15")),
         "simulate esso-osaka-estimated --manoeuvre stop",

@@ -265,7 +265,7 @@ def judged(
     """Error over standard error of the main coefficients, predictions with the true motion, and their times (n,)."""
     held = paths[2::3]
     fitted = [path for path in paths if path not in held]
-    found = t2s.identify_craft(card, fitted, holdout=held)
+    found = t2s.identify(card, fitted, holdout=held)
     fit = found.fit
     errors = {}
     for name, value, error in zip(fit.problem.free, fit.estimate.values, fit.estimate.standard_errors, strict=True):

@@ -247,13 +247,13 @@ def users(rounds: int, together: int = 256, alone: int = 4) -> None:
     assert isinstance(mariner, ManoeuvringCard) and isinstance(tanker, ManoeuvringCard)
     ship, other_ship, ten, none = ShipText.of(mariner), ShipText.of(tanker), float(np.radians(10.0)), np.zeros(0)
     asked: dict[str, tuple[ManoeuvringCard, Question]] = {
-        "simulate --ensemble, turn:35": (mariner, OfManoeuvre(ship, Turn(float(RUDDER)), None, none)),
-        "simulate --ensemble, zigzag:10/10": (mariner, OfManoeuvre(ship, Zigzag(ten, ten), None, none)),
-        "simulate --ensemble, stop (Esso Osaka)": (tanker, OfManoeuvre(other_ship, Stop(), None, none)),
-        "simulate --ensemble, spiral": (mariner, OfManoeuvre(ship, parse_manoeuvre("spiral"), None, none)),
-        "stability --ensemble, all IMO criteria": (mariner, OfCriteria(ship)),
+        "simulate --members, turn:35": (mariner, OfManoeuvre(ship, Turn(float(RUDDER)), None, none)),
+        "simulate --members, zigzag:10/10": (mariner, OfManoeuvre(ship, Zigzag(ten, ten), None, none)),
+        "simulate --members, stop (Esso Osaka)": (tanker, OfManoeuvre(other_ship, Stop(), None, none)),
+        "simulate --members, spiral": (mariner, OfManoeuvre(ship, parse_manoeuvre("spiral"), None, none)),
+        "stability --members, all IMO criteria": (mariner, OfCriteria(ship)),
         "the same with a stop (Esso Osaka)": (tanker, OfCriteria(other_ship)),
-        "influence --ensemble, advance and overshoot": (
+        "influence --members, advance and overshoot": (
             mariner,
             OfFigures(ship, ("advance_m@35", "overshoot1_deg@10/10")),
         ),
@@ -277,7 +277,7 @@ def users(rounds: int, together: int = 256, alone: int = 4) -> None:
 
 
 def bands_of_readme(card: ManoeuvringCard) -> None:
-    """The bands of the manual for ``tank2sim simulate mariner --manoeuvre turn:35 --ensemble 100 --seed 3``."""
+    """The bands of the manual for ``tank2sim simulate mariner --manoeuvre turn:35 --members 100 --seed 3``."""
     turn, asked = Turn(float(RUDDER)), EnsembleRequest(100, 3)
     run = simulate(build(card), turn)
     bands = manoeuvre_bands(card, turn, (None, float(run.trajectory.t[-1])), asked).figures

@@ -83,7 +83,7 @@ def fitted(vessel: str, paths: list[Path]) -> dict[str, tuple[float, float]]:
     """Coefficient to its value and standard error."""
     if vessel == "usv_22":
         card = first_card(shared_craft_numbers(), np.random.default_rng(0))
-        fit = t2s.identify_craft(card, paths).fit
+        fit = t2s.identify(card, paths).fit
         return {
             name: (value, error)
             for name, value, error in zip(

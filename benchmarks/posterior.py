@@ -17,6 +17,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads would only wait for each other
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -26,8 +27,8 @@ from scipy.stats import chisquare, kstest
 
 from tank2sim.identification.trials.identify import estimate_parameters
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.methods.posterior_sampling import SAMPLERS, sample_posterior
-from tank2sim.identification.trials.options import IdentificationOptions
+from tank2sim.identification.trials.methods.posterior_sampling import sample_posterior
+from tank2sim.identification.trials.options import IdentificationOptions, Sampler
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.structures import STRUCTURES
@@ -82,7 +83,7 @@ def samplers() -> None:
     posed = problem_from_card(STRUCTURES["cross_flow"].start(card), trials.trials, trials.driven_by)
     estimate = estimate_parameters(posed, IdentificationOptions())
     print(f"{len(posed.free)} coefficients, {sum(len(run.measured) for run in posed.runs)} samples of 6 signals")
-    for name in SAMPLERS:
+    for name in get_args(Sampler):
         begin = time.perf_counter()
         found = sample_posterior(posed, estimate, name)
         seconds = time.perf_counter() - begin

@@ -2,7 +2,7 @@
 
 The Mariner with the same relative standard error on each of her derivatives, so large that her advance fails the limit
 of 4.5 L of MSC.137(76) now and then. The probability of that, the worse of a turn to either side counting, is found
-twice: by ``tank2sim stability --ensemble`` (its importance sampling, with all six criteria) and by turns of a million
+twice: by ``tank2sim stability --members`` (its importance sampling, with all six criteria) and by turns of a million
 ships, run in lanes only until the advance is known. Both have a standard error, and their difference must be within
 three of both together. The limits of the two initial turning and overshoot criteria are further off than any member
 comes. A million ships take ten minutes of a core.

@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent / "static" / "pages"
 LIVE = Path(__file__).parent / "live" / "pages"
 PAGES = {
     "turn": "simulate mariner-nominal --manoeuvre turn:35",
-    "zigzag": "simulate kvlcc2-l7 --manoeuvre zigzag:-10/10 --ensemble 200",
+    "zigzag": "simulate kvlcc2-l7 --manoeuvre zigzag:-10/10 --members 200",
     "spiral": "simulate kvlcc2-l7 --manoeuvre spiral:20",
     "stop": "simulate esso-osaka-ship --manoeuvre stop",
     "stability": "stability kvlcc2-l7",

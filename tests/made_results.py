@@ -14,12 +14,11 @@ from _pytest.mark import ParameterSet
 import tank2sim as t2s
 from tank2sim.answer.result import Result
 from tank2sim.api.bundled_ships import list_ships
-from tank2sim.api.gap import gap_result
 from tank2sim.apps.steering import ship as page_ship
 from tank2sim.bundled import bundled
 from tank2sim.gap.result import Gap
 from tank2sim.native import cross
-from tank2sim.results.gap import NO_TRIALS
+from tank2sim.results.gap import NO_TRIALS, gap_result
 from tests.gap import made_up
 from tests.identification.captive.made_runs import oscillation
 from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
@@ -111,7 +110,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     ),
     "influence of a steering card": lambda _: t2s.steering_models("poznyakov-yudin"),
     "influence with targets": _tune,
-    "influence through two points": lambda _: t2s.load("mariner").tune_through("35@35", "1400m@3"),
+    "influence through two points": lambda _: t2s.load("mariner").tune_through(["35@35", "1400m@3"]),
     "guess": lambda _: t2s.guess(
         length_m=160.0,
         beam_m=23.2,

@@ -176,7 +176,7 @@ def test_a_scheduler_that_is_lost_is_one_line_on_the_screen(two, tmp_path) -> No
     from distributed import Client
 
     begin = [sys.executable, "-c", "from tank2sim.cli import main; main()"]
-    command = [*begin, "stability", "mariner", "--ensemble", "5000", "--executor", two.option]
+    command = [*begin, "stability", "mariner", "--members", "5000", "--executor", two.option]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         with Client(f"tcp://{two.address}", set_as_default=False) as client:
             until = time.monotonic() + 60

@@ -11,9 +11,6 @@ from .conftest import ROOT
 
 SOURCES = ROOT / "src" / "tank2sim"
 
-OF_EVERY_COMMAND = {"command"}
-"""Each module of a command has its function under this name, by which the command line finds it."""
-
 
 def public_names(path: Path) -> list[str]:
     names = []
@@ -33,7 +30,7 @@ def test_no_public_name_is_defined_twice() -> None:
         for name in public_names(path):
             places[name].add(path.relative_to(SOURCES).as_posix())
     assert len(places) > 1500
-    assert {name: found for name, found in places.items() if len(found) > 1 and name not in OF_EVERY_COMMAND} == {}
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
 
 
 def test_no_test_imports_from_another_test() -> None:

@@ -99,7 +99,7 @@ def work(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("work")
     (folder / "mariner.toml").write_text(mariner_text())
     (folder / "thruster.toml").write_text(mariner_text() + THRUSTER)
-    command = "simulate thruster.toml --manoeuvre zigzag:20/20 --duration 400 --out zz.csv"
+    command = "simulate thruster.toml --manoeuvre zigzag:20/20 --duration 400 -o zz.csv"
     done(*tank2sim(site, command, cwd=folder))
     return folder
 
@@ -358,7 +358,7 @@ def test_faulty_packages_do_not_stop_what_does_not_use_them(faulty: Path, tmp_pa
     (tmp_path / "trials" / "notes.txt").write_text("not a trial\n")
     simulated, audited, folder = tank2sim(
         faulty,
-        "simulate card.toml --manoeuvre turn:20 --duration 60 --out trials/run.csv",
+        "simulate card.toml --manoeuvre turn:20 --duration 60 -o trials/run.csv",
         "audit trials/run.csv",
         "identify card.toml trials --structure linear --method equation_error",
         cwd=tmp_path,

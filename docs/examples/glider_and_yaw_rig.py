@@ -13,7 +13,7 @@ import tank2sim as t2s
 def main() -> None:
     """Go through the tutorial."""
     programme = Path(__file__).parents[2] / "models" / "kulikovsky-velikanov" / "programme.csv"
-    tank2sim("glide", "--angle-deg", "25,30", "--as-printed")
+    tank2sim("glide", "--angles", "25,30", "--as-printed")
     tank2sim("glide", "--programme", programme, "--budget-kg", "50", "--depth-m", "200", "-o", "glide.html")
     print(t2s.load("kulikovsky-velikanov").to_fmu("glider.fmu"))
 

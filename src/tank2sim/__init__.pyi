@@ -5,11 +5,9 @@ from .answer.result import Result as Result
 from .api.audit import audit as audit
 from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import compare as compare
-from .api.craft_identification import (
-    identify_craft as identify_craft,
-)
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import find_gap as find_gap
+from .api.gap import find_gaps as find_gaps
 from .api.identification import identify as identify
 from .api.reduction import reduce as reduce
 from .api.reduction import reduce_to_mmg as reduce_to_mmg
@@ -64,6 +62,7 @@ from .results.craft_identification import (
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.gap import GapResult as GapResult
+from .results.gap_fleet import FleetResult as FleetResult
 from .results.identification import IdentificationResult as IdentificationResult
 from .results.influence import InfluenceResult as InfluenceResult
 from .results.influence import TuningResult as TuningResult

@@ -7,7 +7,7 @@ import functools
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
@@ -97,14 +97,20 @@ Percent = Annotated[float, ArgumentBounds(0, 1000)]
 Scatter = Annotated[float, ArgumentBounds(0, 10, above=True)]
 DrawsArgument = Annotated[int, ArgumentBounds(0, 1000, whole=True)]
 Seed = Annotated[int, ArgumentBounds(0, whole=True)]
-Effects = Annotated[int, ArgumentBounds(1, 4, whole=True)]
-"""That a search names at most: :data:`tank2sim.gap.workflow.MOST_EFFECTS`."""
+MOST_EFFECTS = 4
+"""Effects that a search names at most. Project choice: a day of trials rarely determines more parameters."""
+Effects = Annotated[int, ArgumentBounds(1, MOST_EFFECTS, whole=True)]
+FalseDiscovery = Annotated[float, ArgumentBounds(0.01, 0.5)]
+"""Probability with which an effect that is named alone may be wrong: from the one that even the surest name has
+(:data:`tank2sim.gap.search.model_choice.SUREST`) to a guess."""
 Count = Annotated[int, ArgumentBounds(1, whole=True)]
 ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 """Ships of an ensemble. Project choice: a day of computing."""
 EnsembleSize = Annotated[int, ENSEMBLE]
 SmallEnsemble = Annotated[int, ArgumentBounds(0, 100_000, whole=True)]
 """Ships that are each simulated on trials. Project choice: a day of computing."""
+PROCESSES = "processes"
+"""Executor: processes of this machine."""
 VALIDATION_MEMBERS = 40
 """Ships of an ensemble for deviations of figures: their deviation has an uncertainty of about 15 %. Project choice."""
 REQUIRED_PERCENT = 20.0
@@ -152,6 +158,25 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     return call
 
 
+def refuse_set(function: Callable[..., Any], given: Mapping[str, Any], problem: str, *, taken: Collection[str]) -> None:
+    """Raise ArgumentError for an argument of a function, none of `taken`, that differs from its default.
+
+    Parameters
+    ----------
+    function : callable
+    given : mapping
+        Value of each of its arguments.
+    problem : str
+        Why it is refused.
+    taken : collection of str
+        Arguments that may have any value.
+    """
+    for name, one in inspect.signature(function).parameters.items():
+        value = tuple(given[name]) if isinstance(given[name], list) else given[name]
+        if name not in taken and value != one.default:
+            raise ArgumentError(name, "", problem, "leave it out")
+
+
 class UnknownType(type):
     """A type that only type checkers know, with whatever members it has."""
 
@@ -192,7 +217,11 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
                 return _as_kind(name, value, part)
             except ArgumentError as fault:
                 faults.append(fault)
-        raise next((fault for fault in faults if fault.remedy.startswith("give a")), faults[0])
+        main = next((each for each in faults if each.remedy.startswith("give a")), faults[0])
+        kinds = dict.fromkeys(each.remedy.removeprefix("give ") for each in faults if each.remedy.startswith("give a"))
+        raise ArgumentError(
+            main.source, main.place, main.problem, f"give {' or '.join(kinds)}" if kinds else main.remedy
+        )
     if get_origin(kind) is Annotated:
         bounds = bounds_of(kind)
         return _as_kind(name, value, get_args(kind)[0]) if bounds is None else bounds.checked(name, value)
@@ -225,8 +254,8 @@ def _is_a(value: Any, kind: Any) -> bool:
         return not isinstance(value, int | float | str | bytes | list | tuple | dict | None)
     if kind is Path:
         return isinstance(value, os.PathLike)
-    if kind is Sequence:  # arrays, series, views and sets do as well
-        return isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    if kind is Sequence:  # arrays, series, views and sets do as well; a data frame would be the names of its columns
+        return isinstance(value, Iterable) and not isinstance(value, str | bytes) and not hasattr(value, "columns")
     if kind is None:
         return value is None
     try:

@@ -22,7 +22,7 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.version import __version__
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from distributed import Future as Remote
 
 _Result = TypeVar("_Result")
-
-EXECUTOR_OPTION = "--executor"
 
 ANSWERS_WITHIN_S = 10.0
 """A scheduler that has not answered by then is taken to be none (project choice)."""
@@ -115,7 +113,7 @@ class Cluster(Executor):
         """Raise InputError if there are no workers, or one of them has other versions than are `wanted`."""
         if not self._client.scheduler_info()["workers"]:
             problem = f"the scheduler at {self._text} has no workers"
-            raise InputError(EXECUTOR_OPTION, "", problem, "start some with `dask worker host:port`")
+            raise ArgumentError("executor", "", problem, "start some with `dask worker host:port`")
         try:
             replies = _within(PATIENCE_S, lambda: self._client.run(installed, on_error="return"))
         except (OSError, TimeoutError):  # one does not answer now; each is asked again before it works
@@ -206,7 +204,7 @@ class Cluster(Executor):
                 with self._lock:
                     waiting = list(self._waiting)
                 for promised in waiting:
-                    error = InputError(EXECUTOR_OPTION, "", trouble, "correct the cluster, or leave the option out")
+                    error = ArgumentError("executor", "", trouble, "correct the cluster, or leave executor out")
                     self._settle(promised, partial(promised.set_exception, error))
 
     def _trouble(self) -> str:
@@ -222,14 +220,12 @@ class Cluster(Executor):
 
         if isinstance(error, KilledWorker):
             problem = "one piece of work was lost with worker after worker"
-            return InputError(
-                EXECUTOR_OPTION, "", problem, "see what their logs say; perhaps each has too little memory"
-            )
+            return ArgumentError("executor", "", problem, "see what their logs say; perhaps each has too little memory")
         return self._lost() if lost else error
 
     def _lost(self) -> InputError:
         problem = f"the scheduler at {self._text} was lost during the work"
-        return InputError(EXECUTOR_OPTION, "", problem, "start it and its workers again, or leave the option out")
+        return ArgumentError("executor", "", problem, "start it and its workers again, or leave executor out")
 
 
 _SINGLE_TASK = Lock()
@@ -263,15 +259,15 @@ def _client(text: str) -> Client:
             )
     except (OSError, TimeoutError, ValueError):
         problem, remedy = f"no scheduler answers at {text}", "start one there with `dask scheduler`"
-        raise InputError(EXECUTOR_OPTION, "", problem, f"{remedy}, or leave the option out") from None
+        raise ArgumentError("executor", "", problem, f"{remedy}, or leave executor out") from None
 
 
 def _refuse_other(theirs: Mapping[str, str], versions: Mapping[str, str], address: str) -> None:
     for name, wanted in versions.items():
         if theirs.get(name) != wanted:
             problem = f"has {name} {theirs[name]}, but here it is {wanted}" if name in theirs else f"lacks this {name}"
-            raise InputError(
-                EXECUTOR_OPTION, f"worker {address}", problem, "install the same on both, and start the worker again"
+            raise ArgumentError(
+                "executor", f"worker {address}", problem, "install the same on both, and start the worker again"
             )
 
 

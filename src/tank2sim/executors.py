@@ -17,12 +17,12 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 
-from tank2sim.cluster import EXECUTOR_OPTION, connected, working_for_another
-from tank2sim.errors import InputError
+from tank2sim.arguments import PROCESSES
+from tank2sim.cluster import connected, working_for_another
+from tank2sim.errors import ArgumentError
 from tank2sim.memory import keep_freed_memory
 from tank2sim.plugins import PluginWarning
 
-PROCESSES = "processes"
 EXECUTOR_FORMS = f"{PROCESSES}, or dask://host:port"
 
 
@@ -37,10 +37,10 @@ def check_executor(text: str) -> str:
     if text == PROCESSES:
         return text
     if not re.fullmatch(r"dask://[^/\s:]+:\d{1,5}|dask://\[[0-9a-fA-F:]+\]:\d{1,5}", text):
-        raise InputError(EXECUTOR_OPTION, "", f"{text!r} is not an executor", f"give {EXECUTOR_FORMS}")
+        raise ArgumentError("executor", "", f"{text!r} is not an executor", f"give {EXECUTOR_FORMS}")
     if importlib.util.find_spec("distributed") is None:
         problem = "Dask, which a cluster needs, is not installed"
-        raise InputError(EXECUTOR_OPTION, "", problem, "pip install 'tank2sim[dask]', or leave the option out")
+        raise ArgumentError("executor", "", problem, "pip install 'tank2sim[dask]', or leave executor out")
     return text
 
 

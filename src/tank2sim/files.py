@@ -10,12 +10,10 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from tank2sim.errors import InputError
 
@@ -314,6 +312,26 @@ def writable_folder(path: Path) -> Path:
     return path
 
 
+@contextmanager
+def folder_made(path: Path) -> Iterator[None]:
+    """A folder for outputs, made before the long work that fills it, and removed if that fails.
+
+    Raises
+    ------
+    InputError
+        It cannot be made or written.
+    """
+    made = not path.exists()
+    writable_folder(path)
+    try:
+        yield
+    except BaseException:
+        if made:
+            with suppress(OSError):
+                path.rmdir()
+        raise
+
+
 def _umask() -> int:
     value = os.umask(0)
     os.umask(value)
@@ -405,12 +423,10 @@ def plain_json(value: Any) -> Any:
     match value:
         case Mapping():
             return {str(key): plain_json(item) for key, item in value.items()}
-        case np.ndarray():
+        case _ if hasattr(value, "tolist"):  # arrays and numbers of NumPy
             return plain_json(value.tolist())
         case list() | tuple():
             return [plain_json(item) for item in value]
-        case np.generic():
-            return plain_json(value.item())
         case float():
             return value if math.isfinite(value) else None
         case Path():

@@ -6,7 +6,7 @@ import ctypes
 import os
 from pathlib import Path
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # parameters of mallopt, malloc.h of glibc
 _MOST_KEPT = 512 << 20
@@ -81,4 +81,4 @@ def refuse_beyond_memory(name: str, number: int, bytes_each: int) -> None:
         problem = (
             f"is {number:,}, which takes {number * bytes_each / 1e9:.3g} GB, and {available / 1e9:.3g} GB are free"
         )
-        raise InputError(name, "", problem, f"give at most {most:,}")
+        raise ArgumentError(name, "", problem, f"give at most {most:,}")

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 REMEDY = "repair the package or uninstall it"
 
-_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?")
 
 P = ParamSpec("P")
 R = TypeVar("R")

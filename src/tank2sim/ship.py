@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
 from tank2sim.api.autopilot import autopilot
-from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.api.influence import find_influence, tune_ship
+from tank2sim.api.manoeuvre import simulate_manoeuvre
+from tank2sim.api.stability import judge_stability
+from tank2sim.apps.bridge.command import make_pilot_card, make_poster
+from tank2sim.apps.rigs.glider.command import glide
+from tank2sim.apps.steering.command import make_steering_page
+from tank2sim.apps.steering_cards.tuning_command import tune_ship_through
 from tank2sim.arguments import (
     AngleArgument,
     EnsembleSize,
     NumberArgument,
-    PositiveArgument,
     Seed,
     SpeedArgument,
-    TuningRange,
     checked,
 )
 from tank2sim.arrays import Array
-from tank2sim.cards import CraftCard, read_card
+from tank2sim.cards import read_card
 from tank2sim.dynamics.vessel import Vessel
 from tank2sim.errors import InputError, close_name
-from tank2sim.executors import PROCESSES
 from tank2sim.files import write_together
 from tank2sim.units import to_si
 
@@ -33,21 +35,8 @@ if TYPE_CHECKING:
     import control
     import pandas as pd
 
-    from tank2sim.answer.result import Result
-    from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
-    from tank2sim.apps.rigs.glider.programme import GlideProgramme
-    from tank2sim.apps.rigs.glider.result import GlideResult
-    from tank2sim.apps.steering.result import SteeringPageResult
-    from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
-    from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.fmu import ExportResult
-    from tank2sim.results.influence import InfluenceResult, TuningResult
     from tank2sim.results.manoeuvre import ManoeuvreResult
-    from tank2sim.results.stability import StabilityResult
-    from tank2sim.simulation.manoeuvres import Manoeuvre
-
-
-AnyResult = TypeVar("AnyResult", bound="Result[Any]")
 
 
 class SimulationOptions(TypedDict, total=False):
@@ -213,88 +202,9 @@ class Ship(Vessel):
             raise InputError("orders", "", "has columns of different lengths", "give an order for each time")
         return self.simulate(orders_from_columns(columns, "orders"), **options)
 
-    @checked
-    def simulate(
-        self,
-        manoeuvre: str | Manoeuvre,
-        *,
-        duration_s: PositiveArgument | None = None,
-        external: Mapping[str, float] | None = None,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> ManoeuvreResult:
-        """Simulate a manoeuvre in the words of the command line: ``"zigzag:20/20"``, ``"turn:-35"``, ``"stop"``.
+    simulate = simulate_manoeuvre
 
-        Parameters
-        ----------
-        manoeuvre : str or Manoeuvre
-            Angles of a text in degrees; an object of :mod:`tank2sim.simulation.manoeuvres` has radians.
-        duration_s : float, optional
-            By default as long as the manoeuvre needs.
-        external : mapping, optional
-            Constant force from outside: ``X``, ``Y`` (N, positive forward and to starboard) at ``x``, ``y`` (m, forward
-            of midships and to starboard), and a moment ``N`` (N m, positive to starboard) in addition.
-        members : int
-            Size of an ensemble drawn from the standard errors of the card, for bands of 5, 50 and 95 %; 0 for none.
-        seed : int
-            Of the ensemble.
-        executor : str
-            Who computes the ensemble: ``processes`` or ``dask://host:port``.
-
-        Raises
-        ------
-        InputError
-            The text is not a manoeuvre, the card is not one of a ship with a rudder, the motion leaves all bounds,
-            or `external` has an unknown key or comes with an ensemble.
-        """
-        from tank2sim.api.manoeuvre import simulate_manoeuvre
-        from tank2sim.simulation.manoeuvres import parse_manoeuvre
-
-        if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
-            problem = f"is of the type {type(manoeuvre).__name__}"
-            raise InputError("manoeuvre", "", problem, "give a text, for example 'turn:35'")
-        parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
-        words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
-        ensemble = EnsembleOptions(members, seed, executor)
-        return simulate_manoeuvre(self, parsed, words, duration_s, ensemble, external)
-
-    @checked
-    def stability(
-        self,
-        speed_mps: SpeedArgument | None = None,
-        *,
-        spirals: bool = True,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> StabilityResult | CraftStabilityResult:
-        """Straight-line stability, steady turning and the IMO criteria; of a craft what is not of a rudder.
-
-        Parameters
-        ----------
-        speed_mps : float, optional
-            Of the straight course; by default the speed of the card.
-        spirals : bool
-            Simulate the spirals on the steady-turning diagram.
-        members, seed, executor
-            As in :meth:`simulate`.
-
-        Raises
-        ------
-        InputError
-            The ship holds no straight course; an ensemble of a craft.
-        """
-        if isinstance(self.card, CraftCard):
-            from tank2sim.api.stability import judge_craft_stability
-
-            if members:
-                problem = "is of the IMO criteria, which a craft without a rudder has not"
-                raise InputError("--ensemble", "", problem, "leave it out")
-            return judge_craft_stability(self, speed_mps)
-        from tank2sim.api.stability import judge_stability
-
-        return judge_stability(self, speed_mps, spirals=spirals, ensemble=EnsembleOptions(members, seed, executor))
+    stability = judge_stability
 
     @checked
     def state_space(
@@ -334,251 +244,14 @@ class Ship(Vessel):
         settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
-    @checked
-    def influence(
-        self,
-        figures: str | Sequence[str] = (),
-        *,
-        joint_variation: Mapping[str, float] | None = None,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> InfluenceResult:
-        """Influence coefficients: by how many per cent a figure changes for 10 % more of each number on the card.
-
-        Parameters
-        ----------
-        figures : str or sequence of str
-            ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``, angles in degrees: names are those of
-            :data:`tank2sim.analysis.influence.figures.FIGURE_KINDS`. Of a craft with thrusters
-            ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, ``final_rate_degps@spin:400``, in
-            rpm: :data:`.CRAFT_FIGURE_KINDS`. By default one of each kind.
-        joint_variation : mapping, optional
-            Changes in % of numbers that change together (Kc), by name: ``{"Yv": 0.62, "Nv": 1.7}``.
-        members, seed, executor
-            As in :meth:`simulate`.
-
-        Raises
-        ------
-        InputError
-            A figure or a name is unknown, or the ship does not show a figure.
-        """
-        from tank2sim.api.influence import influence_of_ship
-
-        names = [figures] if isinstance(figures, str) else list(figures)
-        return influence_of_ship(self, names, joint_variation or {}, EnsembleOptions(members, seed, executor))
-
-    @checked
-    def tune(
-        self,
-        targets: str | Sequence[str],
-        *,
-        figures: str | Sequence[str] = (),
-        by: str = "uncertain",
-        within: TuningRange = 3.0,
-        hold: Sequence[str] = (),
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        joint_variation: Mapping[str, float] | None = None,
-        members: EnsembleSize = 0,
-        seed: Seed = 0,
-        executor: str = PROCESSES,
-    ) -> TuningResult:
-        """Change the card until figures have the values that a trial or a standard gives.
-
-        Parameters
-        ----------
-        targets : str or sequence of str
-            ``steady_radius_m@20=424``, ``overshoot1_deg@20/20<=25``, ``>=``: figures as in :meth:`influence`.
-        figures : str or sequence of str
-            Further figures to compute.
-        by : str
-            ``uncertain``: the least sum of squared moves in standard errors; ``fewest``: the fewest parameters.
-        within : float
-            Bounds of each move, standard errors of the card.
-        hold : sequence of str
-            Parameters that stay (``Nr``).
-        bounds : mapping, optional
-            Lowest and highest value by name, in the conventions of the card's file, in place of `within`.
-        joint_variation : mapping, optional
-            Parameters that move together only, as in :meth:`influence`.
-        members, seed, executor
-            As in :meth:`simulate`; of the ship before.
-
-        Raises
-        ------
-        InputError
-            A target cannot be read, a name is unknown, or nothing is left to change. Targets that contradict each
-            other are a result, whose card is refused.
-        """
-        from tank2sim.analysis.tuning.result import Means
-        from tank2sim.api.influence import tune_ship
-
-        wanted, further = ([given] if isinstance(given, str) else list(given) for given in (targets, figures))
-        means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
-        return tune_ship(self, wanted, further, means, EnsembleOptions(members, seed, executor))
-
-    @checked
-    def tune_through(self, first: str, second: str) -> TurnTuningResult:
-        """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.
-
-        Parameters
-        ----------
-        first, second : str
-            Points ``RATE@RUDDER``, deg/min to the side of the rudder at deg of rudder, + to starboard (``61@35``,
-            ``20@0`` of an unstable ship), or a radius, ``424m@20``.
-
-        Raises
-        ------
-        InputError
-            A point cannot be read, or no factors between 1/5 and 5 meet both.
-        """
-        from tank2sim.apps.steering_cards.tuning_command import tune_ship_through
-
-        return tune_ship_through(self, first, second)
-
+    influence = find_influence
+    tune = tune_ship
+    tune_through = tune_ship_through
     autopilot = autopilot
-
-    @checked
-    def glide(
-        self,
-        angles_deg: float | Sequence[float] = (),
-        *,
-        roll_deg: AngleArgument = 0.0,
-        buoyancy_kg: PositiveArgument | None = None,
-        programme: GlideProgramme | str | Path | None = None,
-        as_printed: bool = False,
-        budget_kg: NumberArgument | None = None,
-        depth_m: NumberArgument | None = None,
-        views: bool = False,
-    ) -> GlideResult:
-        """Steady glides of an underwater glider, the path of a programme, and what is best.
-
-        Parameters
-        ----------
-        angles_deg : float or sequence of float
-            Paths of steady glides, + to climb, - to dive.
-        roll_deg : float
-            Of these glides, + starboard side down.
-        buoyancy_kg : float, optional
-            Size of their net buoyancy; by default that of the card.
-        programme : path or GlideProgramme, optional
-            To be flown, by the steady glides and by the transient model: a CSV of steps ``duration_s``,
-            ``path_angle_deg`` or ``pitch_deg``, ``roll_deg``, ``buoyancy_kg``.
-        as_printed : bool
-            Also what the equations of Kulikovsky & Velikanov give as they are printed.
-        budget_kg, depth_m : float, optional
-            Ballast that can be pushed out, and the depth from which, for the range. Both or neither.
-        views : bool
-            Also how wrong steady glides are for programmes of different speed.
-
-        Raises
-        ------
-        InputError
-            The card is not one of a glider, an angle or a step cannot be flown, or the programme is at fault.
-        """
-        from tank2sim.apps.rigs.glider.command import glide_with
-        from tank2sim.apps.rigs.glider.programme import read_programme
-        from tank2sim.apps.rigs.glider.study import GlideQuestion
-
-        angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
-        question = GlideQuestion(
-            angles_rad=tuple(np.radians(angles).tolist()),
-            roll_rad=math.radians(roll_deg),
-            buoyancy_kg=buoyancy_kg,
-            programme=read_programme(programme) if isinstance(programme, str | Path) else programme,
-            as_printed=as_printed,
-            budget_kg=budget_kg,
-            depth_m=depth_m,
-            views=views,
-        )
-        return glide_with(self, question)
-
-    @checked
-    def poster(
-        self,
-        path: str | Path | None = None,
-        *,
-        ballast: Any = None,
-        orders: Mapping[str, float] | None = None,
-    ) -> PosterResult:
-        """The wheelhouse poster (IMO A.601(15), A3); what the card does not state stays blank.
-
-        Parameters
-        ----------
-        path : path, optional
-            HTML file to write, which prints on one page.
-        ballast : Ship, Card, str or path, optional
-            The ship in ballast; this is then the loaded condition.
-        orders : mapping, optional
-            Orders of the engine telegraph ahead, with their revolutions in rpm: ``{"Half ahead": 56}``.
-
-        Raises
-        ------
-        InputError
-            The ship does not manoeuvre, an order cannot be shown, the ballast card is of another ship, or the file
-            cannot be written.
-        """
-        from tank2sim.apps.bridge.command import make_poster
-
-        return self._written(make_poster(self, ballast=ballast, order=orders), path)
-
-    @checked
-    def pilot_card(
-        self,
-        path: str | Path | None = None,
-        *,
-        ballast: Any = None,
-        orders: Mapping[str, float] | None = None,
-    ) -> PilotCardResult:
-        """The pilot card (IMO A.601(15), A4). Raises as :meth:`poster`.
-
-        Parameters
-        ----------
-        path, ballast, orders
-            As of :meth:`poster`.
-        """
-        from tank2sim.apps.bridge.command import make_pilot_card
-
-        return self._written(make_pilot_card(self, ballast=ballast, order=orders), path)
-
-    @checked
-    def steering_page(
-        self,
-        path: str | Path | None = None,
-        *,
-        ghost: str | Path | None = None,
-        scenario: str | Path | None = None,
-        view_3d: bool = False,
-    ) -> SteeringPageResult:
-        """A page in which the ship is steered in a browser; it needs no network.
-
-        Parameters
-        ----------
-        path : path, optional
-            HTML file to write.
-        ghost : path, optional
-            A measured trial that moves next to the ship.
-        scenario : path or str, optional
-            Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
-        view_3d : bool
-            Whether the page also has the view from the bridge (three.js, 0.6 MB).
-
-        Raises
-        ------
-        InputError
-            The ship has no rudder, the trial is at fault or has no positions, the scenario is at fault, or the file
-            cannot be written.
-        """
-        from tank2sim.apps.steering.command import make_steering_page
-
-        inputs = [Path(given) for given in (ghost, scenario) if given and Path(given).is_file()]
-        return self._written(make_steering_page(self, ghost, scenario, view_3d), path, *inputs)
-
-    def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
-        """Write the page of a result to a path that is not an input, if one is given; return the result."""
-        if path is not None:
-            write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
-        return result
+    glide = glide
+    poster = make_poster
+    pilot_card = make_pilot_card
+    steering_page = make_steering_page
 
     @checked
     def to_fmu(

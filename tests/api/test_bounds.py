@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import click
 import numpy as np
@@ -14,11 +15,19 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim import memory
-from tank2sim.arguments import AngleArgument, ArgumentBounds, Count, Effects, Seed, SpeedArgument, bounds_of, checked
+from tank2sim.api.commands import VERBS
+from tank2sim.arguments import (
+    AngleArgument,
+    ArgumentBounds,
+    FalseDiscovery,
+    SpeedArgument,
+    annotated_kind,
+    bounds_of,
+    checked,
+)
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
-from tank2sim.cli.options import number
-from tank2sim.gap.workflow import MOST_EFFECTS
+from tank2sim.gap.search.model_choice import LIKELY, SUREST
 from tests.cli.command_line import refused, tank2sim
 
 SHIP = t2s.load("mariner")
@@ -77,7 +86,7 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: SHIP.steer({"t_s": 0, "delta_order_deg": 1}), "orders"),
         (lambda: SHIP.steer(np.ones((3, 2))), "orders"),
         (lambda: SHIP.steer(None), "orders"),
-        (lambda: SHIP.poster(orders={"Half ahead": "a"}), "orders: Half ahead"),
+        (lambda: SHIP.poster(order={"Half ahead": "a"}), "order: Half ahead"),
         (lambda: SHIP.save(None), "path"),
         (lambda: SHIP.to_fmu("x.fmu", fmi="2"), "fmi"),
         (lambda: SHIP.replace({"model.speed_mps": None}), SHIP.card.source),
@@ -93,6 +102,8 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: t2s.identify(SHIP, 5), "trials"),
         (lambda: t2s.identify(SHIP, "x.csv", members=-1), "members"),
         (lambda: t2s.identify(SHIP, "x.csv", piece_s=0.0), "piece_s"),
+        (lambda: t2s.identify(SHIP, "x.csv", posterior="gibbs"), "posterior"),
+        (lambda: t2s.identify(SHIP, "x.csv", structure="kraken"), "structure"),
         (lambda: t2s.find_gap(SHIP, "x.csv", max_effects=9), "max_effects"),
         (lambda: t2s.find_gap(SHIP, "x.csv", workers=0), "workers"),
         (lambda: t2s.validate(SHIP, required_percent=-1), "required_percent"),
@@ -209,24 +220,29 @@ def test_a_rudder_that_looks_like_radians_is_doubted_in_the_first_line(
 
 
 def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
-    assert bounds_of(Effects) == ArgumentBounds(1, MOST_EFFECTS, whole=True)
-    for kind in (Seed, Count, SpeedArgument, Effects):
-        bounds, option = bounds_of(kind), number(kind)
-        assert bounds is not None and isinstance(option, click.IntRange | click.FloatRange)
-        assert (option.min, option.max, option.min_open) == (bounds.low, bounds.high, bounds.above)
+    assert bounds_of(FalseDiscovery) == ArgumentBounds(round(1 - SUREST, 9), 1 - LIKELY)
+    bounded = 0
     for name in COMMANDS:
         command = group.get_command(click.Context(group), name)
         assert command is not None
-        for option in command.params:
-            if "--seed" in option.opts:
-                assert isinstance(option.type, click.IntRange) and option.type.min == 0, name
+        kinds = {option.name: option.type for option in command.params}
+        function = VERBS[name].function
+        for argument in inspect.signature(function).parameters.values():
+            kind = annotated_kind(argument.annotation, function)
+            for bounds in filter(None, map(bounds_of, get_args(kind) or (kind,))):
+                option = kinds[argument.name]
+                if bounds != ArgumentBounds():
+                    assert isinstance(option, click.IntRange | click.FloatRange), (name, argument.name)
+                    assert (option.min, option.max, option.min_open) == (bounds.low, bounds.high, bounds.above)
+                    bounded += 1
+    assert bounded > 40
 
 
 @pytest.mark.parametrize(
     "arguments, option",
     [
         ("simulate mariner --manoeuvre turn:35 --duration nan", "--duration"),
-        ("simulate mariner --manoeuvre turn:35 --ensemble 9999999999", "--ensemble"),
+        ("simulate mariner --manoeuvre turn:35 --members 9999999999", "--members"),
         ("stability mariner --speed nan", "--speed"),
         ("autopilot mariner --wave-filter nan", "--wave-filter"),
         ("design mariner --carriage-length nan", "--carriage-length"),

@@ -45,7 +45,8 @@ def test_a_sheet_fits_a_screen_and_has_a_picture(poster: t2s.PosterResult) -> No
 def test_a_pilot_card_is_written_with_the_speeds_of_its_orders(tmp_path: Path) -> None:
     ship = t2s.load("esso-osaka-estimated")
     nominal = ship.card.propulsion.nominal_radps * 30 / 3.141592653589793  # type: ignore[attr-defined]
-    card = ship.pilot_card(tmp_path / "pilot.html", orders={"Full sea speed": nominal, "Half ahead": nominal / 2})
+    card = ship.pilot_card(order={"Full sea speed": nominal, "Half ahead": nominal / 2})
+    card.to_html(tmp_path / "pilot.html")
     assert "Half ahead" in (tmp_path / "pilot.html").read_text(encoding="utf-8")
     # A ship that is left alone with these revolutions comes to that speed.
     run = ship.steer({"t_s": [0], "delta_order_deg": [0], "n_rpm": [nominal / 2]}, duration_s=3000)
@@ -57,10 +58,10 @@ def test_a_pilot_card_is_written_with_the_speeds_of_its_orders(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("options", "source", "place"),
     [
-        ({"orders": {"Half ahead": -3.0}}, "order", "Half ahead=-3"),
-        ({"orders": {"Full astern": 60.0}}, "order", "Full astern=60"),
-        ({"orders": {"a": 60.0, "A": 50.0}}, "order", "A=50"),
-        ({"orders": {f"order {number}": 50.0 for number in range(4)}}, "order", "order 3=50"),
+        ({"order": {"Half ahead": -3.0}}, "order", "Half ahead=-3"),
+        ({"order": {"Full astern": 60.0}}, "order", "Full astern=60"),
+        ({"order": {"a": 60.0, "A": 50.0}}, "order", "A=50"),
+        ({"order": {f"order {number}": 50.0 for number in range(4)}}, "order", "order 3=50"),
         ({"ballast": "kvlcc2-captive"}, "kvlcc2-captive", "ship"),
         ({"ballast": "mariner"}, "mariner", "ship.draught_m"),
     ],
@@ -76,19 +77,20 @@ def test_a_card_is_never_overwritten_by_its_own_sheet(tmp_path: Path) -> None:
     path = tmp_path / "ship.toml"
     t2s.load("mariner").save(path)
     with pytest.raises(t2s.InputError):
-        t2s.load(path).poster(path)
+        t2s.load(path).poster().to_html(path)
     assert t2s.load(path).name == "Mariner class"
 
 
 def test_without_the_compiler_no_steering_page_is_written(tmp_path: Path) -> None:
     with mock.patch.object(page_ship, "has_compiler", return_value=False), pytest.raises(t2s.InputError) as refusal:
-        t2s.load("mariner").steering_page(tmp_path / "steer.html")
+        t2s.load("mariner").steering_page()
     assert "tank2sim[platforms]" in refusal.value.remedy and not list(tmp_path.iterdir())
 
 
 def test_a_steering_page_is_that_of_its_result(tmp_path: Path) -> None:
     with without_wasm():
-        found = t2s.load("mariner").steering_page(tmp_path / "steer.html")
+        found = t2s.load("mariner").steering_page()
+    found.to_html(tmp_path / "steer.html")
     page = (tmp_path / "steer.html").read_text(encoding="utf-8")
     assert found.to_dict()["steerable"] is True and page == found.page()
     assert found.to_dict()["page_kB"] == pytest.approx((tmp_path / "steer.html").stat().st_size / 1000)

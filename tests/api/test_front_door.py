@@ -54,7 +54,6 @@ LENGTHY = (
     "design_campaign",
     "design_trial",
     "guess",
-    "identify_craft",
     "tow",
     "yaw",
 )

@@ -62,7 +62,7 @@ def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path
     assert refusal.value.place == "model.kind" and "glider" in refusal.value.remedy
     with pytest.raises(t2s.InputError) as refusal:
         glider.glide(budget_kg=10)
-    assert str(refusal.value.source) == "--depth-m" and refusal.value.remedy
+    assert str(refusal.value.source) == "depth_m" and refusal.value.remedy
     with pytest.raises(t2s.InputError) as refusal:
         glider.glide(programme=tmp_path / "none.csv")
     assert str(refusal.value.source).endswith("none.csv")

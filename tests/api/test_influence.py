@@ -70,7 +70,7 @@ def test_targets_that_contradict_each_other_are_named_and_their_card_is_refused(
     assert not tuning.reached and tuning.to_dict()["tuned"]["contradiction"] == list(tuning.targets.index)  # type: ignore[index]
     with pytest.raises(t2s.InputError) as refused:
         _ = tuning.card
-    assert refused.value.source == "--tune" and "--within" in refused.value.remedy
+    assert refused.value.source == "targets" and "within" in refused.value.remedy
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_a_tuned_card_carries_the_covariance_of_what_hardly_moved(tmp_path: Path
 
 
 def test_the_scaled_ship_turns_through_both_points(mariner: t2s.Ship) -> None:
-    tuning = mariner.tune_through("35@35", "1400m@3")
+    tuning = mariner.tune_through(["35@35", "1400m@3"])
     assert tuning.turns["rate_after_degpmin"].iloc[0] == pytest.approx(35)
     run = tuning.tuned_ship.turn(35)
     assert 60 * run.figures["steady_rate_degps"] == pytest.approx(35, rel=2e-3)
@@ -111,14 +111,14 @@ def test_models_of_a_steering_card_turn_as_the_paper_prints() -> None:
 @pytest.mark.parametrize(
     ("call", "source", "place"),
     [
-        (lambda ship: ship.influence("steady_radius"), "--figure", "steady_radius"),
-        (lambda ship: ship.influence("criterion_C", joint_variation={"Yq": 1.0}), "--agreed", "Yq"),
-        (lambda ship: ship.influence("criterion_C", members=1), "--ensemble", ""),
-        (lambda ship: ship.tune("steady_radius_m@20"), "--tune", "steady_radius_m@20"),
-        (lambda ship: ship.tune([]), "--tune", ""),
-        (lambda ship: ship.tune("criterion_C=5e-6", by="luck"), "--by", ""),
+        (lambda ship: ship.influence("steady_radius"), "figures", "steady_radius"),
+        (lambda ship: ship.influence("criterion_C", joint_variation={"Yq": 1.0}), "joint_variation", "Yq"),
+        (lambda ship: ship.influence("criterion_C", members=1), "members", ""),
+        (lambda ship: ship.tune("steady_radius_m@20"), "targets", "steady_radius_m@20"),
+        (lambda ship: ship.tune([]), "targets", ""),
+        (lambda ship: ship.tune("criterion_C=5e-6", by="luck"), "by", ""),
         (lambda ship: ship.tune("criterion_C=5e-6", within=0.0), "within", ""),
-        (lambda ship: ship.tune_through("35@35", "much@3"), "--through", "much@3"),
+        (lambda ship: ship.tune_through(["35@35", "much@3"]), "points", "much@3"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_at_its_place(mariner: t2s.Ship, call, source: str, place: str) -> None:

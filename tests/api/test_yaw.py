@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import doctest
+from typing import get_args
 
 import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.rigs.yaw import command as module
+from tank2sim.apps.rigs.yaw.identify import YAW_METHODS
 from tests.yaw_truth import Truth, record, written
 
 BODY_KGM2, ADDED_KGM2 = 0.0204, 0.03
@@ -67,6 +69,23 @@ def test_a_record_is_simulated_once(tmp_path):
     assert refusal.value.source == str(path) and refusal.value.remedy
 
 
+def test_the_methods_are_those_of_the_evaluation():
+    assert get_args(module.YawMethod) == YAW_METHODS
+
+
+def test_a_simulated_record_is_identified_at_once(tmp_path):
+    path = tmp_path / "rig.csv"
+    found = t2s.yaw(path, simulate="alyshev", noise_A=0.003, similar_to="38,8,100,120")
+    again = t2s.yaw(path)
+    assert found.estimates.loc[found.method].tolist() == pytest.approx(
+        again.estimates.loc[found.method].tolist(), rel=1e-3
+    )
+    assert "rates times 8.968" in found.notices[-1]
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.yaw(path, simulate="alyshev")
+    assert refusal.value.source == str(path)
+
+
 @pytest.mark.slow
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
@@ -77,10 +96,11 @@ def test_it_fits_a_screen_and_shows_its_charts(found):
 @pytest.mark.parametrize(
     ("options", "source"),
     [
-        ({"method": "magic"}, "--method"),
-        ({"terms": ["stiction"]}, "--terms"),
-        ({"theory": "0.67,0.2"}, "--theory"),
-        ({"reference_inertia_kgm2": 0.02}, "--reference"),
+        ({"method": "magic"}, "method"),
+        ({"terms": ["stiction"]}, "terms"),
+        ({"theory": "0.67,0.2"}, "theory"),
+        ({"reference_inertia_kgm2": 0.02}, "reference"),
+        ({"noise_A": 0.1}, "noise_A"),
     ],
 )
 def test_bad_input_is_refused_with_place_and_remedy(folder, options, source):
@@ -102,7 +122,7 @@ def test_a_method_without_an_estimate_is_refused_before_a_card_is_made(folder):
     assert "output_error" not in found.estimates.index
     with pytest.raises(t2s.InputError) as refusal:
         found.rig_card()
-    assert refusal.value.source == "--method" and "energy_least_squares" in refusal.value.remedy
+    assert refusal.value.source == "method" and "energy_least_squares" in refusal.value.remedy
 
 
 @pytest.mark.slow

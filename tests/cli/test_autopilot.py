@@ -61,7 +61,7 @@ def test_what_is_wrong_is_reported_in_one_line_and_nothing_is_written(tmp_path: 
         ("mariner", "--track", "none.csv"): "does not exist",
         ("mariner", "--track", "short.csv"): "short.csv: leg 1: is 2 m",
         ("mariner", "--course-change", "0"): "is 0",
-        ("mariner", "--verify"): "needs an FMU",
+        ("mariner", "--verify"): "needs --export",
         ("mariner", "--design", "fuzzy"): "fuzzy",
         ("nothing",): "nothing",
         ("mariner", "--set", "derivatives.Nd=139e-5", "--set", "derivatives.Yd=-278e-5"): "wrong way",

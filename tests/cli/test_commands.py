@@ -21,7 +21,7 @@ def test_ships_lists_the_bundled_cards(tmp_path) -> None:
 
 def test_simulate_writes_what_is_asked(tmp_path) -> None:
     result = tank2sim(
-        *("simulate", "Mariner", "--manoeuvre", "zigzag:20/20", "--out", "run.csv", "--plot", "run.png"),
+        *("simulate", "Mariner", "--manoeuvre", "zigzag:20/20", "-o", "run.csv", "--plot", "run.png"),
         *("--json", "run.json"),
         cwd=tmp_path,
     )
@@ -70,7 +70,7 @@ def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> No
 
 
 def test_if_one_file_cannot_be_written_none_is(tmp_path) -> None:
-    arguments = ["simulate", "mariner", "--manoeuvre", "turn:35", "--out", "run.csv", "--json", "missing/run.json"]
+    arguments = ["simulate", "mariner", "--manoeuvre", "turn:35", "-o", "run.csv", "--json", "missing/run.json"]
     refused(tank2sim(*arguments, cwd=tmp_path), "missing/run.json", "cannot be written")
     assert not list(tmp_path.iterdir())
 

@@ -33,7 +33,7 @@ def test_a_result_that_is_nested_without_end_is_refused(schema: str, depth: int,
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("influence", "mariner", "--agreed", "deep.toml"),
+        ("influence", "mariner", "--joint-variation", "deep.toml"),
         ("influence", "deep.toml"),
         ("simulate", "deep.toml", "--manoeuvre", "turn:35"),
         ("convention", "deep.toml"),
@@ -86,26 +86,26 @@ def _ship_with(tmp_path: Path, covariance: str) -> None:
 )
 def test_a_covariance_that_is_no_matrix_of_numbers_is_refused(rows: str, tmp_path: Path) -> None:
     _ship_with(tmp_path, f'"covariance": {rows}')
-    options = ("--manoeuvre", "turn:35", "--ensemble", "4")
+    options = ("--manoeuvre", "turn:35", "--members", "4")
     refused(tank2sim("simulate", "ship.toml", *options, cwd=tmp_path), "ship.covariance.json")
 
 
 @pytest.mark.parametrize("rows", ["[[true, false], [false, true]]", '[["0", 0], [0, 0]]', "true"])
 def test_samples_of_a_covariance_that_are_no_numbers_are_refused(rows: str, tmp_path: Path) -> None:
     _ship_with(tmp_path, f'"covariance": [[1e-6, 0], [0, 1e-6]], "samples": {rows}')
-    options = ("--manoeuvre", "turn:35", "--ensemble", "4")
+    options = ("--manoeuvre", "turn:35", "--members", "4")
     refused(tank2sim("simulate", "ship.toml", *options, cwd=tmp_path), "ship.covariance.json", "samples")
 
 
 @pytest.mark.parametrize(
-    "command", [("simulate", "--manoeuvre", "turn:35"), ("stability", "--no-spiral"), ("influence",)]
+    "command", [("simulate", "--manoeuvre", "turn:35"), ("stability", "--no-spirals"), ("influence",)]
 )
 def test_an_ensemble_without_one_ship_that_sails_is_refused(command: tuple[str, ...], tmp_path: Path) -> None:
     name, *options = command
     _ship_with(tmp_path, '"covariance": [[1e300, 0], [0, 1e300]]')
-    refused(tank2sim(name, "ship.toml", *options, "--ensemble", "4", cwd=tmp_path), "ship.covariance.json")
+    refused(tank2sim(name, "ship.toml", *options, "--members", "4", cwd=tmp_path), "ship.covariance.json")
     _ship_with(tmp_path, '"covariance": [[9e7, 0], [0, 9e7]]')
-    done = tank2sim(name, "ship.toml", *options, "--ensemble", "2", "--seed", "3", cwd=tmp_path)
+    done = tank2sim(name, "ship.toml", *options, "--members", "2", "--seed", "3", cwd=tmp_path)
     assert done.returncode in (0, 2) and "fault of the program" not in done.stderr
 
 
@@ -124,9 +124,9 @@ os.execv(sys.executable, [sys.executable, "-m", "tank2sim", {arguments}])
         ((2,), ("ships",), 0),
         ((0, 1, 2), ("ships",), 0),
         ((1,), ("--help",), 0),
-        ((1,), ("stability", "mariner", "--no-spiral", "--json", "s.json"), 0),
-        ((1,), ("stability", "mariner", "--no-spiral", "--json", "-"), 2),
-        ((2,), ("stability", "mariner", "--no-spiral", "--json", "s.json"), 0),
+        ((1,), ("stability", "mariner", "--no-spirals", "--json", "s.json"), 0),
+        ((1,), ("stability", "mariner", "--no-spirals", "--json", "-"), 2),
+        ((2,), ("stability", "mariner", "--no-spirals", "--json", "s.json"), 0),
         ((1, 2), ("stability", "nowhere"), 2),
     ],
 )

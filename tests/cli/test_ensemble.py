@@ -1,4 +1,4 @@
-"""``--ensemble``: bands in the JSON, the same for the same seed, from the covariance that reduce writes."""
+"""``--members``: bands in the JSON, the same for the same seed, from the covariance that reduce writes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TURN = ("simulate", "mariner", "--manoeuvre", "turn:20", "--duration", "300")
 def test_bands_of_a_manoeuvre_are_the_same_for_the_same_seed(tmp_path) -> None:
     found = []
     for seed in ("1", "1", "2"):
-        result = tank2sim(*TURN, "--ensemble", "20", "--seed", seed, "--json", "s.json", cwd=tmp_path)
+        result = tank2sim(*TURN, "--members", "20", "--seed", seed, "--json", "s.json", cwd=tmp_path)
         assert result.returncode == 0, result.stderr
         assert "Ensemble of 20" in result.stdout and "2 % of the value is taken" in " ".join(result.stdout.split())
         found.append(json.loads((tmp_path / "s.json").read_text())["ensemble"])
@@ -33,21 +33,21 @@ def test_bands_of_a_manoeuvre_are_the_same_for_the_same_seed(tmp_path) -> None:
 
 @pytest.mark.slow
 def test_a_picture_has_the_bands(tmp_path) -> None:
-    result = tank2sim(*TURN, "--ensemble", "8", "--plot", "s.png", cwd=tmp_path)
+    result = tank2sim(*TURN, "--members", "8", "--plot", "s.png", cwd=tmp_path)
     assert result.returncode == 0 and (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.slow
 def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
-    more = ("--ensemble", "6", "--json", "s.json")
-    result = tank2sim("stability", "mariner", "--no-spiral", *more, "-o", "s.html", cwd=tmp_path)
+    more = ("--members", "6", "--json", "s.json")
+    result = tank2sim("stability", "mariner", "--no-spirals", *more, "-o", "s.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "s.json").read_text())["ensemble"]
     chances = {one["name"]: one["probability_met"] for one in found["imo"]}
     assert chances["advance"] == 1 and chances["tactical diameter"] == 0 and found["probability_stable"] == 1
     assert "P(met)" in (tmp_path / "s.html").read_text()
     figure = "steady_radius_m@20"
-    result = tank2sim("influence", "mariner", "--figure", figure, *more, "--page", "i.html", cwd=tmp_path)
+    result = tank2sim("influence", "mariner", "--figures", figure, *more, "--page", "i.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     reported = json.loads((tmp_path / "s.json").read_text())
     spread = reported["ensemble"]["figures"][figure]["standard_deviation"]
@@ -58,8 +58,8 @@ def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
 def test_a_cluster_without_an_ensemble_and_no_executor_are_refused(tmp_path) -> None:
     refused(tank2sim(*TURN, "--executor", "threads", cwd=tmp_path), "--executor", "dask://host:port")
     if importlib.util.find_spec("distributed"):
-        refused(tank2sim(*TURN, "--executor", "dask://127.0.0.1:1", cwd=tmp_path), "--ensemble")
-    refused(tank2sim(*TURN, "--ensemble", "1", cwd=tmp_path), "ensemble")
+        refused(tank2sim(*TURN, "--executor", "dask://127.0.0.1:1", cwd=tmp_path), "--executor", "members")
+    refused(tank2sim(*TURN, "--members", "1", cwd=tmp_path), "--members", "2 or more")
 
 
 @pytest.mark.slow
@@ -75,12 +75,12 @@ def test_reduce_writes_the_covariance_and_simulate_draws_from_it(data, tmp_path)
     errors = np.sqrt(np.diag(known.matrix))
     for name, error in zip(known.names, errors, strict=True):
         assert math.isclose(error, card.uncertainty[name.partition(".")[2]], rel_tol=6e-3)
-    result = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path)
+    result = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--members", "4", cwd=tmp_path)
     assert result.returncode == 0 and "as the covariance next to the card says" in " ".join(result.stdout.split())
     (tmp_path / "ship.covariance.json").unlink()
-    refused(tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path), "is missing")
+    refused(tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--members", "4", cwd=tmp_path), "is missing")
 
 
 def test_a_seed_without_an_ensemble_and_a_word_for_its_size_are_refused(tmp_path) -> None:
-    refused(tank2sim("stability", "mariner", "--seed", "3", cwd=tmp_path), "--seed", "--ensemble")
-    refused(tank2sim("stability", "mariner", "--ensemble", "abc", cwd=tmp_path), "--ensemble", "abc", "whole number")
+    refused(tank2sim("stability", "mariner", "--seed", "3", cwd=tmp_path), "--seed", "without members")
+    refused(tank2sim("stability", "mariner", "--members", "abc", cwd=tmp_path), "--members", "abc", "integer")

@@ -80,7 +80,7 @@ def test_a_card_shows_nothing_of_a_foreign_covariance(content: str, foreign: Pat
     foreign.write_text(content)
     text = (bundled("models") / "mariner" / "ship.toml").read_text()
     (foreign.parent / "in" / "ship.toml").write_text(f"# covariance: {foreign}\n{text}")
-    options = ("--manoeuvre", "turn:35", "--ensemble", "4")
+    options = ("--manoeuvre", "turn:35", "--members", "4")
     done = tank2sim("simulate", "ship.toml", *options, cwd=foreign.parent / "in")
     refused(done, str(foreign))
     assert "SECRET" not in done.stderr

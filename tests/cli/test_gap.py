@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim import make_report
-from tank2sim.api.gap import gap_options
+from tank2sim import find_gap, make_report
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
@@ -76,7 +75,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object,
             gap = replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
             return gap if test else replace(gap, next_test=None)
 
-        monkeypatch.setattr("tank2sim.api.gap.run_workflow", find_gap)
+        monkeypatch.setattr("tank2sim.api.gap_search.run_gap_workflow", find_gap)
         return calls
 
     return found
@@ -235,10 +234,10 @@ def _with_trials(folder: Path, new: Path) -> Path:
         (["titanic", "turn20.csv"], ["titanic"]),
         (["linear.toml", "turn20.csv"], ["linear.toml", "model.kind", "linear"]),
         (["wilinski-zellman", "turn20.csv"], ["model.kind", "manoeuvring ship"]),
-        (["mariner"], ["TRIALS"]),
+        (["mariner"], ["trials"]),
         (["mariner", "turn20.csv", "--effects", "curent"], ["--effects", "curent", "did you mean current"]),
         (["mariner", "turn20.csv", "--without", "kraken"], ["--without", "kraken"]),
-        (["mariner", "turn20.csv", "--without", "--workers", "2"], ["--without names no effect"]),
+        (["mariner", "turn20.csv", "--without", "--workers", "2"], ["--without is followed by nothing"]),
         (["mariner", "turn20.csv", "--max-effects", "5"], ["--max-effects"]),
         (["mariner", "empty"], ["empty", "holds no trial"]),
     ],
@@ -336,5 +335,5 @@ def test_an_improved_card_goes_all_the_way_to_a_checked_fmu(name: str, tmp_path:
 @pytest.mark.parametrize(("given", "option"), [({"effects": "wind"}, "effects"), ({"workers": 0}, "workers")])
 def test_an_option_of_the_wrong_kind_is_refused_by_its_name(given: dict, option: str) -> None:
     with pytest.raises(InputError) as raised:
-        gap_options(**given)
+        find_gap("mariner", "turn20.csv", **given)
     assert raised.value.source == option

@@ -80,7 +80,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 
         monkeypatch.setattr("tank2sim.gap.fleet.search.run_gap_workflow", find_gap)
-        monkeypatch.setattr("tank2sim.api.gap.run_workflow", find_gap)
+        monkeypatch.setattr("tank2sim.api.gap_search.run_gap_workflow", find_gap)
         return calls
 
     return set_up
@@ -222,8 +222,11 @@ def test_a_folder_that_holds_a_card_is_one_ship(ships: Path, tmp_path: Path, fin
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["ships", "--holdout", "ships/alpha/holdout/held.csv", "-o", "out"], ["--holdout", "sub-folder holdout"]),
-        (["ships", "ships/alpha/slow.csv", "-o", "out"], ["ships", "is a folder"]),
+        (
+            ["ships", "--holdout", "ships/alpha/holdout/held.csv", "-o", "out"],
+            ["--holdout", "folder of ships"],
+        ),
+        (["ships", "ships/alpha/slow.csv", "-o", "out"], ["trials", "does not go with a folder of ships"]),
         (["ships", "-o", "ships"], ["ships", "of its own"]),
         (["ships", "-o", "ships/beta"], ["ships/beta", "of its own"]),
         (["ships/alpha/holdout", "-o", "out"], ["holds no ship"]),

@@ -14,7 +14,7 @@ PROGRAMME = str(Path(__file__).parents[2] / "models/kulikovsky-velikanov/program
 
 def test_angles_give_states(tmp_path) -> None:
     result = tank2sim(
-        *("glide", "--angle-deg", "25", "--angle-deg=-45,35", "30", "--as-printed", "--budget-kg", "50"),
+        *("glide", "--angles", "25", "-45,35", "30", "--as-printed", "--budget-kg", "50"),
         *("--depth-m", "200", "--json", "g.json"),
         cwd=tmp_path,
     )
@@ -41,7 +41,7 @@ def test_a_programme_gives_a_path_and_the_transient_next_to_it(tmp_path) -> None
 
 
 def test_the_reference_area_is_an_option(tmp_path) -> None:
-    arguments = ["glide", "--angle-deg", "30", "--reference-area-m2", "0.0356", "--json", "g.json"]
+    arguments = ["glide", "--angles", "30", "--reference-area-m2", "0.0356", "--json", "g.json"]
     assert tank2sim(*arguments, cwd=tmp_path).returncode == 0
     (state,) = json.loads((tmp_path / "g.json").read_text())["states"]
     assert state["speed_mps"] == pytest.approx(0.515, abs=1e-3)
@@ -50,17 +50,16 @@ def test_the_reference_area_is_an_option(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--angle-deg", "20"], ["20 deg cannot be flown", "23.385 deg"]),
-        (["--angle-deg", "24", "--roll-deg", "30"], ["26.534 deg"]),
-        (["--angle-deg", "thirty"], ["--angle-deg", "thirty"]),
-        (["--angle-deg", "95"], ["95 deg"]),
-        (["kulikovsky-velikanov"], ["is given alone", "--card"]),
-        (["--card", "mariner"], ["model.kind", "glider"]),
+        (["--angles", "20"], ["20 deg cannot be flown", "23.385 deg"]),
+        (["--angles", "24", "--roll-deg", "30"], ["26.534 deg"]),
+        (["--angles", "thirty"], ["--angles", "thirty"]),
+        (["--angles", "95"], ["95 deg"]),
+        (["mariner"], ["model.kind", "glider"]),
         (["--programme", "none.csv"], ["none.csv"]),
-        (["--budget-kg", "10"], ["--depth-m", "missing"]),
-        (["--budget-kg", "10", "--depth-m", "-3"], ["--depth-m", "-3"]),
-        (["--reference-area-m2", "-1"], ["glider.reference_area_m2"]),
-        (["--angle-deg", "30", "--json", "missing/g.json"], ["missing/g.json"]),
+        (["--budget-kg", "10"], ["--depth", "missing"]),
+        (["--budget-kg", "10", "--depth-m", "-3"], ["--depth", "-3"]),
+        (["--reference-area-m2", "-1"], ["--reference-area"]),
+        (["--angles", "30", "--json", "missing/g.json"], ["missing/g.json"]),
     ],
 )
 def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> None:

@@ -27,7 +27,7 @@ def test_a_guess_writes_card_page_and_json(tmp_path) -> None:
     jsonschema.validate(found, t2s.json_schema("guess"))
     assert found["figures"]["tactical_diameter@turn35"]["standard_error"] == 20.0
     assert (tmp_path / "ship.covariance.json").exists() and "guess" in (tmp_path / "g.html").read_text()
-    again = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:35", "--ensemble", "20", cwd=tmp_path)
+    again = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:35", "--members", "20", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     assert "samples of the posterior" in " ".join(again.stdout.split())
 

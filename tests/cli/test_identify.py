@@ -224,7 +224,9 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     both = ("identify", "off.toml", "zigzag20.csv", "--holdout", "zigzag20.csv")
     refused(tank2sim(*both, cwd=folder), "both fitted and held out")
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--piece", "0.1", cwd=folder), "--piece", "or more")
-    refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--holdout", cwd=folder), "--holdout names no trial")
+    refused(
+        tank2sim("identify", "off.toml", "zigzag20.csv", "--holdout", cwd=folder), "--holdout is followed by nothing"
+    )
     assert not (folder / "n.toml").exists()
 
 
@@ -330,7 +332,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     (folder / "longer.toml").write_text(text.replace(f"length_m = {LENGTH}", f"length_m = {2 * LENGTH}"))
     asked = ("identify", "longer.toml", *FITTED, *SHORT, "-o", "o.toml", "--json", "o.json")
     result = tank2sim(*asked, cwd=folder)
-    refused(result, "zigzag20", "longer.toml", "--force")
+    refused(result, "zigzag20", "longer.toml", "force the fit")
     assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()
     forced = tank2sim(*asked, "--force", cwd=folder)
     assert forced.returncode == 0, forced.stderr
@@ -347,7 +349,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
 def test_a_trial_of_another_ship_among_the_trials_is_refused(folder: Path) -> None:
     write(folder, "stranger", zigzag(20), seed=8, truth={**TRUTH, "Nd": 5 * TRUTH["Nd"], "Nr": 3 * TRUTH["Nr"]})
     result = tank2sim("identify", "off.toml", *FITTED, "stranger.csv", "-o", "two.toml", cwd=folder)
-    refused(result, "stranger shows", "--force")
+    refused(result, "stranger shows", "force the fit")
     assert not (folder / "two.toml").exists()
 
 
@@ -405,7 +407,7 @@ def test_samples_of_the_posterior_are_with_the_card_and_ensembles_take_them(fold
     assert known is not None and known.samples is not None and known.samples.shape == (240, len(entries))
     stated = [card.derivatives[name.partition(".")[2]] for name in known.names]
     np.testing.assert_allclose(known.samples.mean(axis=0), stated, rtol=1e-3, atol=1e-6)
-    simulated = tank2sim("simulate", "sampled.toml", "--manoeuvre", "turn:20", "--ensemble", "20", cwd=folder)
+    simulated = tank2sim("simulate", "sampled.toml", "--manoeuvre", "turn:20", "--members", "20", cwd=folder)
     assert "240 samples of the posterior" in simulated.stdout
 
 

@@ -15,8 +15,8 @@ from tests.cli.command_line import refused, tank2sim
 
 def test_influence_tells_both_coefficients_of_every_parameter(tmp_path) -> None:
     result = tank2sim(
-        *("influence", "mariner", "--figure", "criterion_C", "steady_radius_m@20", "K_per_s", "T_s", "K_prime"),
-        *("--agreed", "Yv=0.62", "Nv=1.7"),
+        *("influence", "mariner", "--figures", "criterion_C", "steady_radius_m@20", "K_per_s", "T_s", "K_prime"),
+        *("--joint-variation", "Yv=0.62", "Nv=1.7"),
         *("--json", "i.json", "--page", "i.html"),
         cwd=tmp_path,
     )
@@ -77,23 +77,26 @@ def test_wishes_that_contradict_each_other_are_a_finding_unless_a_card_was_asked
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["mariner", "--figure", "steady_radius"], ["steady_radius_m"]),
-        (["mariner", "--figure", "criterion_C", "--agreed", "Yq=1"], ["--agreed", "Yq"]),
-        (["mariner", "--figure", "criterion_C", "--agreed", "Yv=much"], ["--agreed", "much"]),
-        (["mariner", "--figure", "criterion_C", "--agreed", "none.toml"], ["none.toml"]),
-        (["mariner", "--tune", "criterion_C=5e-6", "--bound", "Yv=1"], ["--bound", "LOW..HIGH"]),
-        (["mariner", "--figure", "criterion_C", "-o", "x.toml"], ["--tune"]),
-        (["mariner", "--figure", "criterion_C", "--hold", "Foo"], ["--hold", "--tune"]),
-        (["mariner", "--figure", "criterion_C", "--bound", "Nr=0..1"], ["--bound", "--tune"]),
-        (["mariner", "--tune", "K_per_s=0.2", "--bound", "Nr=1..0"], ["--bound", "LOW below HIGH"]),
+        (["mariner", "--figures", "steady_radius"], ["steady_radius_m"]),
+        (["mariner", "--figures", "criterion_C", "--joint-variation", "Yq=1"], ["--joint-variation", "Yq"]),
+        (["mariner", "--figures", "criterion_C", "--joint-variation", "Yv=much"], ["--joint-variation", "much"]),
+        (["mariner", "--figures", "criterion_C", "--joint-variation", "none.toml"], ["none.toml"]),
+        (["mariner", "--tune", "criterion_C=5e-6", "--bounds", "Yv=1"], ["--bounds", "LOW..HIGH"]),
+        (["mariner", "--figures", "criterion_C", "-o", "x.toml"], ["--tune"]),
+        (["mariner", "--figures", "criterion_C", "--hold", "Foo"], ["--hold", "--tune"]),
+        (["mariner", "--figures", "criterion_C", "--bounds", "Nr=0..1"], ["--bounds", "--tune"]),
+        (["mariner", "--tune", "K_per_s=0.2", "--bounds", "Nr=1..0"], ["--bounds", "LOW below HIGH"]),
         (["mariner", "--tune", "steady_radius_m=-5@20"], ["--tune", "no ship has"]),
         (["mariner", "--through", "35@35", "20@-3", "--hold", "Nr"], ["--hold", "--through"]),
         (
             ["mariner", "--through", "35@35", "20@-3"],
             ["35 deg/min to starboard", "20 deg/min to port at 3 deg to port"],
         ),
-        (["wilinski-zellman", "--figure", "criterion_C"], ["linear, abkowitz or mmg"]),
-        (["mariner", "--set", "derivatives.Nd=0", "--set", "derivatives.Yd=0", "--figure", "T_s"], ["straight course"]),
+        (["wilinski-zellman", "--figures", "criterion_C"], ["linear, abkowitz or mmg"]),
+        (
+            ["mariner", "--set", "derivatives.Nd=0", "--set", "derivatives.Yd=0", "--figures", "T_s"],
+            ["straight course"],
+        ),
     ],
 )
 def test_bad_input_ends_in_one_line_and_nothing_is_written(tmp_path, arguments, words) -> None:
@@ -104,7 +107,8 @@ def test_bad_input_ends_in_one_line_and_nothing_is_written(tmp_path, arguments, 
 def test_an_agreed_variation_can_stand_in_a_file(tmp_path) -> None:
     (tmp_path / "kc.toml").write_text("mass = 1.0\n[derivatives]\nYv = 0.62\nNr = 1.36\n")
     result = tank2sim(
-        *("influence", "mariner", "--figure", "criterion_C", "--agreed", "kc.toml", "--json", "a.json"), cwd=tmp_path
+        *("influence", "mariner", "--figures", "criterion_C", "--joint-variation", "kc.toml", "--json", "a.json"),
+        cwd=tmp_path,
     )
     assert result.returncode == 0, result.stderr
     percent = json.loads((tmp_path / "a.json").read_text())["agreed"]["percent"]

@@ -56,7 +56,7 @@ def test_asked_for_nothing_it_helps(tmp_path) -> None:
         ("tows", "wilinski-zellman/tows.csv", ["tow", "tows", "--terms", "B3", "-o", "tows"]),
         ("ship", "mariner/ship.toml", ["stability", "ship", "--json", "ship"]),
         ("ship", "wilinski-zellman/ship.toml", ["export", "ship", "-o", "ship"]),
-        ("ship", "mariner/ship.toml", ["simulate", "ship", "--manoeuvre", "turn:35", "--out", "ship"]),
+        ("ship", "mariner/ship.toml", ["simulate", "ship", "--manoeuvre", "turn:35", "-o", "ship"]),
     ],
 )
 def test_an_input_is_not_written_over(tmp_path, given, bundled, arguments) -> None:
@@ -99,10 +99,14 @@ def test_every_command_is_in_one_group_of_the_help(tmp_path) -> None:
     from tank2sim.api.commands import VERBS
     from tank2sim.cli import COMMANDS, GROUPS
 
-    modules = set(VERBS) | {path.stem for path in (MODELS.parent / "src/tank2sim/cli").glob("*.py")}
-    assert set(COMMANDS) <= modules and sum(map(len, GROUPS.values())) == len(COMMANDS)
-    helped = tank2sim("--help", cwd=tmp_path).stdout
-    assert all(f"\n{title}:\n" in helped for title in GROUPS)
+    assert sum(map(len, GROUPS.values())) == len(COMMANDS)
+    helped = " ".join(tank2sim("--help", cwd=tmp_path).stdout.split())
+    for title, commands in GROUPS.items():
+        shown = helped.partition(f" {title}: ")[2]
+        for name in commands:
+            words = f"{name} {VERBS[name].words}"
+            assert shown.startswith(words)
+            shown = shown.removeprefix(words).lstrip()
 
 
 @pytest.mark.slow

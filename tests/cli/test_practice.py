@@ -47,7 +47,7 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
         (["compare", "mariner"], "two cards"),
         (["compare", "mariner", "wilinski-zellman"], "manoeuvres"),
         (["poster", "wilinski-zellman", "-o", "w.html"], "model.kind"),
-        (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=RPM"),
+        (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=NUMBER"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Half ahead=-3"], "NAME=RPM"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Full astern=60"], "order astern"),
         (["poster", "esso-osaka-estimated", "-o", "w.html", "--order", "Full=7000000"], "beyond 1,200 revolutions"),
@@ -80,7 +80,7 @@ def test_validate_tells_each_figure_of_a_real_trial(tmp_path, data) -> None:
 
 @pytest.mark.slow
 def test_a_criterion_beyond_the_card_is_neither_met_nor_probable(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", "--ensemble", "3", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spirals", "--members", "3", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     tables = result.stdout.split("IMO MSC.137(76)")[1:]
     rows = [next(row for row in one.splitlines() if "tactical" in row) for one in tables]

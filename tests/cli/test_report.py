@@ -22,7 +22,7 @@ def test_what_simulate_wrote_becomes_a_page(tmp_path: Path) -> None:
 
 
 def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) -> None:
-    command = "simulate mariner --manoeuvre turn:35 --duration 300 --json s.json --out s.csv".split()
+    command = "simulate mariner --manoeuvre turn:35 --duration 300 --json s.json -o s.csv".split()
     assert tank2sim(*command, cwd=tmp_path).returncode == 0
     histories = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["histories"]
     header, *lines = (tmp_path / "s.csv").read_text(encoding="utf-8").splitlines()[1:]

@@ -12,7 +12,7 @@ from tests.cli.command_line import refused, tank2sim
 
 
 def test_all_of_the_study_is_in_the_json_and_the_page(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", "--json", "s.json", "-o", "s.html", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spirals", "--json", "s.json", "-o", "s.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "unstable" in result.stdout and "hysteresis loop" in result.stdout
     found = json.loads((tmp_path / "s.json").read_text())
@@ -47,7 +47,7 @@ def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -
 
 
 def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spirals", cwd=tmp_path)
     reported = " ".join(result.stdout.split())
     assert re.search(r"advance; [^:]*: EXTRAPOLATED beyond what the card was measured in", reported)
     assert "track reach: the card has no [propulsion]" in reported
@@ -57,7 +57,7 @@ def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) 
 def test_a_linear_card_has_no_curve_over_speed_and_weather_is_reported(tmp_path) -> None:
     weather = '[{name = "current", parameters = {speed_mps = 0.5, direction_deg = 90.0}}]'
     arguments = ["--set", "model.kind=linear", "--set", f"effects={weather}", "--speed", "5.4", "--json", "s.json"]
-    result = tank2sim("stability", "mariner", "--no-spiral", *arguments, "-o", "s.html", cwd=tmp_path)
+    result = tank2sim("stability", "mariner", "--no-spirals", *arguments, "-o", "s.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "s.json").read_text())
     assert found["margins"]["speed"] is None and "Over the card" not in (tmp_path / "s.html").read_text()

@@ -14,7 +14,7 @@ from tests.cli.command_line import refused, tank2sim
     [
         ("ships",),
         ("simulate", "mariner", "--manoeuvre", "turn:35"),
-        ("influence", "mariner", "--figure", "criterion_C"),
+        ("influence", "mariner", "--figures", "criterion_C"),
     ],
     ids=lambda arguments: arguments[0],
 )

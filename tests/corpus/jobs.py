@@ -18,7 +18,7 @@ FAST = ["--structure", "linear", "--members", "0", "--method"]
 
 RECIPES: dict[str, list[Recipe]] = {
     "simulate": [
-        (["card.toml", "--manoeuvre", "turn:35", "--duration", "40", "--out", "run.csv"], ["card.toml"]),
+        (["card.toml", "--manoeuvre", "turn:35", "--duration", "40", "-o", "run.csv"], ["card.toml"]),
         (["card.toml", "--manoeuvre", "zigzag:10/10", "--duration", "40", "--json", "out.json"], ["card.toml"]),
         (["card.toml", "--manoeuvre", "file:orders.csv", "--duration", "40"], ["orders.csv"]),
         (["tanker.toml", "--manoeuvre", "pullout:20", "--duration", "40"], ["tanker.toml"]),
@@ -74,8 +74,8 @@ RECIPES: dict[str, list[Recipe]] = {
                  (["card.toml", "turn.csv", "--members", "0", "--json", "out.json"], ["turn.csv"])],
     "compare": [(["card.toml", "tanker.toml", "--members", "0", "--json", "out.json"], ["card.toml", "tanker.toml"])],
     "influence": [
-        (["card.toml", "--figure", "K_per_s", "criterion_C", "--json", "out.json"], ["card.toml"]),
-        (["card.toml", "--figure", "steady_radius_m@20"], ["card.toml"]),
+        (["card.toml", "--figures", "K_per_s", "criterion_C", "--json", "out.json"], ["card.toml"]),
+        (["card.toml", "--figures", "steady_radius_m@20"], ["card.toml"]),
         (["steering.toml", "--json", "out.json"], ["steering.toml"]),
     ],
     "design": [
@@ -88,14 +88,14 @@ RECIPES: dict[str, list[Recipe]] = {
         (["card.toml", "--design", "pd", "--track", "track.csv"], ["track.csv"]),
     ],
     "glide": [
-        (["--card", "glider.toml", "--angle-deg", "-30", "--json", "out.json"], ["glider.toml"]),
-        (["--card", "glider.toml", "--programme", "programme.csv"], ["programme.csv"]),
-        (["--card", "glider.toml", "--angle-deg", "25", "--budget-kg", "5", "--depth-m", "100"], ["glider.toml"]),
+        (["glider.toml", "--angles", "-30", "--json", "out.json"], ["glider.toml"]),
+        (["glider.toml", "--programme", "programme.csv"], ["programme.csv"]),
+        (["glider.toml", "--angles", "25", "--budget-kg", "5", "--depth-m", "100"], ["glider.toml"]),
     ],
     "export": [(["card.toml", "-o", "out.fmu"], ["card.toml"]),
                (["surge.toml", "-o", "out.fmu"], ["surge.toml"])],
     "check": [(["ship.fmu"], ["ship.fmu"]), (["ship.fmu", "--card", "card.toml"], ["card.toml"])],
-    "stability": [(["card.toml", "--no-spiral", "--json", "out.json"], ["card.toml"])],
+    "stability": [(["card.toml", "--no-spirals", "--json", "out.json"], ["card.toml"])],
     "report": [([name, "-o", "out.html"], [name]) for name in RESULTS],
 }  # fmt: skip
 
@@ -112,7 +112,7 @@ _NUMBER_OPTIONS = (
     "--force-N",
     "--mass-kg",
     "--inertia-kgm2",
-    "--angle-deg",
+    "--angles",
     "--budget-kg",
     "--depth-m",
     "--members",

@@ -49,7 +49,7 @@ def test_tows_of_impossible_numbers_are_refused_by_column(folder, column, factor
 def test_a_derivative_that_no_hull_has_is_refused_by_its_key(folder, value):
     text = (folder / "card.toml").read_text().replace("Yv = -1160e-5", f"Yv = {value}")
     (folder / "card.toml").write_text(text)
-    refused(tank2sim("stability", "card.toml", "--no-spiral", cwd=folder), "card.toml", "derivatives.Yv")
+    refused(tank2sim("stability", "card.toml", "--no-spirals", cwd=folder), "card.toml", "derivatives.Yv")
 
 
 def test_a_motion_that_leaves_all_bounds_names_the_card(folder):
@@ -103,7 +103,7 @@ def test_a_result_that_is_no_json_for_a_page_is_refused_by_its_file(folder, text
 
 
 def test_a_notice_that_is_no_text_is_refused_by_its_key(folder):
-    assert tank2sim("influence", "card.toml", "--figure", "K_per_s", "--json", "i.json", cwd=folder).returncode == 0
+    assert tank2sim("influence", "card.toml", "--figures", "K_per_s", "--json", "i.json", cwd=folder).returncode == 0
     content = json.loads((folder / "i.json").read_text())
     (folder / "i.json").write_text(json.dumps({**content, "notices": [1.5]}))
     refused(tank2sim("report", "i.json", "-o", "page.html", cwd=folder), "i.json", "notices")

@@ -11,7 +11,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.demo import DEMO_STEPS, PAGE
-from tank2sim.apps.demo.command import DemoResult
+from tank2sim.apps.demo.result import DemoResult
 from tank2sim.apps.demo.run import write_demo
 
 pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.api.gap import identified_from
+from tank2sim.api.gap_search import identified_from
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text

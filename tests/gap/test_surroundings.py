@@ -13,7 +13,6 @@ import tomlkit
 from gap_truth import Made, Setting, make, sampled, write
 from identify_esso_osaka import spans
 
-from tank2sim.api.gap import gap_result
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import surroundings_by_trial
@@ -30,6 +29,7 @@ from tank2sim.gap.search.explanations import search
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.trials import window, with_signals
+from tank2sim.results.gap import gap_result
 
 TRIALS = ("zigzag20_20", "turn35_stbd", "straight")
 HELD = ("turn35_port",)

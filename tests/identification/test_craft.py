@@ -26,7 +26,7 @@ def found(craft, tmp_path_factory) -> t2s.CraftIdentificationResult:
     folder = tmp_path_factory.mktemp("trials")
     *fitted, held = written(folder, craft, ["straight", "spin", "astern", "steps", "zigzag"])
     first = craft_log.first_card(craft, np.random.default_rng(5))
-    return t2s.identify_craft(first, fitted, holdout=held)
+    return t2s.identify(first, fitted, holdout=held)
 
 
 @pytest.mark.slow
@@ -58,7 +58,7 @@ def test_orders_alone_give_thrust_curve_damping_and_lag(craft, tmp_path) -> None
     text = craft_log.first_card(craft, np.random.default_rng(5)).card.text
     lines = f"max_rpm = {craft['rpm']!r}\ntime_constant_s = {1.5 * craft['lag']!r}"
     text = text.replace(f"max_rpm = {1.05 * craft['rpm']!r}", lines)
-    found = t2s.identify_craft(t2s.Ship(parse_card(text, "first.toml")), paths)
+    found = t2s.identify(t2s.Ship(parse_card(text, "first.toml")), paths)
     assert found.study.driven_by == "orders"
     coefficients = found.study.coefficients
     for name, truth in [(f"port.{key}", craft[key]) for key in ("ahead", "astern")] + [
@@ -89,7 +89,7 @@ def test_orders_that_cannot_be_are_refused(craft, tmp_path, rows, place) -> None
     changed = [",".join([*line.split(",")[:-2], rows, rows]) for line in lines[1:]]
     path.write_text("\n".join([lines[0], *changed]) + "\n")
     with pytest.raises(InputError, match=place):
-        t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), path)
+        t2s.identify(craft_log.first_card(craft, np.random.default_rng(5)), path)
 
 
 def test_trials_by_revolutions_and_by_orders_are_not_mixed(craft, tmp_path) -> None:
@@ -97,7 +97,7 @@ def test_trials_by_revolutions_and_by_orders_are_not_mixed(craft, tmp_path) -> N
     (tmp_path / "ordered").mkdir()
     (second,) = written(tmp_path / "ordered", craft, ["steps"], ordered=True)
     with pytest.raises(InputError, match="give trials of one kind") as raised:
-        t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), [first, second])
+        t2s.identify(craft_log.first_card(craft, np.random.default_rng(5)), [first, second])
     assert raised.value.source == str(first)
 
 
@@ -111,7 +111,7 @@ def test_a_held_out_trial_is_predicted(found) -> None:
 @pytest.mark.slow
 def test_what_straight_runs_do_not_show_is_said_and_a_manoeuvre_that_would_is_named(craft, tmp_path) -> None:
     paths = written(tmp_path, craft, ["straight"])
-    found = t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), paths)
+    found = t2s.identify(craft_log.first_card(craft, np.random.default_rng(5)), paths)
     verdicts = dict(zip(found.fit.problem.free, found.fit.verdicts, strict=True))
     for name in ("derivatives.Nr", "derivatives.Nrabsr", "derivatives.Yvabsv", "thrusters.port.astern"):
         assert verdicts[name] is CoefficientVerdict.PRIOR, name
@@ -135,18 +135,21 @@ def test_a_trial_that_lacks_a_column_is_refused_by_its_name(craft, tmp_path, cha
     (path,) = written(tmp_path, craft, ["spin"])
     path.write_text(path.read_text().replace(*change, 1))
     with pytest.raises(InputError, match=problem):
-        t2s.identify_craft(craft_log.first_card(craft, np.random.default_rng(5)), path)
+        t2s.identify(craft_log.first_card(craft, np.random.default_rng(5)), path)
 
 
 def test_a_trial_is_not_fitted_and_held_out_at_once(craft, tmp_path) -> None:
     (path,) = written(tmp_path, craft, ["spin"])
     with pytest.raises(InputError, match="held out"):
-        t2s.identify_craft("otter", path, holdout=path)
+        t2s.identify("otter", path, holdout=path)
 
 
-def test_a_ship_with_a_rudder_is_refused(tmp_path) -> None:
-    with pytest.raises(InputError, match="small_craft"):
-        t2s.identify_craft("mariner", tmp_path)
+@pytest.mark.parametrize("given", [{"structure": "card"}, {"hold": ["Xuu"]}, {"members": 0}, {"inertia": True}])
+def test_what_is_for_ships_alone_is_refused(craft, tmp_path, given) -> None:
+    (path,) = written(tmp_path, craft, ["spin"])
+    with pytest.raises(InputError, match="is not for a craft") as raised:
+        t2s.identify("otter", path, **given)
+    assert raised.value.source == next(iter(given))
 
 
 def test_the_share_explained_is_one_without_error_and_zero_for_the_mean() -> None:

@@ -72,7 +72,7 @@ def test_the_columns_of_a_rudder_are_the_direction_of_the_one_outboard(craft, ca
 @pytest.mark.slow
 def test_thrust_and_damping_are_found(craft, card, tmp_path) -> None:
     path = written(tmp_path / "trial.csv", craft)
-    found = t2s.identify_craft(card, path).study.coefficients
+    found = t2s.identify(card, path).study.coefficients
     truth = {"outboard.ahead": THRUST, "Xu": craft["Xu"], "Nr": craft["Nr"], "Nrabsr": craft["Nrabsr"]}
     for name, value in truth.items():
         assert abs(found[name].value - value) < 3 * found[name].standard_error, name
@@ -82,4 +82,4 @@ def test_thrust_and_damping_are_found(craft, card, tmp_path) -> None:
 def test_a_trial_without_the_direction_is_refused(craft, card, tmp_path) -> None:
     path = written(tmp_path / "trial.csv", craft, "n_outboard_rpm,heel_deg")
     with pytest.raises(InputError, match="azimuth_outboard_deg"):
-        t2s.identify_craft(card, path)
+        t2s.identify(card, path)

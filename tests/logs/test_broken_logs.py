@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tank2sim.apps.logs.command import LogResult, log
+from tank2sim.apps.logs.command import log
 from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.result import LogResult
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
 from tests.logs.made_logs import frame, nmea_lines, rmc, sentence, voyage

@@ -13,9 +13,8 @@ from tank2sim.answer.charts.before_after import ALL, BOTH, before_after_switch, 
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.charts.theme import DARK, DARK_TONE
 from tank2sim.answer.page import render_page
-from tank2sim.api.gap import gap_result
 from tank2sim.gap.outcome.export import gap_study
-from tank2sim.results.gap import NO_TRIALS
+from tank2sim.results.gap import NO_TRIALS, gap_result
 from tank2sim.results.gap_charts import gap_histories, gap_tracks, misfit_chart, place_chart
 from tests.gap import made_up
 from tests.report.opened_page import CHROMIUM, opened

@@ -11,10 +11,9 @@ import pytest
 from tank2sim.answer.charts.before_after import in_noise
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
-from tank2sim.api.gap import gap_result
 from tank2sim.gap.outcome.export import gap_study
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap, Passed, Rival
-from tank2sim.results.gap import NO_TRIALS, GapResult
+from tank2sim.results.gap import NO_TRIALS, GapResult, gap_result
 from tank2sim.results.gap_cause_charts import agreement_chart, rival_chart
 from tank2sim.results.gap_charts import gap_tracks, misfit_chart, shown_places
 from tank2sim.results.gap_text import probabilities_in_words, verdict_in_words, with_error

@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.cards import parse_card
-from tank2sim.cli.identify import command
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
 from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.methods.posterior import scaled_prior
@@ -32,6 +30,7 @@ from tank2sim.records.trials import Trial
 from tank2sim.results import identification as identification_module
 from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
 from tank2sim.results.trial_charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
+from tests.cli.command_line import tank2sim
 from tests.identification.trials import made_up_ship
 
 OFF = {"Nd": 1.25, "Nr": 0.8, "Yv": 1.2, "Xu": 0.8}
@@ -320,8 +319,10 @@ def test_the_command_writes_the_page_and_its_pictures(trials, tmp_path) -> None:
     card, plots = tmp_path / "off.toml", tmp_path / "plots"
     card.write_text(text_of(OFF), encoding="utf-8")
     path = written(trials["turn"], tmp_path)
-    shown = CliRunner().invoke(command, [str(card), str(path), "--method", "equation_error", "--plot", str(plots)])
-    assert shown.exit_code == 0, shown.exception
+    shown = tank2sim(
+        "identify", str(card), str(path), *("--method", "equation_error", "--plot", str(plots)), cwd=tmp_path
+    )
+    assert shown.returncode == 0, shown.stderr
     stems = ("windows", "figures", "tracks_fitted", "histories_fitted", "parameters", "correlation", "singular_values")
     assert {one.name for one in plots.iterdir()} == {"report.html", *(f"{stem}.png" for stem in stems)}
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))

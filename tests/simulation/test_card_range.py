@@ -98,7 +98,7 @@ def invoked(*arguments):
     [
         ("simulate", "kvlcc2-captive", "--manoeuvre", "turn:35"),
         pytest.param(("stability", "kvlcc2-captive"), marks=pytest.mark.slow),
-        pytest.param(("influence", "kvlcc2-captive", "--figure", "tactical_diameter_m@35"), marks=pytest.mark.slow),
+        pytest.param(("influence", "kvlcc2-captive", "--figures", "tactical_diameter_m@35"), marks=pytest.mark.slow),
         ("compare", "kvlcc2-captive", "kvlcc2-captive", "--members", "0"),
     ],
     ids=lambda arguments: arguments[0],
@@ -111,7 +111,7 @@ def test_a_command_whose_figures_leave_the_card_says_so_before_it_shows_any(argu
 
 def test_json_names_the_figures_outside_the_card(tmp_path) -> None:
     file = tmp_path / "run.json"
-    invoked("simulate", "kvlcc2-captive", "--manoeuvre", "zigzag:20/20", "--ensemble", "2", "--json", file)
+    invoked("simulate", "kvlcc2-captive", "--manoeuvre", "zigzag:20/20", "--members", "2", "--json", file)
     found = json.loads(file.read_text())
     assert {"overshoot_1_deg", "overshoot_2_deg", "period_s"} <= set(found["outside_card_range"])
     assert found["left_card_range_s"] < 5

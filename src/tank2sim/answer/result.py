@@ -63,6 +63,16 @@ class Result(ABC, Generic[_S]):
         return ()
 
     @property
+    def written(self) -> tuple[Path, ...]:
+        """Files that the function itself wrote; the command names them."""
+        return ()
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Parts of the question without an answer, a line each; the command prints them as errors and ends with 2."""
+        return ()
+
+    @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Cards at the top of the page."""
         return ()

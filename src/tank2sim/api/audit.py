@@ -9,17 +9,21 @@ from typing import TYPE_CHECKING
 from tank2sim.api.verbs import verb
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.trial import TrialRecord
     from tank2sim.results.audit import AuditResult
 
 
 @verb("faults in the data of trials", results=("tank2sim.results.audit:AuditResult",))
-def audit(trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord]) -> AuditResult:
+def audit(
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame],
+) -> AuditResult:
     """Judge the columns of trials by their consistency alone: signs, units, frames, clocks, failed sensors.
 
     Parameters
     ----------
-    trials : path, TrialRecord, or sequence of them
+    trials : path, TrialRecord, DataFrame, or sequence of them
         A folder means the trials in it. Times that do not rise are a finding.
 
     Raises

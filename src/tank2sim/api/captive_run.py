@@ -5,77 +5,111 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
-import numpy as np
+from tank2sim.api.verbs import Output, verb
+from tank2sim.arguments import AngleArgument, SpeedArgument
+from tank2sim.errors import ArgumentError, InputError
+from tank2sim.files import TABLE
 
-from tank2sim.arguments import AngleArgument, SpeedArgument, checked
-from tank2sim.errors import InputError, close_name
-from tank2sim.identification.captive.single_runs import study_runs
-from tank2sim.records.campaign_form import RUN_TYPES, CampaignFile, FilesSection, RunSheet, RunType, TankTest
-from tank2sim.records.campaigns import Campaign, CaptiveRun, copied_runs, read_campaign_form, read_captive_run
-from tank2sim.results.captive_run import CaptiveRunResult
+if TYPE_CHECKING:
+    from tank2sim.records.campaign_form import CampaignFile, RunType, TankTest
+    from tank2sim.records.campaigns import CaptiveRun
+    from tank2sim.results.captive_run import CaptiveRunResult
 
-ForceConvention = Literal["on_model", "on_gauge", "hydrodynamic"]
+RunName = Literal[
+    "static_drift",
+    "static_rudder",
+    "drift_and_rudder",
+    "steady_turn",
+    "pure_sway",
+    "pure_yaw",
+    "yaw_with_drift",
+    "drift",
+    "rudder",
+    "straight",
+    "combined",
+]
+"""Types of run of :data:`tank2sim.records.campaign_form.RUN_TYPES`, and short names of some."""
+
 SHORT_TYPES: dict[str, RunType] = {"drift": "static_drift", "rudder": "static_rudder", "straight": "static_drift"}
-"""Short names of types of run; ``combined`` is ``yaw_with_drift`` if the model yaws, else ``drift_and_rudder``."""
-TYPE_NAMES = (*RUN_TYPES, *SHORT_TYPES, "combined")
-"""Every name of a type of run."""
+"""Short names of types of run."""
 
 _STEADY_YAW_RADPS = 1e-6
 
 
-@checked
+@verb(
+    "one captive run, as soon as it ends: harmonics, cycle, repeats",
+    Output(
+        "-o", TABLE, "Write the Fourier coefficients.", lambda result, path: {path: result.to_csv()}, "HARMONICS.csv"
+    ),
+    Output(
+        "--cycle",
+        TABLE,
+        "Write the averaged cycle of the first run.",
+        lambda result, path: {path: result.cycle_csv()},
+        "CYCLE.csv",
+    ),
+    name="run",
+    results=("tank2sim.results.captive_run:CaptiveRunResult",),
+)
 def reduce_runs(
-    files: str | Path | Sequence[str | Path],
+    runs: str | Path | Sequence[str | Path],
     *,
-    type: str | None = None,
+    type: RunName | None = None,
     campaign: str | Path | None = None,
-    force_convention: ForceConvention | None = None,
+    force_convention: Literal["on_model", "on_gauge", "hydrodynamic"] | None = None,
     speed_mps: SpeedArgument | None = None,
     drift_deg: AngleArgument | None = None,
     rudder_deg: AngleArgument | None = None,
 ) -> CaptiveRunResult:
-    """Reduce one captive run, or several repeats of it, by itself.
+    """Reduce one captive run by itself to Fourier coefficients with errors, an averaged cycle and a residual.
+
+    Several files are repeats of one run. Their differences are compared with the noise within them.
 
     Parameters
     ----------
-    files : path or sequence of paths
+    runs : path or sequence of paths
         Files of the run, of any layout that ``campaign.toml`` may have.
     type : str, optional
-        Type of the run: one of :data:`TYPE_NAMES`; by default as in the campaign's sheet.
+        Type of the run; by default as in the campaign. ``combined`` is ``yaw_with_drift`` if the model yaws, else
+        ``drift_and_rudder``.
     campaign : path, optional
         ``campaign.toml`` with tank, model, signs and columns; the run need not be in it.
     force_convention : str, optional
-        Whose force the file has, if no campaign is given; by default that on the gauge.
+        Sign convention of the forces, if no campaign is given; by default ``on_gauge``.
     speed_mps : float, optional
-        Test speed, if no campaign is given and the file has no speed.
-    drift_deg, rudder_deg : float, optional
-        Angles, where neither file nor sheet has them.
+        Test speed, m/s, if no campaign is given and the file has no speed.
+    drift_deg : float, optional
+        Drift angle, deg, where neither file nor campaign states it.
+    rudder_deg : float, optional
+        Rudder angle, deg, where neither file nor campaign states it.
 
     Raises
     ------
     InputError
-        A file is missing or at fault, or the type is not known.
+        A file is missing or at fault, or the type is unknown.
 
     Examples
     --------
     >>> import tank2sim as t2s
     >>> t2s.reduce_runs("run12.csv", type="sway")
     Traceback (most recent call last):
-    tank2sim.errors.InputError: type: 'sway' is not a type of run; did you mean pure_sway?
+    tank2sim.errors.ArgumentError: type: is 'sway'; did you mean pure_sway?
     """
-    paths = [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]
+    import numpy as np
+
+    from tank2sim.identification.captive.single_runs import study_runs
+    from tank2sim.records.campaign_form import TankTest
+    from tank2sim.records.campaigns import Campaign, copied_runs, read_campaign_form
+    from tank2sim.results.captive_run import CaptiveRunResult
+
+    paths = [Path(runs)] if isinstance(runs, str | Path) else [Path(file) for file in runs]
     if not paths:
-        raise InputError("run", "", "has no file", "give at least one run")
-    if type is not None and type not in TYPE_NAMES:
-        raise InputError("type", "", f"{type!r} is not a type of run", close_name(type, TYPE_NAMES))
-    if force_convention is not None and force_convention not in get_args(ForceConvention):
-        known = ", ".join(get_args(ForceConvention))
-        raise InputError("force_convention", "", f"{force_convention!r} is not known", f"known are: {known}")
+        raise ArgumentError("runs", "", "has no file", "give at least one run")
     form = read_campaign_form(campaign) if campaign is not None else None
-    if form is not None and (force_convention or speed_mps):
-        raise InputError(str(campaign), "test", "has the speed and the convention of forces", "leave out the options")
+    if form is not None and (given := "force_convention" if force_convention else "speed_mps" if speed_mps else ""):
+        raise ArgumentError(given, "", f"is stated by {campaign}", "leave it out")
     angles = {
         name: math.radians(angle)
         for name, angle in (("drift_rad", drift_deg), ("rudder_rad", rudder_deg))
@@ -86,14 +120,14 @@ def reduce_runs(
     test = form.test if form else TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
     if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
         raise InputError(again, "", "is given twice", "give each run once")
-    runs = [_read(path, type, form, Path(campaign) if campaign else None, test, angles) for path in paths]
-    copies, mirrored = copied_runs(runs)
+    read = [_read(path, type, form, Path(campaign) if campaign else None, test, angles) for path in paths]
+    copies, mirrored = copied_runs(read)
     if copies:
         raise next(iter(copies.values()))
     if form is None and speed_mps is None:
-        for path, run in zip(paths, runs, strict=True):
+        for path, run in zip(paths, read, strict=True):
             if np.ptp(run.speed_mps) == 0.0 and run.speed_mps[0] == 1.0:
-                raise InputError(path, "header", "there is no speed", "give --speed, or --campaign campaign.toml")
+                raise ArgumentError("speed_mps", str(path), "states no speed", "give the speed, or a campaign")
     known_campaign = None
     if form is not None:
         known_campaign = Campaign(
@@ -103,9 +137,9 @@ def reduce_runs(
             tank=form.tank,
             uncertainty=form.uncertainty,
             full_scale=form.full_scale,
-            runs=tuple(runs),
+            runs=tuple(read),
         )
-    return CaptiveRunResult(*study_runs(runs, known_campaign, mirrored))
+    return CaptiveRunResult(*study_runs(read, known_campaign, mirrored))
 
 
 def _read(
@@ -116,6 +150,11 @@ def _read(
     test: TankTest,
     angles: Mapping[str, float],
 ) -> CaptiveRun:
+    import numpy as np
+
+    from tank2sim.records.campaign_form import RUN_TYPES, FilesSection, RunSheet
+    from tank2sim.records.campaigns import read_captive_run
+
     sheet = None
     if form is not None and campaign is not None:
         place = path.resolve()
@@ -123,8 +162,8 @@ def _read(
     columns = {**(form.columns if form else {}), **(sheet.columns if sheet else {})}
     files = form.files if form else FilesSection()
     if type_name is None and sheet is None:
-        remedy = f"give --type, one of: {', '.join(TYPE_NAMES)}"
-        raise InputError(path, "", "its type is not known", remedy)
+        remedy = f"give one of: {', '.join(get_args(RunName))}"
+        raise ArgumentError("type", str(path), "is not stated", remedy)
     kinds: list[RunType]
     if type_name == "combined":
         kinds = ["yaw_with_drift", "drift_and_rudder"]

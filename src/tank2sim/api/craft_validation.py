@@ -1,4 +1,4 @@
-"""A craft's card against trials that did not make it: free-running predictions."""
+"""The card of a craft compared with other trials than those it was identified from: free-running predictions."""
 
 from __future__ import annotations
 
@@ -8,38 +8,35 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.api.craft_identification import craft_trial_files
 from tank2sim.cards import CraftCard
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import PREDICTION_LEAD_S, SHORTEST_PREDICTION_S, predict_by_card
 from tank2sim.identification.craft.problem import craft_problem
 from tank2sim.identification.craft.study import CraftValidationStudy, study_predictions
-from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.same_record import refuse_copies
+from tank2sim.records.trials import Trial
 
 
 def validate_craft(
-    card: CraftCard, trials: str | Path | Sequence[str | Path]
+    card: CraftCard, trials: Sequence[Trial]
 ) -> tuple[CraftValidationStudy, CraftCard, tuple[Path, ...]]:
     """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
     Parameters
     ----------
     card : CraftCard
-    trials : path or sequence of paths
-        As those of :func:`tank2sim.identify_craft`.
+    trials : sequence of Trial
+        Trials (:func:`.read_craft_trial`).
 
     Raises
     ------
     InputError
         There is no trial, a file is at fault, none is long enough, or the card does not move as the trials do.
     """
-    paths = craft_trial_files(trials)
-    if not paths:
+    if not trials:
         remedy = "give trials that tank2sim log cut and identify did not fit"
         raise InputError("trials", "", "there are none, and a craft is validated by what it did", remedy)
-    read = [read_craft_trial(path, card.thrusters) for path in paths]
-    alike, problem = refuse_copies(read), craft_problem(card, read)
+    alike, problem = refuse_copies(trials), craft_problem(card, trials)
     try:
         with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
             predictions = predict_by_card(problem)
@@ -49,5 +46,5 @@ def validate_craft(
     if not predictions:
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         raise InputError("trials", "", f"none is longer than {least:g} s", "give longer ones")
-    study = study_predictions(card, [str(path) for path in paths], predictions, alike)
-    return study, card, tuple(paths)
+    paths = tuple(trial.path for trial in trials)
+    return study_predictions(card, [str(path) for path in paths], predictions, alike), card, paths

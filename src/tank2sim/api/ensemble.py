@@ -7,21 +7,20 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from tank2sim.arguments import ENSEMBLE
-from tank2sim.errors import InputError
-from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.arguments import ENSEMBLE, PROCESSES
+from tank2sim.errors import ArgumentError
+from tank2sim.executors import check_executor, executing
 from tank2sim.memory import refuse_beyond_memory
 
 FEW = 64
 """Members that are computed in this process: fewer are done before others have started. Project choice."""
 
 FEW_IN_LANES = 4000
-"""The same of members that run in lanes, a millisecond each. Project choice."""
-
+"""The same number for members that run in lanes, which take a millisecond each. Project choice."""
 
 _BYTES = 400
-"""Bytes of a member: some 25 figures, and as many again where quantiles are taken. Project choice, four times what a
-turning circle of 20 s takes."""
+"""Bytes of a member: about 25 figures, twice where quantiles are taken. Project choice: four times the need of a
+turning circle of 20 s."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class EnsembleOptions:
     Raises
     ------
     InputError
-        The executor cannot be used, there are fewer than 2 members, or an executor but no members.
+        The executor cannot be used, there is one member, or an executor or a seed without members.
     """
 
     members: int = 0
@@ -49,10 +48,11 @@ class EnsembleOptions:
 
     def __post_init__(self) -> None:
         ENSEMBLE.checked("members", self.members)
-        if check_executor(self.executor) != PROCESSES and not self.members:
-            raise InputError("--executor", "", "has nothing to do without --ensemble", "give --ensemble N, too")
-        if self.members and self.members < 2:
-            raise InputError("--ensemble", "", f"is {self.members}", "2 members or more, or 0 for no ensemble")
+        for name, given in (("executor", check_executor(self.executor) != PROCESSES), ("seed", self.seed != 0)):
+            if given and not self.members:
+                raise ArgumentError(name, "", "has no effect without members", "give members, too, or leave it out")
+        if self.members == 1:
+            raise ArgumentError("members", "", "is 1", "give 2 or more, or 0 for no ensemble")
         refuse_beyond_memory("members", self.members, _BYTES)
 
     @contextmanager

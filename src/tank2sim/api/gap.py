@@ -1,148 +1,163 @@
-"""Verb ``find_gap``: the missing physical effect of a model, by trials."""
+"""The missing physical effects of models, found by trials: of a ship, and of the ships of a fleet."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from tank2sim.api.trial import TrialPaths, fitted_and_held
-from tank2sim.arguments import Count, Effects, NumberArgument, checked
-from tank2sim.cards import Card, ManoeuvringCard
-from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.vessel import Vessel, as_vessel
-from tank2sim.errors import InputError
-from tank2sim.executors import PROCESSES, check_executor, executing, processes_to_begin
-from tank2sim.gap.fleet.search import nonlinear_card
-from tank2sim.gap.inference.fit_all import StageReport
-from tank2sim.gap.outcome.export import gap_study
-from tank2sim.gap.result import Gap
-from tank2sim.gap.search.model_choice import SUREST
-from tank2sim.gap.workflow import MOST_EFFECTS, GapOptions
-from tank2sim.gap.workflow import run_gap_workflow as run_workflow
-from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import fitted_as
-from tank2sim.results.gap import GapResult
+from tank2sim.api.verbs import Progress, Written, verb
+from tank2sim.arguments import MOST_EFFECTS, Count, Effects, FalseDiscovery
+from tank2sim.bundled import bundled_cards
 
-SUREST_WRONG = round(1 - SUREST, 9)
-"""Probability with which even the surest name may be wrong."""
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.dynamics.vessel import Vessel
+    from tank2sim.results.gap import GapResult
+    from tank2sim.results.gap_fleet import FleetResult
+
+_FOLDER = Written((), "DIR", by_function=True)
 
 
-@checked
-def find_gap(
-    card: Vessel | Card | str | Path,
-    trials: TrialPaths,
+def _is_folder(card: str) -> bool:
+    return Path(card).is_dir() and card.lower() not in bundled_cards()
+
+
+@verb(
+    "the physical effects that the cards of a fleet lack",
+    takes=_is_folder,
+    results=(
+        "tank2sim.results.gap_fleet:FleetResult",
+        "tank2sim.results.gap:GapResult",
+    ),
+)
+def find_gaps(
+    fleet: str | Path,
+    output: str | Annotated[Path, _FOLDER],
     *,
-    holdout: TrialPaths = (),
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
     max_effects: Effects = MOST_EFFECTS,
-    false_discovery: NumberArgument = 0.5,
-    executor: str = PROCESSES,
+    false_discovery: FalseDiscovery = 0.5,
+    again: bool = False,
+    executor: str = "processes",
     workers: Count | None = None,
-    progress: StageReport = lambda text: None,
-) -> GapResult:
-    """Find the physical effect that a model lacks to follow free-running trials, add it, and prove it.
+    report: Progress = lambda _: None,
+) -> FleetResult | GapResult:
+    """Find the missing effects of the ships of a fleet, as :func:`find_gap` finds those of one ship.
+
+    The results of each ship are written as soon as they exist; a search that was stopped goes on where it was.
 
     Parameters
     ----------
-    card : Vessel, Card, str or path
-        The ship as it is known (an ``abkowitz`` card).
-    trials, holdout : path or sequence of paths
-        Trials that name the effect, and trials that only prove it; a folder means the trials in it.
-    effects, without : sequence of str
-        Look for these alone; do not look for these. By default the whole library.
+    fleet : path
+        Folder with a sub-folder for each ship: its card, its trials next to it, and held-out trials in a sub-folder
+        ``holdout``. A folder that holds a card itself is one ship.
+    output : path
+        Folder for ``fleet.json``, ``fleet.html``, and the results of each ship in a sub-folder of its name.
+    effects, without, max_effects, false_discovery
+        As of :func:`find_gap`.
+    again : bool
+        Compute all ships of a folder, also those with valid results of an earlier search.
+    executor, workers
+        As of :func:`find_gap`; several ships are computed at once, each in one process.
+    report : callable
+        Called with the ship and the stage that begins.
+
+    Raises
+    ------
+    InputError
+        The folder holds no ship, or the results cannot be written. The faults of single ships are in the result.
+    """
+    from tank2sim.api.gap_search import FleetRequest, gap_options, search_fleet
+    from tank2sim.gap.fleet.ships import ship_alone
+    from tank2sim.ship import load
+
+    alone = ship_alone(Path(fleet))
+    if alone is None:
+        options = gap_options(effects, without, max_effects, false_discovery, workers)
+        return search_fleet(FleetRequest(Path(fleet), Path(output), options, executor, again), report)
+    found = find_gap(
+        load(alone.card),
+        alone.trials,
+        holdout=alone.holdout,
+        output=output,
+        effects=effects,
+        without=without,
+        max_effects=max_effects,
+        false_discovery=false_discovery,
+        executor=executor,
+        workers=workers,
+        report=report,
+    )
+    return replace(found, remarks=(*found.remarks, f"{fleet} holds a card itself, and was taken for one ship"))
+
+
+@verb(
+    "the physical effect that a card lacks",
+    variants={"folder_of_ships": find_gaps},
+    name="gap",
+    results=("tank2sim.results.gap:GapResult",),
+)
+def find_gap(
+    ship: Vessel,
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
+    *,
+    holdout: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
+    output: str | Annotated[Path, _FOLDER] | None = None,
+    effects: Sequence[str] = (),
+    without: Sequence[str] = (),
+    max_effects: Effects = MOST_EFFECTS,
+    false_discovery: FalseDiscovery = 0.5,
+    executor: str = "processes",
+    workers: Count | None = None,
+    report: Progress = lambda _: None,
+) -> GapResult:
+    """Find the physical effect that a ship lacks to follow free-running trials, add it, and prove it.
+
+    On the command line a folder in place of ship and trials is a fleet (:func:`find_gaps`): each sub-folder is a ship,
+    with its card, its trials next to it, and held-out trials in a sub-folder ``holdout``. The results of each ship are
+    written as soon as they exist; a search that was stopped goes on where it was. The command ends with exit code 0
+    whatever is found, and with 2 if a ship of the fleet could not be judged.
+
+    Parameters
+    ----------
+    ship : Vessel, Card, str or path
+        The ship before these trials, a polynomial or an MMG card.
+    trials : path, TrialRecord, DataFrame, or sequence of them
+        Trials that name the effect; a folder means the trials in it.
+    holdout : path, TrialRecord, DataFrame, or sequence of them
+        Trials that only prove the effect.
+    output : path, optional
+        Folder for ``gap.json``, ``improved.toml``, ``report.html``, ``next_test.csv`` and ``corrected/``, in place of
+        those of an earlier search.
+    effects : sequence of str
+        Look for these alone; by default for the whole library.
+    without : sequence of str
+        Do not look for these.
     max_effects : int
-        Effects named at most, 1 to 4.
+        Effects named at most.
     false_discovery : float
-        Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5; what is less sure is one of
-        several candidates.
+        Largest probability with which an effect that is named alone may be wrong; otherwise several candidates are
+        named.
     executor : str
-        ``processes`` or ``dask://host:port``.
+        Where explanations are fitted: ``processes``, or ``dask://host:port``.
     workers : int, optional
         Processes; by default one for each core.
-    progress : callable
+    report : callable
         Called with the stage that begins.
 
     Raises
     ------
     InputError
-        A file is at fault, a trial is too short, an effect is not known or cannot be tried on this card, or an option
-        is out of its range.
+        A file is at fault, a trial is too short, an effect is not known or cannot be tried on this card, or the folder
+        cannot be written.
     """
-    ship = nonlinear_card(as_vessel(card).card)
-    options = gap_options(effects, without, max_effects, workers, false_discovery)
-    with _workers(executor, workers) as pool:
-        fitted, held = fitted_and_held(trials, holdout, ship, report_unused=False)  # a search uses them
-        fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
-        return gap_result(run_workflow(ship, fitted, held, options, progress, pool), fitted, held)
+    from tank2sim.api.gap_search import gap_options, search_ship
 
-
-def gap_result(gap: Gap, fitted: Measured, held: Measured) -> GapResult:
-    """Return the result of a search with its trials."""
-    files = {trial.name: trial.path.name for trial in (*fitted.trials, *held.trials)}
-    return GapResult(gap_study(gap, files), gap, fitted, held)
-
-
-def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
-    """A notice if the card was identified from some of these trials: its coefficients may hold what is missing.
-
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    fitted : Measured
-        Trials that name the effect.
-    """
-    names = [trial.name for trial in fitted.trials if fitted_as(card, trial) is not None]
-    if not names:
-        return []
-    return [
-        f"{card.source} was fitted to {', '.join(names)}: its coefficients may hold a part of what is missing. "
-        "Give gap the card as it was before these trials, and identify on the improved card afterwards"
-    ]
-
-
-@checked
-def gap_options(
-    effects: Sequence[str] = (),
-    without: Sequence[str] = (),
-    max_effects: Effects = MOST_EFFECTS,
-    workers: Count | None = None,
-    false_discovery: NumberArgument = 0.5,
-) -> GapOptions:
-    """Options of the search. Raises InputError for an effect that is not known, or a number out of its range.
-
-    Parameters
-    ----------
-    effects, without, max_effects, workers, false_discovery
-        As of :func:`find_gap`.
-    """
-    for option, names in (("--effects", effects), ("--without", without)):
-        if isinstance(names, str):
-            raise InputError(option, "", f"is the text {names!r}", f"give a list of names: [{names!r}]")
-        for name in names:
-            if EFFECTS.get(name) is None:
-                raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    if not SUREST_WRONG <= false_discovery <= 0.5:
-        problem = f"is {false_discovery:g}: no name is surer than {1 - SUREST_WRONG:g}, and half is a guess"
-        raise InputError("--false-discovery", "", problem, f"give {SUREST_WRONG:g} to 0.5")
-    return GapOptions(
-        tuple(effects) or None, tuple(without), max_effects, workers=workers, false_discovery=false_discovery
-    )
-
-
-@contextmanager
-def _workers(executor: str, workers: int | None) -> Iterator[Executor | None]:
-    """The cluster, or processes of this machine, which load what they need while the trials are read; None for one."""
-    local = check_executor(executor) == PROCESSES
-    count = processes_to_begin(workers)
-    if local and count == 1:
-        yield None
-        return
-    with executing(executor, count) as pool:
-        for _ in range(count if local else 0):
-            pool.submit(importlib.import_module, "tank2sim.gap.workflow")
-        yield pool
+    options = gap_options(effects, without, max_effects, false_discovery, workers)
+    folder = None if output is None else Path(output)
+    return search_ship(ship.card, trials, holdout, folder, options, executor, report)

@@ -1,41 +1,66 @@
-"""Coefficients identified from free-running trials."""
+"""Coefficients identified from free-running trials of a ship, or of a craft with thrusters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tank2sim.analysis.ensemble.draws import by_file_name
-from tank2sim.api.trial import TrialPaths, fitted_and_held
-from tank2sim.arguments import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, checked
-from tank2sim.cards import Card, parse_card
-from tank2sim.dynamics.vessel import Vessel, as_vessel
-from tank2sim.errors import InputError
-from tank2sim.executors import PROCESSES, check_executor, executing
-from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
-from tank2sim.identification.trials.identify import Identification, identify_trials
-from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN
-from tank2sim.identification.trials.options import BY_RESIDUALS, TRIAL_METHODS, IdentificationOptions
-from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
-from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
-from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import with_fitted_trials
-from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
-from tank2sim.identification.trials.study import identified_card_text, study_identification
-from tank2sim.records.campaigns import read_campaign
-from tank2sim.results.identification import IdentificationResult
+from tank2sim.api.verbs import Output, Progress, verb
+from tank2sim.arguments import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, refuse_set
+from tank2sim.errors import ArgumentError, InputError, close_name
+from tank2sim.files import CARD
+from tank2sim.identification.trials.options import (
+    AUTO,
+    AVERAGE,
+    BY_EVIDENCE,
+    BY_RESIDUALS,
+    DRAWS_OF_CHAIN,
+    STRUCTURE_WORDS,
+    IdentificationOptions,
+    Sampler,
+    TrialMethod,
+)
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    import pandas as pd
+
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.arrays import Array
+    from tank2sim.cards import Card
+    from tank2sim.dynamics.vessel import Vessel
+    from tank2sim.identification.trials.identify import Identification
+    from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
+    from tank2sim.identification.trials.problem.estimation_problem import SearchReport
+    from tank2sim.identification.trials.problem.prepare_trials import Measured
+    from tank2sim.results.craft_identification import CraftIdentificationResult
+    from tank2sim.results.identification import IdentificationResult
 
 
-@checked
+def _card_files(result: IdentificationResult | CraftIdentificationResult, path: Path) -> dict[Path, str | bytes]:
+    return result.card.files(path) if result.card else {}
+
+
+@verb(
+    "coefficients from free-running trials",
+    Output("-o", CARD, "Write the card found.", _card_files, "CARD.toml"),
+    choices={"structure": STRUCTURE_WORDS},
+    results=(
+        "tank2sim.results.identification:IdentificationResult",
+        "tank2sim.results.craft_identification:CraftIdentificationResult",
+    ),
+)
 def identify(
-    card: Vessel | Card | str | Path,
-    trials: TrialPaths,
+    ship: Vessel,
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame],
     *,
-    holdout: TrialPaths = (),
-    method: str = BY_RESIDUALS,
+    holdout: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
+    method: TrialMethod = BY_RESIDUALS,
     structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
     inertia: bool = False,
@@ -45,71 +70,95 @@ def identify(
     force: bool = False,
     members: SmallEnsemble = 100,
     bootstrap: SmallEnsemble = 0,
-    posterior: str = "",
+    posterior: Sampler | None = None,
     draws: DrawsOfChain = DRAWS_OF_CHAIN,
-    executor: str = PROCESSES,
+    executor: str = "processes",
     workers: Count | None = None,
-    progress: SearchReport = silent,
-) -> IdentificationResult:
-    """Identify the coefficients of a ship from free-running trials.
+    report: Progress = lambda _: None,
+) -> IdentificationResult | CraftIdentificationResult:
+    """Identify the coefficients of a ship, or of a craft with thrusters, from free-running trials.
+
+    The standard errors of the card are the prior. Trials are CSV, SIMMAN ``.dat`` or Esso Osaka CSV files. A craft
+    takes `trials` and `holdout` alone: CSV files with position, heading and the revolutions ``n_<name>_rpm`` of each
+    thruster, as :func:`.log` cuts them; current and mean wind are estimated for each trial.
 
     Parameters
     ----------
-    card : Vessel, Card, str or path
-        What is known of the ship beforehand; its standard errors say how well.
-    trials, holdout : path, TrialRecord, or sequence of them
-        Trials to fit, and trials only to compare with; a folder means the trials in it.
+    ship : Vessel, Card, str or path
+        The ship before the trials; its standard errors say how well each coefficient is known.
+    trials : path, TrialRecord, DataFrame, or sequence of them
+        Trials to fit; a folder means the trials in it.
+    holdout : path, TrialRecord, DataFrame, or sequence of them
+        Trials to compare with and not to fit.
     method : str
-        ``output_error``, ``equation_error``, ``kalman`` or ``recursive``; ``residuals``: the Kalman filter for trials
-        at sea in which output error leaves more than the noise of the sensors, else output error.
+        How to fit; ``residuals`` is ``kalman`` for trials at sea that show gusts or waves, else ``output_error``.
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`; ``auto``: by cross-validation;
-        ``average``: intervals of all structures, weighted by their predictions, with the card of the best;
-        ``evidence``: cross-flow drag, unless the trials prefer the card's own terms very strongly by the Bayesian
-        information criterion.
+        Terms of the model: one of these, or a structure of an installed package.
     campaign : path, optional
-        ``campaign.toml`` of captive tests with a model of the ship, fitted together with the trials: its forces,
-        Froude-scaled, with the gain of each force, of the rudder, an offset of X and the moment's reference point
-        uncertain between tank and ship.
+        ``campaign.toml`` of captive tests with a model of the ship, to be fitted together with the trials.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
         Length of the pieces of output error, s; by default 5 L/u0.
     trust_card : bool
-        Take the card's standard errors as they are.
+        Keep the card's standard errors, even if the trials require wider ones.
     hold : sequence of str
-        Derivatives or parameters of effects that stay as the card has them.
+        Derivatives and parameters of effects that keep the card's values.
     force : bool
-        Fit trials also where they look like another ship's; the result is marked.
+        Fit trials that look like another ship's, too; result and card are then marked.
     members : int
         Simulations behind the intervals of the figures of held-out trials.
     bootstrap : int
-        Sets of trials simulated again with the estimate and fitted, for its scatter.
-    posterior : str
-        ``nuts``: sample the posterior by the no-U-turn sampler; ``ensemble``: by an ensemble of walkers. Estimates,
-        their covariance and all intervals are then those of the samples, which the card carries next to it; about 2 min
-        for 20 coefficients. Needs ``tank2sim[posterior]``.
+        Sets of trials that are simulated with the estimate and fitted again, for the scatter of the estimates.
+    posterior : str, optional
+        Sample the posterior, by the no-U-turn sampler or an ensemble of walkers. The card carries the samples, and
+        estimates and intervals are theirs. Needs ``tank2sim[posterior]``; about 2 min for 20 coefficients.
     draws : int
         Draws of each of the sampler's four chains.
     executor : str
-        ``processes`` or ``dask://host:port``.
+        Where cross-validation, bootstrap and intervals are computed: ``processes``, or ``dask://host:port``.
     workers : int, optional
-        Processes for cross-validation and bootstrap.
-    progress : callable
-        Called with stage, values and cost of each better estimate.
+        Processes; by default one for each core.
+    report : callable
+        Called with stage, step and cost of each better estimate. An interrupt keeps the best so far.
 
     Raises
     ------
     InputError
-        A file is at fault, the trials are not of the card's ship, or they do not determine the coefficients.
+        A file is at fault, the trials are not of this ship, or they do not determine the coefficients.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import tank2sim as t2s
+    >>> otter, folder = t2s.load("otter"), Path(tempfile.mkdtemp())
+    >>> for name in ("straight:600", "spin:400", "difference:300"):
+    ...     rows = otter.simulate(name, duration_s=10).df[::40]
+    ...     rows.to_csv(folder / f"{name.partition(':')[0]}.csv", index=False)
+    >>> found = t2s.identify(otter, folder)
+    >>> abs(found.card.thrusters[0].ahead_Ns2 / 0.01108 - 1) < 0.05
+    True
     """
-    for name, value, known in (
-        ("method", method, TRIAL_METHODS),
-        ("structure", structure, (*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)),
-    ):
-        if value not in known:
-            raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
-    ship = as_vessel(card).manoeuvring()
+    given = dict(locals())
+    from tank2sim.api.craft_identification import identify_craft
+    from tank2sim.api.trial import craft_trials_of, fitted_and_held
+    from tank2sim.cards import CraftCard
+    from tank2sim.identification.trials.identify import identify_trials
+    from tank2sim.identification.trials.problem.structures import STRUCTURES
+    from tank2sim.identification.trials.study import study_identification
+    from tank2sim.results.identification import IdentificationResult
+
+    progress = _step_report(report)
+    if isinstance(ship.card, CraftCard):
+        taken = {"ship", "trials", "holdout", "report"}
+        refuse_set(identify, given, "is not for a craft with thrusters", taken=taken)
+        thrusters = ship.card.thrusters
+        to_fit, to_predict = craft_trials_of(trials, thrusters), craft_trials_of(holdout, thrusters, "holdout")
+        return identify_craft(ship.card, to_fit, to_predict, progress)
+    card = ship.manoeuvring()
+    if structure not in (known := (*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)):
+        raise ArgumentError("structure", "", f"{structure!r} is not known", close_name(structure, known))
     options = IdentificationOptions(
         method=method,
         structure=structure,
@@ -123,16 +172,31 @@ def identify(
         posterior=posterior,
         draws=draws,
     )
-    fitted, held = fitted_and_held(trials, holdout, ship)
+    fitted, held = fitted_and_held(trials, holdout, card)
     if campaign is not None:
         fitted = replace(fitted, captive=captive_runs(campaign))
     with _computing(options, executor, workers, held=bool(held.trials)) as pool:
-        found = identify_trials(ship, fitted, held, options, progress, pool)
-    return IdentificationResult(study_identification(ship, found, fitted, held), _card(found, fitted), found)
+        found = identify_trials(card, fitted, held, options, progress, pool)
+    return IdentificationResult(study_identification(card, found, fitted, held), _card(found, fitted), found)
+
+
+def _step_report(report: Progress) -> SearchReport:
+    """The report of a search: a line for each better estimate."""
+    steps = count(1)
+
+    def progress(stage: str, values: Array, cost: float) -> None:
+        report(f"{stage}: step {next(steps)}, cost {cost:.6g} (Ctrl-C keeps the best so far)")
+
+    return progress
 
 
 def _card(found: Identification, fitted: Measured) -> Card:
     """The card found, with the covariance of its estimates."""
+    from tank2sim.analysis.ensemble.draws import by_file_name
+    from tank2sim.cards import parse_card
+    from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+    from tank2sim.identification.trials.study import identified_card_text
+
     captive = fitted.captive
     tank = [f"{len(captive.runs)} captive tests of {captive.campaign.path.name}"] if captive else []
     text = identified_card_text(found, [*(trial.name for trial in fitted.trials), *tank])
@@ -143,13 +207,17 @@ def _card(found: Identification, fitted: Measured) -> Card:
 
 
 def captive_runs(campaign: str | Path) -> CaptiveRuns:
-    """The reduced runs of a campaign, rudder tests at other speeds included.
+    """The reduced runs of a campaign, with rudder tests at other speeds.
 
     Raises
     ------
     InputError
-        The campaign is at fault, see :func:`tank2sim.reduce`.
+        The campaign is at fault (:func:`tank2sim.reduce`), or one of its runs is at a heel.
     """
+    from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
+    from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
+    from tank2sim.records.campaigns import read_campaign
+
     read = read_campaign(campaign)
     if heeled := next((run.name for run in read.runs if run.heel_rad), ""):
         raise InputError(
@@ -162,12 +230,15 @@ def captive_runs(campaign: str | Path) -> CaptiveRuns:
 def _computing(
     options: IdentificationOptions, executor: str, workers: int | None, *, held: bool
 ) -> Iterator[Executor | None]:
-    """For cross-validation and bootstrap; a cluster for the intervals of what is held out, too."""
+    """Executor for cross-validation and bootstrap; a cluster also computes the intervals of held-out trials."""
+    from tank2sim.arguments import PROCESSES
+    from tank2sim.executors import check_executor, executing
+
     on_this_machine = check_executor(executor) == PROCESSES
     several = options.structure in (AUTO, AVERAGE)
     if not on_this_machine and not (several or options.bootstrap or (held and options.members)):
-        remedy = f"give --structure {AUTO}, --bootstrap N or --holdout TRIAL, too"
-        raise InputError("--executor", "", "has nothing to do", remedy)
+        remedy = f"give structure {AUTO}, bootstrap or holdout, too"
+        raise ArgumentError("executor", "", "has nothing to do", remedy)
     if on_this_machine and not several and not options.bootstrap:
         yield None
         return

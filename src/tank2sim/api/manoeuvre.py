@@ -6,61 +6,102 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tank2sim.analysis.manoeuvre import study_manoeuvre
-from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
-from tank2sim.dynamics.simulator_interface import external_inputs, with_external_forces
-from tank2sim.errors import InputError
-from tank2sim.results.manoeuvre import ManoeuvreResult
-from tank2sim.simulation.manoeuvres import Manoeuvre, PullOut
-from tank2sim.simulation.run import simulate
+from tank2sim.api.verbs import Output, named_numbers, verb
+from tank2sim.arguments import PROCESSES, EnsembleSize, PositiveArgument, Seed
+from tank2sim.errors import ArgumentError
+from tank2sim.files import TABLE
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
+    from tank2sim.results.manoeuvre import ManoeuvreResult
+    from tank2sim.simulation.manoeuvres import Manoeuvre
 
 
+@verb(
+    "a manoeuvre: turn, zigzag, pull-out, spiral, stop, orders of a file",
+    Output("-o", TABLE, "Write the motion as a trial.", lambda result, path: {path: result.to_csv()}, "RUN.csv"),
+    options={"manoeuvre": "--manoeuvre"},
+    texts={"external": named_numbers("external", "Y=20000 x=-15")},
+    name="simulate",
+    results=("tank2sim.results.manoeuvre:ManoeuvreResult",),
+)
 def simulate_manoeuvre(
     ship: Vessel,
-    manoeuvre: Manoeuvre,
-    words: str,
-    duration_s: float | None,
-    ensemble: EnsembleOptions,
+    manoeuvre: str | Manoeuvre,
+    *,
+    duration_s: PositiveArgument | None = None,
     external: Mapping[str, float] | None = None,
+    members: EnsembleSize = 0,
+    seed: Seed = 0,
+    executor: str = PROCESSES,
 ) -> ManoeuvreResult:
-    """Simulate a manoeuvre of a ship, called by its `words`, with an ensemble if it has members.
+    """Simulate a manoeuvre of a ship, executed at t = 0, and its figures.
 
     Parameters
     ----------
-    ship, manoeuvre, words
-        What is simulated, and what it is called.
-    duration_s : float or None
-        None: as long as the manoeuvre needs.
-    ensemble : EnsembleOptions
-        Size, seed and computer of the ensemble.
+    ship : Vessel
+    manoeuvre : str or Manoeuvre
+        turn:35, turn:-35, zigzag:20/20, zigzag:-10/10, pullout:20, spiral, spiral:20, stop, stop:-60 or
+        file:orders.csv; for a craft with thrusters straight:600, difference:200, difference:-200, spin:400, stop,
+        stop:-600 or file:orders.csv. Angles in deg, positive to starboard; revolutions in rpm.
+    duration_s : float, optional
+        Length of the run, s; by default as long as the manoeuvre needs.
     external : mapping, optional
-        As in :meth:`.Ship.simulate`.
+        Constant force from outside: X and Y (N, positive forward and to starboard) at x and y (m, forward of midships
+        and to starboard), with an additional moment N (N m, positive to starboard): ``{"Y": 20000, "x": -15}``, on the
+        command line ``Y=20000 x=-15``.
+    members : int
+        Ships drawn from the standard errors of the card, for bands of 5, 50 and 95 %: 100 for a first look, 2000 for
+        figures to report; 0 for none.
+    seed : int
+        Seed of the drawn ships.
+    executor : str
+        Where the drawn ships are simulated: ``processes`` of this machine, or a cluster, ``dask://host:port``.
 
     Raises
     ------
     InputError
-        As :meth:`.Ship.simulate`.
+        The text is not a manoeuvre, the ship has no rudder or thrusters, the motion leaves all bounds, or `external`
+        has an unknown key or comes with an ensemble.
+
+    Notes
+    -----
+    `manoeuvre` may also be an object of :mod:`tank2sim.simulation.manoeuvres`, whose angles are in radians.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> run = t2s.load("mariner").simulate("turn:35")
+    >>> round(run.figures["advance_lengths"], 1)
+    3.5
     """
-    if external and ensemble.members:
-        raise InputError("external", "", "cannot act on an ensemble", "leave out either the members or the force")
+    from tank2sim.analysis.manoeuvre import study_manoeuvre
+    from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
+    from tank2sim.dynamics.simulator_interface import external_inputs, with_external_forces
+    from tank2sim.results.manoeuvre import ManoeuvreResult
+    from tank2sim.simulation.manoeuvres import PullOut, parse_manoeuvre
+    from tank2sim.simulation.run import simulate
+
+    if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
+        raise ArgumentError("manoeuvre", "", f"is of the type {type(manoeuvre).__name__}", "give a text, as 'turn:35'")
+    parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
+    words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
+    ensemble = EnsembleOptions(members, seed, executor)
+    if external and members:
+        raise ArgumentError("external", "", "cannot act on an ensemble", "leave out either the members or the force")
     inputs = external_inputs(external or {}, rolls="force.K" in ship.model)
     model = with_external_forces(ship.model) if inputs else ship.model
-    run = simulate(model, manoeuvre, duration_s=duration_s, inputs=inputs)
+    run = simulate(model, parsed, duration_s=duration_s, inputs=inputs)
     other = None
-    if isinstance(manoeuvre, PullOut):
-        other = simulate(model, PullOut(-manoeuvre.rudder), duration_s=duration_s, inputs=inputs)
-    particulars = getattr(ship.card, "ship", None)
-    study = study_manoeuvre(ship.model, words, run, particulars, other)
-    if ensemble.members:
+    if isinstance(parsed, PullOut):
+        other = simulate(model, PullOut(-parsed.rudder), duration_s=duration_s, inputs=inputs)
+    study = study_manoeuvre(ship.model, words, run, getattr(ship.card, "ship", None), other)
+    if members:
         from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
         from tank2sim.simulation.lane_figures import runs_in_lanes
 
         length = duration_s, float(run.trajectory.t[-1])
-        request = EnsembleRequest(ensemble.members, ensemble.seed)
-        with ensemble.computing(FEW_IN_LANES if runs_in_lanes(manoeuvre, duration_s) else FEW) as executor:
-            bands = manoeuvre_bands(ship.manoeuvring(), manoeuvre, length, request, executor)
+        with ensemble.computing(FEW_IN_LANES if runs_in_lanes(parsed, duration_s) else FEW) as computing:
+            bands = manoeuvre_bands(ship.manoeuvring(), parsed, length, EnsembleRequest(members, seed), computing)
         study = replace(study, ensemble=bands)
     return ManoeuvreResult(study, run, ship)

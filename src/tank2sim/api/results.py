@@ -8,41 +8,17 @@ from typing import Any
 
 from tank2sim.answer.result import Result
 from tank2sim.answer.study import study_schema
-from tank2sim.api.commands import VERBS
-from tank2sim.api.verbs import Verb
+from tank2sim.api.commands import VERBS, variants_of
 from tank2sim.arguments import checked
 from tank2sim.errors import InputError
 from tank2sim.files import schema_command, schema_name
 
-RESULT_CLASSES: dict[str, tuple[str, ...]] = {
-    "demo": ("apps.demo.result:DemoResult",),
-    "gap": ("results.gap:GapResult", "results.gap_fleet:FleetResult"),
-    "glide": ("apps.rigs.glider.result:GlideResult",),
-    "influence": (
-        "results.influence:InfluenceResult",
-        "apps.steering_cards.result:SteeringModelsResult",
-        "apps.steering_cards.tuning_result:TurnTuningResult",
-    ),
-    "identify": (
-        "results.identification:IdentificationResult",
-        "results.craft_identification:CraftIdentificationResult",
-    ),
-    "log": ("apps.logs.result:LogResult",),
-    "run": ("results.captive_run:CaptiveRunResult",),
-    "simulate": ("results.manoeuvre:ManoeuvreResult",),
-    "stability": ("results.stability:StabilityResult", "results.craft_stability:CraftStabilityResult"),
-    "steer": ("apps.steering.result:SteeringPageResult",),
-    "yaw": ("apps.rigs.yaw.result:YawResult",),
-}
-"""Command to its results, each as ``module:class``; a command that has several writes one of them."""
-
 
 def result_classes(command: str) -> list[type[Result[Any]]]:
     """Return the classes of the results of a command, those of its variants last; empty if it writes none."""
-    places = [f"tank2sim.{place}" for place in RESULT_CLASSES.get(command, ())]
-    if (verb := VERBS.get(command)) is not None:
-        variants: list[Verb] = [vars(other)["verb"] for other in verb.variants.values()]
-        places += [place for each in (verb, *variants) for place in each.results]
+    if (verb := VERBS.get(command)) is None:
+        return []
+    places = [place for each in (verb, *variants_of(verb).values()) for place in each.results]
     found = []
     for place in places:
         module, _, name = place.partition(":")
@@ -52,7 +28,7 @@ def result_classes(command: str) -> list[type[Result[Any]]]:
 
 def commands_with_results() -> list[str]:
     """Names of the commands that write a result as JSON, in the order of the alphabet."""
-    return sorted({*RESULT_CLASSES, *(name for name, verb in VERBS.items() if verb.results)})
+    return sorted(name for name, verb in VERBS.items() if verb.results)
 
 
 @checked

@@ -5,38 +5,85 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tank2sim.analysis.ensemble.results import EnsembleRequest, stability_bands
-from tank2sim.analysis.ensemble.steering import Grid
-from tank2sim.analysis.stability.craft import craft_stability
-from tank2sim.analysis.stability.study import stability_study
-from tank2sim.api.ensemble import EnsembleOptions
-from tank2sim.cards import CraftCard
-from tank2sim.native.compiler import find_compiler
-from tank2sim.results.craft_stability import CraftStabilityResult
-from tank2sim.results.stability import StabilityResult
-from tank2sim.simulation.integrator import NO_COMPILER
+from tank2sim.api.verbs import verb
+from tank2sim.arguments import PROCESSES, EnsembleSize, Seed, SpeedArgument
+from tank2sim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
+    from tank2sim.results.craft_stability import CraftStabilityResult
+    from tank2sim.results.stability import StabilityResult
 
 
+@verb(
+    "course stability, steady turning, IMO criteria",
+    name="stability",
+    results=(
+        "tank2sim.results.stability:StabilityResult",
+        "tank2sim.results.craft_stability:CraftStabilityResult",
+    ),
+)
 def judge_stability(
-    ship: Vessel, speed_mps: float | None, *, spirals: bool, ensemble: EnsembleOptions
-) -> StabilityResult:
-    """Stability of a ship, with an ensemble if it has members. Raises as :meth:`.Ship.stability`."""
+    ship: Vessel,
+    speed_mps: SpeedArgument | None = None,
+    *,
+    spirals: bool = True,
+    members: EnsembleSize = 0,
+    seed: Seed = 0,
+    executor: str = PROCESSES,
+) -> StabilityResult | CraftStabilityResult:
+    """Judge straight-line stability, steady turning and the IMO criteria of a ship.
+
+    A craft with thrusters has no spirals and no IMO criteria.
+
+    Parameters
+    ----------
+    ship : Vessel
+    speed_mps : float, optional
+        Speed on the straight course, m/s; by default the speed of the card.
+    spirals : bool
+        Simulate the spirals on the steady-turning diagram.
+    members : int
+        Ships drawn from the standard errors of the card, for the probability of meeting each criterion and bands of 5,
+        50 and 95 %: 100 for a first look, 2000 for figures to report; 0 for none.
+    seed : int
+        Seed of the drawn ships.
+    executor : str
+        Where the drawn ships are simulated: ``processes`` of this machine, or a cluster, ``dask://host:port``.
+
+    Raises
+    ------
+    InputError
+        The ship holds no straight course, or an ensemble is asked for a craft.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> t2s.load("mariner").stability(spirals=False).stable
+    True
+    """
+    from tank2sim.analysis.ensemble.results import EnsembleRequest, stability_bands
+    from tank2sim.analysis.ensemble.steering import Grid
+    from tank2sim.analysis.stability.craft import craft_stability
+    from tank2sim.analysis.stability.study import stability_study
+    from tank2sim.api.ensemble import EnsembleOptions
+    from tank2sim.cards import CraftCard
+    from tank2sim.native.compiler import find_compiler
+    from tank2sim.results.craft_stability import CraftStabilityResult
+    from tank2sim.results.stability import StabilityResult
+    from tank2sim.simulation.integrator import NO_COMPILER
+
+    ensemble = EnsembleOptions(members, seed, executor)
+    if isinstance(ship.card, CraftCard):
+        if members:
+            raise ArgumentError("members", "", "are judged by the IMO criteria, which need a rudder", "leave them out")
+        return CraftStabilityResult(craft_stability(ship.card, speed_mps), ship)
     study = stability_study(ship.model, speed_mps, spirals=spirals)
     compiler = () if find_compiler() else (NO_COMPILER,)
     study = replace(study, notices=tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler])))
-    if ensemble.members:
+    if members:
         curves = (speed_mps, Grid.of(ship.model, study.responses[0])) if study.responses else None
-        request = EnsembleRequest(ensemble.members, ensemble.seed)
-        with ensemble.computing() as executor:
-            bands = stability_bands(ship.manoeuvring(), study.imo, request, executor, curves)
+        with ensemble.computing() as computing:
+            bands = stability_bands(ship.manoeuvring(), study.imo, EnsembleRequest(members, seed), computing, curves)
         study = replace(study, ensemble=bands)
     return StabilityResult(study, ship)
-
-
-def judge_craft_stability(ship: Vessel, speed_mps: float | None) -> CraftStabilityResult:
-    """Stability of a craft. Raises as :meth:`.Ship.stability`."""
-    assert isinstance(ship.card, CraftCard)
-    return CraftStabilityResult(craft_stability(ship.card, speed_mps), ship)

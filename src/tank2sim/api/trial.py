@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from tank2sim.api.commands import VERBS
 from tank2sim.arguments import checked
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import write_together
+from tank2sim.records.csv_table import CsvTable, is_frame, table_of_frame, table_or_path
 from tank2sim.records.reading import READERS, looks_like_a_trial
 from tank2sim.records.reading import read_trial_file as read_record
 from tank2sim.records.signals.columns import SignalName, file_columns
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from tank2sim.answer.result import Result
     from tank2sim.cards import ManoeuvringCard
+    from tank2sim.cards.form import ThrusterSection
     from tank2sim.identification.trials.problem.prepare_trials import Measured
     from tank2sim.results.audit import AuditResult
 
@@ -110,17 +112,19 @@ class TrialRecord:
         return text
 
 
-TrialPaths = Sequence[TrialRecord | str | Path] | TrialRecord | str | Path
-"""Trials by their files, folders or records."""
+if TYPE_CHECKING:
+    TrialSource: TypeAlias = TrialRecord | Trial | pd.DataFrame | str | Path
+    TrialPaths: TypeAlias = TrialSource | Sequence[TrialSource]
 
 
 @checked
-def read_trial(path: str | Path) -> TrialRecord:
+def read_trial(path: str | Path | pd.DataFrame) -> TrialRecord:
     """Read a trial: the project's CSV, a SIMMAN ``.dat`` or an Esso Osaka CSV, by its first line.
 
     Parameters
     ----------
-    path : path
+    path : path or DataFrame
+        A data frame has the columns of the project's CSV (``t_s``, ``delta_deg``, ``r_degps``, ...).
 
     Raises
     ------
@@ -137,49 +141,89 @@ def read_trial(path: str | Path) -> TrialRecord:
     >>> float(trial.df["delta_deg"].max())
     35.0
     """
-    return TrialRecord(read_record(path))
+    return TrialRecord(read_record(table_or_path(path, "path")))
 
 
-def trial_files(given: TrialPaths) -> list[Path]:
-    """The files that are meant: a folder means the trials in it, and a record the file that was measured.
-
-    Raises
-    ------
-    InputError
-        A folder holds no trial.
-    """
-    return [item.path if isinstance(item, TrialRecord) else item for item in _files_and_records(given)]
-
-
-def trials_of(given: TrialPaths, *, rising: bool = True) -> list[Trial]:
-    """The trials that are meant: records as they are, files read, and of a folder the trials in it.
-
-    Without `rising`, times that do not rise are let through.
-
-    Raises
-    ------
-    InputError
-        As :func:`tank2sim.records.reading.read_trial_file`; or a folder holds no trial.
-    """
+def trial_files(given: TrialPaths, name: str = "trials") -> list[Path]:
+    """The files among the trials that are meant; a folder means the trials in it. Raises as :func:`trials_of`."""
+    sources = trial_sources(given, name)
     return [
-        item.trial if isinstance(item, TrialRecord) else read_record(item, rising=rising)
-        for item in _files_and_records(given)
+        source.path if isinstance(source, Trial) else source for source in sources if not isinstance(source, CsvTable)
     ]
 
 
-def _files_and_records(given: TrialPaths) -> list[TrialRecord | Path]:
-    found: list[TrialRecord | Path] = []
-    for item in [given] if isinstance(given, TrialRecord | str | Path) else given:
-        if isinstance(item, TrialRecord):
-            found.append(item)
-            continue
-        path = Path(item)
-        files = sorted(file for file in path.glob("*") if looks_like_a_trial(file)) if path.is_dir() else [path]
-        if not files:
-            endings = ", ".join(dict.fromkeys(ending for reader in READERS.values() for ending in reader.suffixes))
-            raise InputError(path, "", "holds no trial", f"a folder with trials ({endings}) was expected")
-        found += files
+def trials_of(given: TrialPaths, name: str = "trials", *, rising: bool = True) -> list[Trial]:
+    """The trials that are meant: records as they are, files and data frames read, and of a folder the trials in it.
+
+    Parameters
+    ----------
+    given : path, TrialRecord, Trial, DataFrame, or sequence of them
+        A data frame has the columns of a trial CSV (``t_s``, ``delta_deg``, ``r_degps``, ...); its ``attrs`` are the
+        comments of the file (``noise``, ``scale``, ``rudder_sign``, ``origin``).
+    name : str
+        Name of the argument: data frames are called ``trials[0]``, ``trials[1]``, ... by it.
+    rising : bool
+        False lets times through that do not rise.
+
+    Raises
+    ------
+    InputError
+        It is none of these; as :func:`tank2sim.records.reading.read_trial_file`; or a folder holds no trial.
+    """
+    sources = trial_sources(given, name)
+    return [source if isinstance(source, Trial) else read_record(source, rising=rising) for source in sources]
+
+
+def craft_trials_of(given: TrialPaths, thrusters: Sequence[ThrusterSection], name: str = "trials") -> list[Trial]:
+    """The trials of a craft with thrusters that are meant.
+
+    Parameters
+    ----------
+    given : path, TrialRecord, DataFrame, or sequence of them
+        Of a record the file is read again: a trial of a ship has no thrusters.
+    thrusters : sequence of ThrusterSection
+        Thrusters of the card.
+    name : str
+        Name of the argument, as of :func:`trials_of`.
+
+    Raises
+    ------
+    InputError
+        As :func:`trials_of` and :func:`tank2sim.records.craft_trials.read_craft_trial`.
+    """
+    from tank2sim.records.craft_trials import read_craft_trial
+
+    sources = (source.path if isinstance(source, Trial) else source for source in trial_sources(given, name))
+    return [read_craft_trial(source, thrusters) for source in sources]
+
+
+def trial_sources(given: TrialPaths, name: str = "trials") -> list[Trial | Path | CsvTable]:
+    """Records, files, and tables of data frames among the trials that are meant. Raises as :func:`trials_of`."""
+    several = isinstance(given, Iterable) and not isinstance(given, str | Path | Mapping) and not is_frame(given)
+    found: list[Trial | Path | CsvTable] = []
+    for number, item in enumerate(given if several else [given]):  # type: ignore[arg-type]
+        place = f"{name}[{number}]" if several else name
+        if isinstance(item, TrialRecord | Trial):
+            found.append(item.trial if isinstance(item, TrialRecord) else item)
+        elif is_frame(item):
+            found.append(table_of_frame(item, place))
+        elif isinstance(item, str | Path):
+            found += _files(Path(item))
+        else:
+            remedy = (
+                "give a path, a TrialRecord, or a DataFrame with the columns of a trial CSV (t_s, delta_deg, r_degps)"
+            )
+            raise ArgumentError(place, "", f"is of the type {type(item).__name__}", remedy)
     return found
+
+
+def _files(path: Path) -> list[Path]:
+    """A file, or the trials in a folder."""
+    files = sorted(file for file in path.glob("*") if looks_like_a_trial(file)) if path.is_dir() else [path]
+    if not files:
+        endings = ", ".join(dict.fromkeys(ending for reader in READERS.values() for ending in reader.suffixes))
+        raise InputError(path, "", "holds no trial", f"a folder with trials ({endings}) was expected")
+    return files
 
 
 def fitted_and_held(
@@ -200,7 +244,7 @@ def fitted_and_held(
     from tank2sim.identification.trials.problem.signatures import fitted_as
     from tank2sim.records.same_record import refuse_copies
 
-    groups = (trials_of(trials), trials_of(holdout))
+    groups = (trials_of(trials), trials_of(holdout, "holdout"))
     fitted, held = (measured(group, card, report_unused=report_unused) for group in groups)
     if not fitted.trials:
         raise InputError("trials", "", "is empty", "give a file of a trial or a folder with trials")

@@ -10,6 +10,8 @@ from tank2sim.api.verbs import verb
 from tank2sim.arguments import REQUIRED_PERCENT, VALIDATION_MEMBERS, PositiveArgument, SmallEnsemble
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.trial import TrialRecord
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.craft_validation import CraftValidationResult
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 )
 def validate(
     ship: Vessel,
-    trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord] = (),
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
     *,
     members: SmallEnsemble = VALIDATION_MEMBERS,
     required_percent: PositiveArgument = REQUIRED_PERCENT,
@@ -38,7 +40,7 @@ def validate(
     Parameters
     ----------
     ship : Vessel, Card, str or path
-    trials : path, TrialRecord, or sequence of them
+    trials : path, TrialRecord, DataFrame, or sequence of them
         Turning circles and zigzags; a folder means the trials in it. Without any, the model is documented and
         verified.
     members : int
@@ -52,12 +54,12 @@ def validate(
         The card is not one of a ship that manoeuvres, or a file is at fault.
     """
     from tank2sim.api.craft_validation import validate_craft
-    from tank2sim.api.trial import trial_files, trials_of
+    from tank2sim.api.trial import craft_trials_of, trials_of
     from tank2sim.api.validation_study import validate_ship
     from tank2sim.cards import CraftCard
     from tank2sim.results.craft_validation import CraftValidationResult
     from tank2sim.results.validation import ValidationResult
 
     if isinstance(ship.card, CraftCard):
-        return CraftValidationResult(*validate_craft(ship.card, trial_files(trials)))
+        return CraftValidationResult(*validate_craft(ship.card, craft_trials_of(trials, ship.card.thrusters)))
     return ValidationResult(*validate_ship(ship.manoeuvring(), trials_of(trials), members, required_percent))

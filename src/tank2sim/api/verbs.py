@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
 
 from tank2sim.arguments import checked
+from tank2sim.errors import ArgumentError
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -29,10 +31,14 @@ class Written:
     endings : tuple of str, optional
         As of :class:`Output`.
     metavar : str
+    by_function : bool
+        The function itself writes there (a folder, as its work goes on), and the command requires it unless it has a
+        default. The ``written`` of the result are the files.
     """
 
     endings: tuple[str, ...] | None
     metavar: str = "FILE"
+    by_function: bool = False
 
 
 @dataclass(frozen=True)
@@ -79,8 +85,16 @@ class Verb:
         Argument to a function that makes its value of the words on the command line.
     choices : mapping
         Argument to the words of its choices.
+    options : mapping
+        Argument to the option that sets it, where the command line does not take it by position or has another name.
     variants : mapping
-        Flag to another verb, which the command calls with this flag in place of the function.
+        Flag to another verb, which the command calls with this flag in place of the function. An option of the other
+        verb of that name is the flag. The key of a verb that `takes` certain first arguments is their kind
+        (``steering_card``).
+    takes : callable, optional
+        As a variant, the verb is called if this is true of the first argument as a text.
+    default_ship : str
+        Name of the bundled ship that the command takes where no card is given; empty if one must be.
     page_required : bool
         Whether the page is the result itself, and must be written.
     exit_code : callable
@@ -94,9 +108,40 @@ class Verb:
     results: Sequence[str] = ()
     texts: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict)
     choices: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    options: Mapping[str, str] = field(default_factory=dict)
     variants: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    takes: Callable[[str], bool] | None = None
+    default_ship: str = ""
     page_required: bool = False
     exit_code: Callable[[Any], int] = lambda _: 0
+
+
+def named_numbers(argument: str, example: str) -> Callable[[Sequence[str]], dict[str, float]]:
+    """Return a reader of words ``NAME=NUMBER``, for `texts` of a verb.
+
+    Parameters
+    ----------
+    argument : str
+        The argument that gets the numbers by name.
+    example : str
+        A word with its name and number, for the remedy.
+    """
+
+    def read(given: Sequence[str]) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for text in given:
+            name, _, number = (part.strip() for part in text.partition("="))
+            try:
+                value = float(number)
+            except ValueError:
+                value = math.nan
+            problem = "is not NAME=NUMBER" if not math.isfinite(value) else "is given twice" if name in found else ""
+            if problem or not name:
+                raise ArgumentError(argument, text, problem or "has no name", f"give, for example, {example}")
+            found[name] = value
+        return found
+
+    return read
 
 
 def verb(words: str, *outputs: Output, name: str = "", **more: Any) -> Callable[[Callable[_P, _T]], Callable[_P, _T]]:

@@ -1,4 +1,4 @@
-"""The command line: one thin file a command, which reads, calls and prints.
+"""The command line, whose commands are derived from functions of the API.
 
 Every command ends 0 (done), 1 (`check` only: it failed) or 2 (bad input: one line on the error stream).
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import importlib
 import os
 import signal
 import sys
@@ -35,23 +34,7 @@ GROUPS = {
     "Export": ("convert", "convention", "export", "check"),
     "Show": ("ships", "poster", "pilotcard", "steer", "report", "open", "demo"),
 }
-"""Commands by the work that people do; those of other packages come last."""
-
-WORDS = {
-    "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
-    "gap": "the physical effect that a card lacks",
-    "glide": "an underwater glider: glides, paths, range",
-    "identify": "coefficients from free-running trials",
-    "influence": "sensitivity of manoeuvring figures; tuning",
-    "log": "a vessel's own log, cut into trials",
-    "open": "a page, in the browser",
-    "run": "one captive run, as soon as it ends: harmonics, cycle, repeats",
-    "simulate": "a manoeuvre: turn, zigzag, pull-out, spiral, stop, orders of a file",
-    "stability": "course stability, steady turning, IMO criteria",
-    "steer": "a page on which the ship is steered",
-    "yaw": "added yaw inertia and dissipation from records of a yaw rig",
-}
-"""A few words for each command that is not derived from its function."""
+"""Commands by what people do; those of other packages come last."""
 
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)
 """Names of the commands of tank2sim."""
@@ -59,9 +42,7 @@ COMMANDS = tuple(name for names in GROUPS.values() for name in names)
 
 def _groups() -> dict[str, list[tuple[str, str]]]:
     """Commands with a few words each, by group."""
-    groups = {
-        title: [(name, WORDS.get(name) or VERBS[name].words) for name in names] for title, names in GROUPS.items()
-    }
+    groups = {title: [(name, VERBS[name].words) for name in names] for title, names in GROUPS.items()}
     if others := [(name, verb.words) for name, verb in VERBS.items() if name not in COMMANDS]:
         groups["Of other packages"] = others
     return groups
@@ -80,14 +61,11 @@ class _Commands(click.Group):
                 formatter.write_dl([(name.ljust(width), words) for name, words in commands])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in WORDS:
-            if cmd_name not in VERBS.names():
-                return None
-            from tank2sim.cli.derived import command_of
+        if cmd_name not in VERBS.names():
+            return None
+        from tank2sim.cli.derived import command_of
 
-            return command_of(VERBS[cmd_name])
-        command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
-        return command
+        return command_of(VERBS[cmd_name])
 
     def invoke(self, ctx: click.Context) -> Any:
         """As of any group; a fault of an argument of the API is called by the option that sets it."""
@@ -101,7 +79,7 @@ class _Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and not args[0].startswith("-") and args[0] not in (known := (*WORDS, *VERBS.names())):
+        if args and not args[0].startswith("-") and args[0] not in (known := VERBS.names()):
             remedy = close_name(args[0], known)
             raise click.UsageError(f"{args[0]!r} is not a command; {remedy}", ctx)
         return super().resolve_command(ctx, args)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-import click
 from rich.console import Console
 from rich.markup import escape
 from rich.measure import Measurement
@@ -15,9 +13,9 @@ from rich.table import Table as Grid
 
 from tank2sim.answer.parts import Table, cell_text
 from tank2sim.answer.result import Result
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.escaping import file_name, one_line
-from tank2sim.files import JSON, PICTURE, STANDARD_OUTPUT, refuse_other_ending, writable_folder, write_together
+from tank2sim.files import PICTURE, STANDARD_OUTPUT, writable_folder, write_together
 from tank2sim.marks import marked
 
 screen = Console(highlight=False)
@@ -25,28 +23,6 @@ screen = Console(highlight=False)
 
 _WIDEST = 1000
 """Characters in which every table has room. Project choice."""
-
-
-def _standard_output(context: click.Context, parameter: click.Parameter, given: Path | None) -> Path | None:
-    if given != Path("-"):
-        screen.stderr = False
-        if given:
-            refuse_other_ending(given, JSON)
-        return given
-    if sys.__stdout__ is None:
-        raise InputError("--json", "-", "standard output is closed", "give the name of a file")
-    screen.stderr = True  # the summary goes there, so that standard output is JSON and nothing else
-    return STANDARD_OUTPUT
-
-
-json_option = click.option(
-    "--json",
-    "json_file",
-    type=click.Path(path_type=Path, dir_okay=False),
-    callback=_standard_output,
-    help="Write the full result as JSON; - is standard output, and the summary then goes to the error stream.",
-)
-"""``--json FILE``, the same on every command."""
 
 
 def show_table(shown: Table) -> None:
@@ -142,6 +118,8 @@ def write_outputs(
     if page:
         contents[page] = result.page()
     if plot and plot.suffix.lower() in PICTURE:
+        if not result.charts():
+            raise ArgumentError("plot", "", "there is no chart to draw", "leave it out")
         contents[plot] = result.picture(ending=plot.suffix)
     elif plot:
         writable_folder(plot)
@@ -149,48 +127,3 @@ def write_outputs(
         contents[plot / "report.html"] = result.page()
     write_together(contents, inputs=inputs, outputs=[path for path in (*files, page, plot, json) if path in contents])
     return [path for path in contents if path is not STANDARD_OUTPUT]
-
-
-def write_result(
-    result: Result[Any],
-    inputs: Iterable[str | Path],
-    *,
-    json_file: Path | None = None,
-    page: Path | None = None,
-    plot: Path | None = None,
-    plots: Path | None = None,
-    files: Mapping[Path, str | bytes] | Sequence[tuple[Path, str | bytes]] = (),
-) -> None:
-    """Write what of a result was asked for, all files or none.
-
-    Parameters
-    ----------
-    result : Result
-    inputs : paths
-        Files that must not be overwritten.
-    json_file, page, plot : Path, optional
-        JSON, page (HTML) and main chart (PNG, SVG or PDF by its ending).
-    plots : Path, optional
-        Folder for a picture of each chart, and the page as ``report.html``.
-    files : mapping or sequence of pairs, optional
-        Further files and their contents; pairs show that a file was given twice.
-
-    Raises
-    ------
-    InputError
-        A file cannot be written, is an input or is given twice.
-    """
-    further = list(files.items()) if isinstance(files, Mapping) else list(files)
-    contents = dict(further)
-    if json_file:
-        contents[json_file] = result.to_json()
-    if page:
-        contents[page] = result.page()
-    if plot:
-        contents[plot] = result.picture(ending=plot.suffix)
-    if plots:
-        writable_folder(plots)
-        contents |= {plots / f"{file_name(name)}.png": result.picture(name) for name in result.charts()}
-        contents[plots / "report.html"] = result.page()
-    given = [*(path for path, _ in further), json_file, page, plot]
-    write_together(contents, inputs=[Path(path) for path in inputs], outputs=given)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
+import sys
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
@@ -16,11 +18,29 @@ from click.core import ParameterSource
 from docstring_parser import Docstring, DocstringStyle, parse
 
 from tank2sim import arguments
+from tank2sim.api.commands import variants_of
 from tank2sim.api.verbs import Output, Verb, Written
-from tank2sim.cli.options import OutputFile
 from tank2sim.errors import InputError
-from tank2sim.files import JSON, PAGE, PICTURE, refuse_doubled, writable_folder
+from tank2sim.escaping import one_line
+from tank2sim.files import JSON, PAGE, PICTURE, STANDARD_OUTPUT, refuse_doubled, refuse_other_ending, writable_folder
 from tank2sim.units import in_words
+
+
+class OutputFile(click.Path):
+    """A file to be written, whose name ends as files of its kind do (:mod:`tank2sim.files`); a folder has no ending."""
+
+    def __init__(self, endings: Sequence[str] | None, **more: Any) -> None:
+        super().__init__(path_type=Path, **more)
+        self.endings = endings
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As of any parameter. Raises InputError if the name ends as files of another kind do."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if self.endings == JSON and str(path) == "-":
+            return STANDARD_OUTPUT
+        if self.endings is not None:
+            refuse_other_ending(path, self.endings)
+        return path
 
 
 class VerbCommand(click.Command):
@@ -32,33 +52,55 @@ class VerbCommand(click.Command):
         spread: list[str] = []
         taking = ""
         for word, following in pairwise([*args, "-"]):
-            if word in several and following.startswith("--"):
+            if word in several and following.startswith("-") and not _numbers(following):
                 raise click.UsageError(f"{word} is followed by nothing", ctx)
-            if word.startswith("-") and not _is_number(word):
+            numbers = _numbers(word)
+            if word.startswith("-") and not numbers:
                 taking = word if word in several else ""
                 spread += [] if taking else [word]
+            elif taking:
+                spread += [part for value in numbers or [word] for part in (taking, value)]
             else:
-                spread += [taking, word] if taking else [word]
+                spread.append(word)
         return super().parse_args(ctx, spread)
 
 
-def _is_number(word: str) -> bool:
+def _numbers(word: str) -> list[str]:
+    """The numbers of a word like ``25,-30``; empty if it is anything else."""
+    parts = word.split(",")
     try:
-        float(word)
+        list(map(float, parts))
     except ValueError:
-        return False
-    return True
+        return []
+    return parts
 
 
 def command_of(verb: Verb) -> click.Command:
     """Return the command of a verb."""
-    others = {flag: other.verb for flag, other in verb.variants.items()}  # type: ignore[attr-defined]
-    own: dict[str | None, click.Parameter] = {}
-    for each in (verb, *others.values()):
+    others = variants_of(verb)
+    own: dict[str, click.Parameter] = {}
+    takers: dict[str, list[str]] = {}
+    for flag, each in {"": verb, **others}.items():
         for parameter in _own_parameters(each):
-            own.setdefault(parameter.name, parameter)
-    flags = [_option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.") for flag, other in others.items()]
+            if isinstance(parameter, click.Option) or not (flag and each.takes):
+                own.setdefault(parameter.name or "", parameter)
+                takers.setdefault(parameter.name or "", []).append(flag)
+    for named, flags in takers.items():
+        parameter = own[named]
+        if "" not in flags and isinstance(parameter, click.Option):
+            parameter.required = False
+            if needed := [flag for flag in flags if f"--{flag}" not in parameter.opts]:
+                parameter.help = f"{parameter.help} [only with {_either(needed, others)}]"
     documented, _ = _documented(verb.function)
+    usual = f"By default CARD is {verb.default_ship}." if verb.default_ship else ""
+    text = "\n\n".join(filter(None, (documented.short_description, documented.long_description, usual)))
+    if inspect.signature(verb.function).return_annotation == "str":
+        return VerbCommand(verb.name, params=[*own.values()], callback=lambda **given: _print(verb, given), help=text)
+    switches = [
+        _option([f"--{flag}"], is_flag=True, help=f"Instead: {other.words}.")
+        for flag, other in others.items()
+        if not other.takes and not _argument_of(flag, other)
+    ]
     main = [] if any("-o" in parameter.opts for parameter in own.values()) else ["-o"]
     shared = [
         _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page.",
@@ -69,15 +111,21 @@ def command_of(verb: Verb) -> click.Command:
         _option(["--quiet"], is_flag=True, help="Print doubts and errors alone."),
         _option(["--verbose"], is_flag=True, help="Print every table."),
     ]  # fmt: skip
-    text = "\n\n".join(part for part in (documented.short_description, documented.long_description) if part)
 
     def run(**given: Any) -> int:
-        chosen = next((flag for flag in others if given[flag]), "")
-        problem = f"does not go with --{chosen}" if chosen else f"needs {' or '.join(f'--{flag}' for flag in others)}"
-        _refuse_foreign(others.get(chosen, verb), problem, own)
-        return _run(others.get(chosen, verb), given)
+        first = next(iter(own), "")
+        chosen = next((flag for flag, other in others.items() if _is_chosen(flag, other, given, first)), "")
+        for named, flags in takers.items():
+            if chosen not in flags and named != first and _was_given(named):
+                problem = (
+                    f"does not go with {_either([chosen], others)}" if chosen else f"needs {_either(flags, others)}"
+                )
+                raise InputError(own[named].opts[0], "", problem, "leave it out" if chosen else "add it")
+        if (called := others.get(chosen, verb)).takes:
+            given[next(iter(inspect.signature(called.function).parameters))] = given[first]
+        return _run(called, given)
 
-    return VerbCommand(verb.name, params=[*own.values(), *flags, *shared], callback=run, help=text)
+    return VerbCommand(verb.name, params=[*own.values(), *switches, *shared], callback=run, help=text)
 
 
 def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
@@ -89,17 +137,31 @@ def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
         yield from _output_parameters(output)
 
 
-def _refuse_foreign(verb: Verb, problem: str, known: Mapping[str | None, click.Parameter]) -> None:
-    """Refuse options that were given and that belong to another variant of the command."""
-    context, own = click.get_current_context(), {one.name for one in _own_parameters(verb)}
-    for name, parameter in known.items():
-        if name not in own and context.get_parameter_source(name or "") is ParameterSource.COMMANDLINE:
-            raise InputError(parameter.opts[0], "", problem, "leave it out" if "not" in problem else "add it")
+def _argument_of(flag: str, verb: Verb) -> str:
+    """The argument of a variant whose option chooses it; empty if it is chosen by a flag."""
+    return next((argument for argument, option in verb.options.items() if option == f"--{flag}"), "")
+
+
+def _is_chosen(flag: str, verb: Verb, given: Mapping[str, Any], first: str) -> bool:
+    """Whether the command line asks for a variant."""
+    return verb.takes(given[first]) if verb.takes else bool(given[_argument_of(flag, verb) or flag])
+
+
+def _either(flags: Sequence[str], others: Mapping[str, Verb]) -> str:
+    """Variants in words: ``--tune or --through``."""
+    kinds = [f"a {flag.replace('_', ' ')}" if others[flag].takes else f"--{flag}" for flag in flags]
+    return " or ".join(kinds)
+
+
+def _was_given(name: str) -> bool:
+    context = click.get_current_context()
+    on_line = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+    return on_line and context.params[name] not in (None, ())
 
 
 def _documented(function: Callable[..., Any]) -> tuple[Docstring, dict[str, str]]:
     """The docstring of a function, and the description of each parameter in plain text."""
-    plain = re.sub(r":\w+:`[.~]?(?:[\w.]+\.)?(\w+)`|``", lambda found: found[1] or "", function.__doc__ or "")
+    plain = re.sub(r":\w+:`[.~]?(?:[\w.]+\.)?(\w+)`|``?", lambda found: found[1] or "", function.__doc__ or "")
     documented = parse(plain, style=DocstringStyle.NUMPYDOC)
     words = {one.arg_name: " ".join((one.description or "").split()) for one in documented.params}
     return documented, {name.strip(): text for names, text in words.items() for name in names.split(",")}
@@ -147,34 +209,40 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
     if _is_of("Vessel", kind):
         change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
                          "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
-        required = one.default is inspect.Parameter.empty
-        card = click.Argument([one.name], metavar="CARD", required=required)
-        return [card, change] if required else [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+        if one.default is not inspect.Parameter.empty:
+            return [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+        usual = verb.default_ship or None
+        card = "[CARD]" if usual else "CARD"
+        return [click.Argument([one.name], metavar=card, required=not usual, default=usual), change]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
-        required = one.default is inspect.Parameter.empty
+        usual = None if one.default is inspect.Parameter.empty else one.default
+        required = usual is None and (written.by_function or one.default is inspect.Parameter.empty)
         return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
-                        required=required)]  # fmt: skip
+                        required=required, default=usual, show_default=bool(usual))]  # fmt: skip
     required = one.default is inspect.Parameter.empty
-    if one.kind is not inspect.Parameter.KEYWORD_ONLY and (required or one.name == _first_list(verb.function)):
+    by_position = one.kind is not inspect.Parameter.KEYWORD_ONLY and one.name not in verb.options
+    if by_position and (required or one.name == _first_list(verb.function)):
         return [click.Argument([one.name], nargs=-1 if several else 1, required=required, type=_type(kind, several))]
     default = None if one.default in (inspect.Parameter.empty, None) else one.default
     if several and isinstance(default, str):
         default = (default,)
     words = "; ".join(f"{choice}: {text}" for choice, text in verb.choices.get(one.name, {}).items())
-    shown: dict[str, Any] = {"help": " ".join(filter(None, (helps.get(one.name), words))), "default": default}
+    text = " ".join(filter(None, (helps.get(one.name), words)))
+    shown: dict[str, Any] = {"help": text, **({"required": True} if required else {"default": default})}
     stem, unit = _stem(one.name)
-    option = f"--{stem.replace('_', '-')}"
-    names = list(dict.fromkeys((option, f"--{one.name.replace('_', '-')}")))
+    option = verb.options.get(one.name) or f"--{stem.replace('_', '-')}"
+    names = list(dict.fromkeys((option, verb.options.get(one.name) or f"--{one.name.replace('_', '-')}")))
     if kind is bool:
         flags = [f"{option}/--no-{option[2:]}"] if one.default else names
         return [_option(flags, name=one.name, is_flag=True, **shown)]
-    if one.name in verb.texts:
-        several = several or any(get_origin(part) is Mapping for part in _parts(kind))
-        return [_option(names, name=one.name, multiple=bool(several), metavar=stem.upper(), **shown)]
-    metavar = unit.upper().replace("/", "P") if unit else None
-    shown["show_default"] = default not in (None, "", ())
-    return [_option(names, name=one.name, type=_type(kind, several), multiple=bool(several), metavar=metavar, **shown)]
+    read = one.name in verb.texts
+    several = several or (read and any(get_origin(part) is Mapping for part in _parts(kind)))
+    metavar = unit.upper().replace("/", "P") if unit and not read else stem.upper() if several or read else None
+    shown |= {"multiple": bool(several), "metavar": f"{metavar} ..." if several else metavar}
+    if not read:
+        shown |= {"type": _type(kind, several), "show_default": default not in (None, "", ())}
+    return [_option(names, name=one.name, **shown)]
 
 
 def _written(kind: Any) -> Written | None:
@@ -230,14 +298,22 @@ def _output_parameters(output: Output) -> list[click.Parameter]:
     return found
 
 
+def _print(verb: Verb, given: Mapping[str, Any]) -> None:
+    """Call a verb whose result is a text, and print it."""
+    click.echo(verb.function(**_values_for(verb.function, given, verb.texts, (), [])))
+
+
 def _run(verb: Verb, given: dict[str, Any]) -> int:
     """Call a verb with what the command line gave, write its files, and print its result."""
     from tank2sim.cli.console import show_result, write_outputs
     from tank2sim.cli.progress import showing_stages
 
     values, changes = dict(given), given.get("set", ())
-    named = [_value_of(output, values) for output in verb.outputs if output.endings != ()]  # folders may be shared
-    refuse_doubled(path for path in (*named, values["page"], values["json"]) if path is not None)
+    named = [_value_of(output, values) for output in verb.outputs]
+    outputs = [path for path in (*named, values["page"], values["json"]) if path is not None]
+    refuse_doubled(outputs)
+    _refuse_unplaced(outputs, [values["plot"], *named])
+    _refuse_idle(output for output, path in zip(verb.outputs, named, strict=True) if path is None)
     inputs: list[Path] = []
     with ExitStack() as stack:
         call = _values_for(verb.function, values, verb.texts, changes, inputs)
@@ -245,7 +321,8 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             call["report"] = stack.enter_context(showing_stages(verb.words))
         result = verb.function(**call)
         contents: dict[Path, str | bytes] = {}
-        if any(_written(kind) for _, kind in _arguments(verb.function)):
+        marks = (_written(kind) for _, kind in _arguments(verb.function))
+        if any(mark and not mark.by_function for mark in marks):
             contents |= result.files
         for output in verb.outputs:
             if (path := _value_of(output, values)) is None:
@@ -263,8 +340,25 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             contents |= made
     given_files = {name: values[name] for name in ("page", "plot", "json")}
     written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
-    show_result(result, written, quiet=values["quiet"], verbose=values["verbose"])
-    return verb.exit_code(result)
+    show_result(result, [*result.written, *written], quiet=values["quiet"], verbose=values["verbose"])
+    for fault in result.faults:
+        print(f"tank2sim: {one_line(fault)}", file=sys.stderr)
+    return 2 if result.faults else verb.exit_code(result)
+
+
+def _refuse_unplaced(outputs: Iterable[Path], made: Sequence[Path | None]) -> None:
+    """Refuse, before work that takes long, files in folders that neither exist nor are `made` with the outputs."""
+    for path in outputs:
+        if not path.parent.is_dir() and path.parent not in made:
+            raise InputError(path, "", "cannot be written: its folder does not exist", "give one that exists")
+
+
+def _refuse_idle(outputs: Iterable[Output]) -> None:
+    """Refuse options of files that are not written."""
+    for output in outputs:
+        for option in _output_parameters(output)[1:]:
+            if _was_given(option.name or ""):
+                raise InputError(option.opts[0], "", f"needs {output.option}", "add it")
 
 
 def _value_of(output: Output, values: Mapping[str, Any]) -> Path | None:

@@ -22,7 +22,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.marks import ASSUMED
 from tank2sim.units import from_si
 
@@ -117,7 +117,7 @@ def _of_craft(card: CraftCard) -> list[CardParameter]:
     return found
 
 
-def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) -> CardParameter:
+def find_parameter(parameters: Sequence[CardParameter], name: str, argument: str) -> CardParameter:
     """The parameter of a user's name, either its full name or that in the card.
 
     Raises
@@ -132,7 +132,7 @@ def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) 
     remedy = (
         f"did you mean {close[0]}?" if close else f"there are: {', '.join(parameter.short for parameter in parameters)}"
     )
-    raise InputError(option, name, "is not a non-zero parameter of this card", remedy)
+    raise ArgumentError(argument, name, "is not a non-zero parameter of this card", remedy)
 
 
 def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
@@ -231,9 +231,7 @@ def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     return found
 
 
-def agreed_by_name(
-    agreed: Mapping[str, float], parameters: Sequence[CardParameter], option: str = "--agreed"
-) -> dict[str, float]:
+def agreed_by_name(agreed: Mapping[str, float], parameters: Sequence[CardParameter]) -> dict[str, float]:
     """An agreed variation (Kc %, by names as a user writes them) by the names of parameters.
 
     Raises
@@ -243,9 +241,9 @@ def agreed_by_name(
     """
     found: dict[str, float] = {}
     for name, percent in agreed.items():
-        parameter = find_parameter(parameters, name, option).name
+        parameter = find_parameter(parameters, name, "joint_variation").name
         if parameter in found:
-            raise InputError(option, name, "is given twice", "give each parameter once")
+            raise ArgumentError("joint_variation", name, "is given twice", "give each parameter once")
         found[parameter] = percent
     return found
 

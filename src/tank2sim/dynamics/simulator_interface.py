@@ -10,7 +10,7 @@ import casadi as ca
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.effects.surroundings import relative_air
 from tank2sim.dynamics.model import Input, Model, Quantity
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 
 _FORCES = (("X", "N", "Surge force"), ("Y", "N", "Sway force"), ("N", "N.m", "Yaw moment"))
 
@@ -176,5 +176,5 @@ def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[
             remedy = "X and Y (N), N (N m), x and y (m) are known"
             if name in EXTERNAL_INPUTS_OF_ROLL:
                 remedy = "it acts on a ship that rolls: give [roll] on the card"
-            raise InputError("external", name.removeprefix("external."), "is not an external force", remedy)
+            raise ArgumentError("external", name.removeprefix("external."), "is not an external force", remedy)
     return inputs

@@ -11,11 +11,12 @@ from functools import partial
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tank2sim.arguments import MOST_EFFECTS
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
 from tank2sim.gap.diagnosis.residuals import (
@@ -73,10 +74,6 @@ RIVALS = 12
 EXPLAINED = 0.2
 """Coefficients explain a gap that they reduce to less than this share, or to noise (project choice)."""
 
-MOST_EFFECTS = 4
-"""Effects that are named at most: more parameters than these are rarely determined by a day of trials (project
-choice)."""
-
 
 @dataclass(frozen=True)
 class GapOptions:
@@ -89,7 +86,7 @@ class GapOptions:
     without : tuple of str
         Effects not to try.
     max_effects : int
-        Effects named at most, 1 to :data:`MOST_EFFECTS`.
+        Effects named at most, 1 to :data:`.MOST_EFFECTS`.
     workers : int, optional
         Processes; by default as many as there are processors.
     false_discovery : float
@@ -263,10 +260,10 @@ def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tupl
         if name not in possible:
             have = any(entry.name == name for entry in card.effects)
             why = "is on the card already" if have else "cannot be tried on this card and these trials"
-            raise InputError("--effects", "", f"{name} {why}", f"possible are: {', '.join(possible)}")
+            raise ArgumentError("effects", "", f"{name} {why}", f"possible are: {', '.join(possible)}")
     names = tuple(name for name in options.effects or possible if name not in options.without)
     if not names:
-        raise InputError("--without", "", "leaves no effect to look for", f"possible are: {', '.join(possible)}")
+        raise ArgumentError("without", "", "leaves no effect to look for", f"possible are: {', '.join(possible)}")
     return names
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.form import ThrusterSection
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import read_table
+from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.trials import Trial
 
 CRAFT_SIGNALS = ("x_m", "y_m", "psi_rad", "r_radps", "u_mps", "v_mps")
@@ -25,7 +25,7 @@ LEAST_CRAFT_ROWS = 20
 """Fewest rows of a trial. Project choice: a few seconds at the rates of small receivers."""
 
 
-def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
+def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]) -> Trial:
     """A trial with the column ``n_<name>_rpm`` or ``order_<name>`` of each thruster, as ``tank2sim log`` cuts it; SI.
 
     An order is a share of the largest revolutions of the card, positive ahead, and becomes the signal
@@ -35,7 +35,8 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
 
     Parameters
     ----------
-    path : Path
+    path : Path or CsvTable
+        The file, or the table of a data frame.
     thrusters : sequence of ThrusterSection
         Thrusters of the card.
 
@@ -44,7 +45,8 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
     InputError
         Revolutions and orders, positions or heading are missing, an order is beyond 1, or the time does not rise.
     """
-    table = read_table(Path(path)).si()
+    table = read_table(path).si()
+    path = table.path
     columns, time = table.columns, table.increasing("t_s")
     if len(time) < LEAST_CRAFT_ROWS:
         raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
@@ -68,7 +70,7 @@ def read_craft_trial(path: Path, thrusters: Sequence[ThrusterSection]) -> Trial:
     known = np.isfinite(signals["psi_rad"])
     psi = signals["psi_rad"].copy()
     psi[known] = np.unwrap(psi[known])
-    return Trial(Path(path), time, signals | {"psi_rad": psi})
+    return Trial(path, time, signals | {"psi_rad": psi})
 
 
 def _azimuths(path: Path, thrusters: Sequence[ThrusterSection], columns: Mapping[str, Array]) -> dict[str, Array]:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import csv
 import difflib
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.units import to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the colon of https://
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -54,17 +58,19 @@ class CsvTable:
     Parameters
     ----------
     path : Path
-        The file.
+        The file, or the name of a data frame.
     columns : dict
         Name to values, (rows,), nan where a cell is empty.
     lines : array of int, (rows,)
-        Line of the file (from 1) of each row.
+        Line of the file (from 1) of each row; of a data frame its row (from 0).
     comments : dict
         Key to text of the lines ``# key: text``; the texts of a repeated key are joined by line breaks.
     remarks : tuple of str
         The other comment lines.
     headings : dict
         Name of a column to what it is called in the file, where :meth:`si` has renamed it.
+    counts : str
+        Unit of `lines` in messages.
     """
 
     path: Path
@@ -73,6 +79,7 @@ class CsvTable:
     comments: dict[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     headings: dict[str, str] = field(default_factory=dict)
+    counts: str = "line"
 
     def heading(self, name: str) -> str:
         """What a column is called in the file."""
@@ -80,7 +87,7 @@ class CsvTable:
 
     def place(self, row: int, name: str) -> str:
         """Where a cell is, for messages: ``line 12, column psi_deg``."""
-        return f"line {self.lines[row]}, column {self.heading(name)}"
+        return f"{self.counts} {self.lines[row]}, column {self.heading(name)}"
 
     def column(self, name: str) -> Array:
         """Values of a column, (rows,).
@@ -174,8 +181,55 @@ class CsvTable:
         return replace(self, columns=columns, headings=headings)
 
 
-def read_table(path: Path | str) -> CsvTable:
-    """Read a CSV table of numbers.
+def is_frame(given: object) -> TypeGuard[pd.DataFrame]:
+    """Whether something is a data frame; pandas is not imported for it."""
+    pandas = sys.modules.get("pandas")
+    return pandas is not None and isinstance(given, pandas.DataFrame)
+
+
+def table_or_path(given: pd.DataFrame | str | Path, name: str) -> CsvTable | Path:
+    """Return what :func:`read_table` takes: the table of a data frame, or a path. Raises as :func:`table_of_frame`."""
+    return table_of_frame(given, name) if is_frame(given) else Path(given)
+
+
+def table_of_frame(frame: pd.DataFrame, name: str) -> CsvTable:
+    """Return the table of a data frame; its ``attrs`` are the comments of a file, and a named index is a column.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Numbers; columns are named as in a file.
+    name : str
+        Name in messages and results, where a file has its path.
+
+    Raises
+    ------
+    InputError
+        It has no rows, a column is given twice, or holds anything but finite numbers and gaps.
+    """
+    if frame.index.name and frame.index.name not in frame.columns:
+        frame = frame.reset_index()
+    path, columns = Path(name), {}
+    if frame.empty:
+        raise InputError(path, "", "has no rows or no columns", "give a data frame with the measured values")
+    for number, column in enumerate(frame.columns):
+        place = f"column {column}"
+        if str(column) in columns:
+            raise InputError(path, place, "is given twice", "delete or rename one of them")
+        series = frame.iloc[:, number]
+        if series.dtype.kind not in "iuf":
+            raise InputError(path, place, "does not hold numbers", "convert it to numbers, NaN where nothing was read")
+        values = series.to_numpy(dtype=float, na_value=np.nan)
+        if too_large := np.flatnonzero(np.abs(values) > LARGEST).tolist():
+            problem = f"{values[too_large[0]]:g} is too large"
+            raise InputError(path, f"row {too_large[0]}, {place}", problem, f"at most {LARGEST:g} was expected")
+        columns[str(column)] = values
+    comments = {str(key): str(value) for key, value in frame.attrs.items()}
+    return CsvTable(path, columns, np.arange(len(frame)), comments, counts="row")
+
+
+def read_table(path: Path | str | CsvTable) -> CsvTable:
+    """Read a CSV table of numbers; a table is returned unchanged.
 
     A byte order mark, CRLF, blank lines, and spaces around names and numbers do not matter.
 
@@ -185,6 +239,8 @@ def read_table(path: Path | str) -> CsvTable:
         The file is missing or not UTF-8; there is no header, a column has no name or the name of another; there are
         no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal point.
     """
+    if isinstance(path, CsvTable):
+        return path
     path = Path(path)
     text = read_text(path)
     plain = _plain_table(path, text)

@@ -9,11 +9,11 @@ import numpy as np
 
 from tank2sim.errors import InputError
 from tank2sim.plugins import PluginWarning, Registry
-from tank2sim.records.csv_table import SHORTEST_STEP
+from tank2sim.records.csv_table import SHORTEST_STEP, CsvTable
 from tank2sim.records.esso_osaka import ESSO_OSAKA
 from tank2sim.records.number_rows import read_bytes_as_text
 from tank2sim.records.simman import SIMMAN
-from tank2sim.records.trial_csv import TRIAL_CSV
+from tank2sim.records.trial_csv import TRIAL_CSV, read_trial_csv
 from tank2sim.records.trials import Trial, TrialReader, fault_of
 
 HEAD_BYTES = 4096
@@ -50,13 +50,13 @@ def _recognises(reader: TrialReader, text: str) -> bool:
         return False
 
 
-def read_trial_file(path: Path | str, *, rising: bool = True) -> Trial:
+def read_trial_file(path: Path | str | CsvTable, *, rising: bool = True) -> Trial:
     """Read a trial of any format of :data:`READERS`; its beginning shows which.
 
     Parameters
     ----------
-    path : path
-        The file.
+    path : path or CsvTable
+        The file, or the table of a data frame, which is read as the project's CSV.
     rising : bool
         Refuse a time that does not rise from row to row; False lets it through, for the audit to judge.
 
@@ -65,9 +65,12 @@ def read_trial_file(path: Path | str, *, rising: bool = True) -> Trial:
     InputError
         The file is missing or of no known format, or its content is faulty; the message names line and column.
     """
-    path = Path(path)
-    reader = reader_of(path)
-    trial = reader.read(path)
+    if isinstance(path, CsvTable):
+        reader, trial = TRIAL_CSV, read_trial_csv(path)
+    else:
+        reader = reader_of(Path(path))
+        trial = reader.read(Path(path))
+    path = trial.path
     if (origin := READERS.origin(reader.name)) and (problem := fault_of(trial)):
         raise origin.fault(f"{path.name}: {problem}")
     if np.isnan(trial.time_s).any():

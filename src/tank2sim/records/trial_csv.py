@@ -18,7 +18,7 @@ COMMENT_KEYS = ("rudder_sign", "noise", "scale")
 """Comments that are understood."""
 
 
-def read_trial_csv(path: Path | str) -> Trial:
+def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times unchanged.
 
     Comment lines: ``# rudder_sign: port`` turns rudder angles and orders to positive to starboard; ``# noise: u_mps

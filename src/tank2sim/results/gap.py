@@ -17,11 +17,12 @@ from tank2sim.cards.covariance import not_referring
 from tank2sim.cards.covariance_reading import derived_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
+from tank2sim.files import folder_made
 from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.outcome.correct_sensors import REMAINING_FAULTS, correct_sensor_faults, corrected_text
-from tank2sim.gap.outcome.export import NEXT_TEST_FILE, joined, replaces
-from tank2sim.gap.outcome.files import CORRECTED, REPORT, SURROUNDED, GapFiles, folder_made, put
+from tank2sim.gap.outcome.export import NEXT_TEST_FILE, gap_study, joined, replaces
+from tank2sim.gap.outcome.files import CORRECTED, REPORT, SURROUNDED, GapFiles, put
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.study import EffectFound, GapStudy
 from tank2sim.gap.outcome.surroundings import with_surroundings
@@ -154,12 +155,18 @@ class GapResult(Result[GapStudy]):
         SI and radians; None if the result was read from its JSON.
     fitted, held : Measured
         Trials that name the effect, and trials that only prove it.
+    written : tuple of Path
+        Files that were written.
+    remarks : tuple of str
+        Messages about them.
     """
 
     study: GapStudy
     gap: Gap | None = None
     fitted: Measured = NO_TRIALS
     held: Measured = NO_TRIALS
+    written: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
     command: ClassVar[str] = "gap"
 
     @property
@@ -264,8 +271,13 @@ class GapResult(Result[GapStudy]):
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Messages about the trials; objections to the verdict are in :attr:`headline`."""
-        return self.study.notices[len(self.study.cautions) :]
+        """Messages about trials and files; objections to the verdict are in :attr:`headline`."""
+        return *self.study.notices[len(self.study.cautions) :], *self.remarks
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The trials."""
+        return tuple(trial.path for trial in (*self.fitted.trials, *self.held.trials))
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
@@ -366,10 +378,21 @@ class GapResult(Result[GapStudy]):
         InputError
             The folder cannot be written.
         """
-        inputs = [trial.path for trial in (*self.fitted.trials, *self.held.trials)]
-        with folder_made(Path(folder)):
-            files, notices = self.files(Path(folder))
-            return *notices, *put(files, Path(folder), inputs)
+        return self.written_to(Path(folder)).remarks
+
+    def written_to(self, folder: Path) -> GapResult:
+        """Write :meth:`files` as :meth:`save` does; the result with them and with messages about them.
+
+        Parameters
+        ----------
+        folder : Path
+        """
+        with folder_made(folder):
+            files, notices = self.files(folder)
+            removed = put(files, folder, [Path(self._gap.card.source), *self.inputs])
+        names = tuple(sorted(path.relative_to(folder).as_posix() for path in files))
+        study = replace(self.study, files=names)
+        return replace(self, study=study, written=tuple(files), remarks=(*notices, *removed))
 
     @property
     def _gap(self) -> Gap:
@@ -402,6 +425,18 @@ class GapResult(Result[GapStudy]):
             text = with_fitted_trials(text, source, self.fitted.trials)
         parse_card(text, source)
         return text
+
+
+def gap_result(gap: Gap, fitted: Measured, held: Measured) -> GapResult:
+    """The result of a search with its trials.
+
+    Parameters
+    ----------
+    gap : Gap
+    fitted, held : Measured
+    """
+    files = {trial.name: trial.path.name for trial in (*fitted.trials, *held.trials)}
+    return GapResult(gap_study(gap, files), gap, fitted, held)
 
 
 def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[str]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
 import altair as alt
@@ -34,10 +35,22 @@ class FleetResult(Result[FleetStudy]):
     study : FleetStudy
     linked : bool
         Whether the page lies in the folder of the results, and leads to the page of each ship.
+    origins : mapping
+        Ship to the origin of its results: this search or an earlier one.
+    remarks : tuple of str
+        Messages about the folder of the results.
+    inputs : tuple of Path
+        Cards and trials.
+    written : tuple of Path
+        Files of the fleet; those of the ships are listed in their ``gap.json``.
     """
 
     study: FleetStudy
     linked: bool = False
+    origins: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    inputs: tuple[Path, ...] = ()
+    written: tuple[Path, ...] = ()
     command: ClassVar[str] = "gap"
 
     @property
@@ -52,11 +65,25 @@ class FleetResult(Result[FleetStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Number of ships with each verdict, and without a result."""
+        """Number of ships with each verdict and without a result; the origin of each result."""
         study = self.study
         counts = [f"{word}: {study.verdicts[word]}" for word in GAP_VERDICTS if word in study.verdicts]
         counts += [f"without a result: {len(self._faults)}"] if self._faults else []
-        return (f"{study.fleet}: {len(study.ships)} ships ({', '.join(counts)}).",)
+        origins = (f"{ship}: {origin}" for ship, origin in self.origins.items())
+        return f"{study.fleet}: {len(study.ships)} ships ({', '.join(counts)}).", *origins
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Messages about the ships and the folder of the results."""
+        return *self.remarks, *self.study.notices
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The ships without a result, those with one reason together."""
+        ships: dict[str, list[str]] = {}
+        for ship in self._faults:
+            ships.setdefault(ship.fault, []).append(ship.folder)
+        return tuple(f"{', '.join(names)}: {fault}" for fault, names in ships.items())
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

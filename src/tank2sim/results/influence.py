@@ -12,13 +12,12 @@ import numpy as np
 
 from tank2sim.analysis.influence.card_influence import FigureErrors, InfluenceStudy
 from tank2sim.analysis.tuning.result import FEWEST, TunedStudy, TunedTarget
-from tank2sim.analysis.tuning.targets import TARGET_OPTION
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.marks import assumed_words
 from tank2sim.results.ensembles import figures_section
 from tank2sim.results.influence_charts import (
@@ -329,10 +328,10 @@ class TuningResult(InfluenceResult):
             The targets cannot be reached, or the result was read from its JSON.
         """
         if not self.reached:
-            remedy = "widen --within or state --bound, or give a nearer target"
-            raise InputError(TARGET_OPTION, "", self.tuned.contradiction_text, remedy)
+            remedy = "widen within, state bounds, or give a nearer target"
+            raise ArgumentError("targets", "", self.tuned.contradiction_text, remedy)
         if self.tuned_card is None:
-            raise InputError(TARGET_OPTION, "", "the JSON of a result has no card", "tune the card again")
+            raise ArgumentError("targets", "", "the JSON of a result has no card", "tune the card again")
         return self.tuned_card
 
     @property

@@ -97,6 +97,12 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         members = self.study.ensemble.notices if self.study.ensemble else ()
         return tuple(dict.fromkeys([*self.study.notices, *members]))
 
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The file of the orders."""
+        kind, _, file = self.study.manoeuvre.partition(":")
+        return (Path(file),) if kind == "file" else ()
+
     @cached_property
     def figures(self) -> dict[str, float]:
         """Manoeuvring figures (ITTC 7.5-04-02-01) by name with unit; entries of lists as ``overshoot_1_deg``."""

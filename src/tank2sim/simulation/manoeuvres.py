@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, read_table
 from tank2sim.simulation.running import Running
 from tank2sim.simulation.thruster_manoeuvres import (
@@ -317,7 +317,7 @@ class Orders:
                 raise InputError(self.source, name, "is not an input of this ship", remedy)
         end = float(self.times[-1]) if duration is None else duration
         if end <= 0:
-            raise InputError(self.source, "column t_s", "ends at 0 s", "add the time to which to run, or --duration")
+            raise InputError(self.source, "column t_s", "ends at 0 s", "add the time to which to run, or a duration")
         # Repeated equal orders are merged: fewer, longer calls into machine code.
         table = np.column_stack(list(self.inputs.values()))
         new = np.concatenate([[True], np.any(np.diff(table, axis=0) != 0, axis=1)])
@@ -361,13 +361,13 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
         close = difflib.get_close_matches(kind, [*makers, *_BY_THRUSTERS, "stop", "file"], n=1)
         hint = f"did you mean {close[0]}? " if close and close[0] != kind else ""
         remedy = f"{hint}one of: {MANOEUVRE_FORMS}; with thrusters {THRUSTER_FORMS}"
-        raise InputError("--manoeuvre", "", f"{text!r} is not a manoeuvre", remedy)
+        raise ArgumentError("manoeuvre", "", f"{text!r} is not a manoeuvre", remedy)
     angles = [float(group) for group in found.groups() if group is not None]
     if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
         remedy = (
             "angles lie between 0 and 90 deg; the heading of a zigzag is positive, its rudder begins to its own side"
         )
-        raise InputError("--manoeuvre", "", f"{text!r} has an angle out of bounds", remedy)
+        raise ArgumentError("manoeuvre", "", f"{text!r} has an angle out of bounds", remedy)
     return makers[kind][1](angles)
 
 
@@ -381,7 +381,7 @@ _BY_THRUSTERS: dict[str, Callable[[float], ThrusterManoeuvre]] = {
 def _parse_thrusters(kind: str, found: re.Match[str] | None, text: str) -> Manoeuvre:
     rpm = float(found[1]) if found else 0.0
     if rpm == 0:
-        raise InputError("--manoeuvre", "", f"{text!r} has no revolutions", f"give them in rpm: {THRUSTER_FORMS}")
+        raise ArgumentError("manoeuvre", "", f"{text!r} has no revolutions", f"give them in rpm: {THRUSTER_FORMS}")
     return _BY_THRUSTERS[kind](rpm * math.tau / 60)
 
 
@@ -453,13 +453,13 @@ def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
 def _parse_stop(text: str) -> Stop:
     found = re.fullmatch(r"stop(?::([+-]?\d+(?:\.\d+)?))?", text)
     if found is None:
-        raise InputError("--manoeuvre", "", f"{text!r} is not a manoeuvre", f"one of: {MANOEUVRE_FORMS}")
+        raise ArgumentError("manoeuvre", "", f"{text!r} is not a manoeuvre", f"one of: {MANOEUVRE_FORMS}")
     if found[1] is None:
         return Stop()
     revolutions = float(found[1]) * math.tau / 60
     if revolutions > 0:
         remedy = "revolutions to stop with are negative (astern) or 0, in rpm"
-        raise InputError("--manoeuvre", "", f"{text!r} orders the engine ahead", remedy)
+        raise ArgumentError("manoeuvre", "", f"{text!r} orders the engine ahead", remedy)
     return Stop(revolutions)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
@@ -73,9 +73,8 @@ def simulate(
     """
     _refuse_other_steering(model, manoeuvre)
     if duration_s is not None and not 0 < duration_s < LONGEST_RUN_S:
-        raise InputError(
-            "--duration", "", f"is {duration_s:g} s", f"more than 0 and less than {LONGEST_RUN_S:g} s was expected"
-        )
+        remedy = f"give more than 0 and less than {LONGEST_RUN_S:g} s"
+        raise ArgumentError("duration_s", "", f"is {duration_s:g} s", remedy)
     integrator = integrator or Integrator(model)
     values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
     start = manoeuvre.start(model) if isinstance(manoeuvre, ThrusterManoeuvre) else {}

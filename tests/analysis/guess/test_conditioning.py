@@ -219,10 +219,10 @@ def test_dimensions_are_bounded_at_what_ships_have(name: str, low: float, high: 
 @pytest.mark.parametrize(
     ("changed", "option"),
     [
-        ({"beam_m": 320.0 / 2.95, "draught_m": 38.0}, "--beam"),
-        ({"beam_m": 320.0 / 12.1, "draught_m": 10.0}, "--beam"),
-        ({"draught_m": 58.0 / 1.45}, "--draught"),
-        ({"draught_m": 58.0 / 8.1}, "--draught"),
+        ({"beam_m": 320.0 / 2.95, "draught_m": 38.0}, "beam_m"),
+        ({"beam_m": 320.0 / 12.1, "draught_m": 10.0}, "beam_m"),
+        ({"draught_m": 58.0 / 1.45}, "draught_m"),
+        ({"draught_m": 58.0 / 8.1}, "draught_m"),
         ({"beam_m": 320.0 / 3.3, "draught_m": 38.0}, ""),
         ({"beam_m": 320.0 / 11.9, "draught_m": 10.0}, ""),
         ({"draught_m": 58.0 / 1.55}, ""),

@@ -95,7 +95,7 @@ def test_a_figure_that_a_craft_cannot_show_is_refused(text) -> None:
 
 @pytest.mark.parametrize("text", ["advance_m@spin:400", "final_speed_mps@straight:", "final_speed_mps@straight:0"])
 def test_a_figure_that_does_not_exist_is_refused(text) -> None:
-    with pytest.raises(InputError, match="--figure"):
+    with pytest.raises(InputError, match="figures"):
         parse_figure(text)
 
 

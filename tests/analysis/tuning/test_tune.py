@@ -153,9 +153,9 @@ def test_the_tuned_card_reaches_its_targets_and_bears_the_old_values(card) -> No
 @pytest.mark.parametrize(
     ("means", "words"),
     [
-        ({"hold": ["Ndd"]}, ["--hold", "Ndd"]),
-        ({"agreed": {"Yq": 1.0}}, ["--agreed", "Yq"]),
-        ({"bounds": {"Nd": (1.0, 1.0)}}, ["--bound", "Nd"]),
+        ({"hold": ["Ndd"]}, ["hold", "Ndd"]),
+        ({"agreed": {"Yq": 1.0}}, ["joint_variation", "Yq"]),
+        ({"bounds": {"Nd": (1.0, 1.0)}}, ["bounds", "Nd"]),
     ],
 )
 def test_means_that_cannot_be_are_refused(card, means, words) -> None:

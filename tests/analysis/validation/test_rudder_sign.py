@@ -18,7 +18,7 @@ def test_compare_and_influence_show_the_rudder_derivatives_of_the_card(ship, oth
     stated = tomllib.loads(bundled_cards()[ship].read_text())["derivatives"]
     runs = {
         "compare": ["compare", ship, other, "--members", "0"],
-        "influence": ["influence", ship, "--figure", "criterion_C"],
+        "influence": ["influence", ship, "--figures", "criterion_C"],
     }
     found = {}
     for name, arguments in runs.items():

@@ -196,7 +196,7 @@ def test_hull_and_rudder_are_scaled_to_turn_through_two_points(tmp_path: Path) -
     for rudder in (35.0, 10.0):
         rates = [rate for rate, stable in wanted.turns_at(np.radians(rudder) * (1 - 1e-9)) if stable]
         points.append(f"{60 * np.degrees(max(rates)):.6g}@{rudder:g}")
-    tuned = t2s.load("kvlcc2-l7-mmg").tune_through(*points)
+    tuned = t2s.load("kvlcc2-l7-mmg").tune_through(points)
     card = tuned.card
     assert isinstance(card, MmgCard)
     assert card.rudder.f_alpha == pytest.approx(2.6, rel=2e-3)

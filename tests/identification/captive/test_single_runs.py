@@ -1,11 +1,14 @@
 """One run by itself: Fourier coefficients with honest errors, averaged cycle, repeats; against known records."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.api.captive_run import SHORT_TYPES, RunName
+from tank2sim.records.campaign_form import RUN_TYPES
 from tests.identification.captive.generator import Campaign, write
 from tests.identification.captive.made_runs import COEFFICIENTS, FREQUENCY, RATE, SPEED, oscillation
 
@@ -135,7 +138,7 @@ def made_campaign(tmp_path_factory):
 def test_what_is_missing_is_asked_for(tmp_path):
     file = oscillation(tmp_path)
     for options, source in (
-        ({}, str(file)),
+        ({}, "type"),
         ({"type": "yaw"}, "type"),
         ({"type": "pure_yaw", "force_convention": "mine"}, "force_convention"),
     ):
@@ -156,3 +159,7 @@ def test_forces_on_the_model_have_the_other_sign(tmp_path):
     file = oscillation(tmp_path, noise=0.0)
     (run,) = t2s.reduce_runs(file, type="pure_yaw", force_convention="on_model").runs
     assert run.coefficient("Y", 1).cosine == pytest.approx(-25.0, abs=1e-4)
+
+
+def test_each_type_of_a_campaign_is_a_type_of_a_single_run() -> None:
+    assert set(get_args(RunName)) == {*RUN_TYPES, *SHORT_TYPES, "combined"}

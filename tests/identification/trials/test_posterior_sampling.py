@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior_sampling import (
     LARGEST_R_HAT,
     LogPosterior,
-    check_sampler,
     sample_posterior,
 )
 from tests.identification.trials.made_up_ship import TRUTH, gusts, problem, trial, turn, zigzag
@@ -131,9 +129,3 @@ def test_few_draws_are_marked(few) -> None:
     assert not few.converged
     assert few.effective.min() < 400 or few.r_hat.max() > LARGEST_R_HAT
     assert few.notices[0].startswith("NOT CONVERGED")
-
-
-def test_an_unknown_sampler_is_refused() -> None:
-    with pytest.raises(InputError) as error:
-        check_sampler("gibbs")
-    assert error.value.source == "--posterior"

@@ -24,7 +24,7 @@ def test_an_added_inertia_that_no_body_has_is_refused(value) -> None:
 def test_an_added_inertia_that_is_not_known_is_refused() -> None:
     with pytest.raises(InputError) as refusal:
         known_added_inertia(found(None), "output_error")
-    assert refusal.value.source == "yaw.csv" and "--inertia-kgm2" in refusal.value.remedy
+    assert refusal.value.source == "yaw.csv" and "inertia_kgm2" in refusal.value.remedy
 
 
 def test_nrdot_is_less_than_zero_and_its_error_has_the_same_scale() -> None:

@@ -270,7 +270,7 @@ def test_what_is_no_record_is_refused(tmp_path, columns):
 def test_terms_are_checked():
     assert parse_yaw_terms("quadratic, coulomb") == ("inertia", "coulomb", "quadratic")
     for text in ("cubic", "coulomb,coulomb"):
-        with pytest.raises(InputError, match="--terms"):
+        with pytest.raises(InputError, match="terms"):
             parse_yaw_terms(text)
 
 

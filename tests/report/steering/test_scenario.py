@@ -138,8 +138,8 @@ def test_a_changed_file_is_read_or_refused_with_its_name(tmp_path: Path):
 def test_a_missing_file_names_the_bundled_waters_and_a_trial_goes_not_with_a_scenario(tmp_path: Path):
     with pytest.raises(InputError, match="bundled scenario: basin, channel"):
         read_scenario(tmp_path / "none.geojson")
-    with pytest.raises(InputError, match="goes not with --ghost"):
-        make_steering_page(t2s.load("mariner"), "trial.csv", "channel")
+    with pytest.raises(InputError, match="scenario: does not go with a ghost"):
+        make_steering_page(t2s.load("mariner"), ghost="trial.csv", scenario="channel")
 
 
 class TestInABrowser:

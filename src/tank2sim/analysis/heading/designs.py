@@ -24,7 +24,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot import HeadingGains, LinearLaw, autopilot_model, linear_autopilot_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 
 NOTCH_DAMPING = 0.1
 """Share of waves at the frequency of a wave filter that passes: project choice, as narrow as the band of the waves."""
@@ -143,7 +143,9 @@ def design_heading(
     name = f"Autopilot of {ship.name}"
     if wave_filter_radps is not None:
         if kind != "pid":
-            raise InputError("--wave-filter", "", f"is not part of the design {kind!r}", "leave it out, or choose pid")
+            raise ArgumentError(
+                "wave_filter_radps", "", f"is not part of the design {kind!r}", "leave it out, or choose pid"
+            )
         return _filtered(plant, name, wave_filter_radps)
     match kind:
         case "pd" | "pid":
@@ -153,7 +155,7 @@ def design_heading(
         case "robust":
             return robust_design(plant, name, ship.origin)
         case _:
-            raise InputError("--design", "", f"{kind!r} is not a design", f"choose one of {', '.join(DESIGNS)}")
+            raise ArgumentError("design", "", f"{kind!r} is not a design", f"choose one of {', '.join(DESIGNS)}")
 
 
 def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant:
@@ -166,7 +168,7 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     if speed_mps is not None and not slowest <= speed_mps <= fastest:
         remedy = f"the card holds from {slowest:g} to {fastest:g} m/s"
-        raise InputError("--speed", "", f"{speed_mps:g} m/s is outside the range of {ship.origin}", remedy)
+        raise ArgumentError("speed_mps", "", f"{speed_mps:g} m/s is outside the range of {ship.origin}", remedy)
     point = straight_course(ship, speed_mps)
     hull = state_space(ship, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
     remedy = "check Yd and Nd of the card, and its rudder_sign"
@@ -298,7 +300,7 @@ def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign
         slycot is not installed, or the controller does not exist.
     """
     if importlib.util.find_spec("slycot") is None:
-        raise InputError("--design", "robust", "needs slycot", "pip install 'tank2sim[robust]'")
+        raise ArgumentError("design", "robust", "needs slycot", "pip install 'tank2sim[robust]'")
     w = plant.frequency_radps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)  # of a name inside python-control

@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 from tank2sim.units import to_si
@@ -17,8 +17,6 @@ STRAIGHT, STEADY, TURN, ZIGZAG = "straight course", "steady turn", "turning circ
 
 STRAIGHT_RUN, DIFFERENCE, SPIN = "straight run", "turn by difference", "spin"
 """Origin of a figure of a craft with thrusters: a simulated manoeuvre."""
-
-FIGURE_OPTION = "--figure"
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ ARGUMENTS = {
 
 
 def forms() -> str:
-    """All figures with their arguments, for the help of a command."""
+    """All figures with their arguments."""
     parts = []
     for family, (example, words) in ARGUMENTS.items():
         names = ", ".join(kind.name for kind in FIGURE_KINDS.values() if kind.family == family)
@@ -137,8 +135,8 @@ class InfluenceFigure:
         return Zigzag(*self.angles) if self.kind.family == ZIGZAG else Turn(*self.angles)
 
 
-def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
-    """Parse a figure of a command line: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
+def parse_figure(text: str, argument: str = "figures") -> InfluenceFigure:
+    """Parse a figure: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
 
     A craft with thrusters: ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, in rpm.
 
@@ -147,38 +145,38 @@ def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
     InputError
         The figure does not exist, or its argument is missing, not allowed or out of bounds.
     """
-    name, at, argument = text.strip().partition("@")
-    if argument.partition(":")[0] in CRAFT_FIGURE_KINDS:
-        return _craft_figure(text.strip(), name, argument, option)
+    name, at, value = text.strip().partition("@")
+    if value.partition(":")[0] in CRAFT_FIGURE_KINDS:
+        return _craft_figure(text.strip(), name, value, argument)
     kind = FIGURE_KINDS.get(name)
     if kind is None:
         close = difflib.get_close_matches(name, FIGURE_KINDS, n=1)
         remedy = f"did you mean {close[0]}?" if close else f"there are: {forms()}"
-        raise InputError(option, text, "is not a figure", remedy)
+        raise ArgumentError(argument, text, "is not a figure", remedy)
     example, words = ARGUMENTS[kind.family]
     number = r"([+-]?\d+(?:\.\d+)?)"
     pattern = {STRAIGHT: "", ZIGZAG: f"{number}/{number}"}.get(kind.family, number)
-    found = re.fullmatch(pattern, argument)
+    found = re.fullmatch(pattern, value)
     if found is None or bool(at) != bool(example):
-        raise InputError(option, text, "cannot be read", f"give {name}{example} ({words})")
+        raise ArgumentError(argument, text, "cannot be read", f"give {name}{example} ({words})")
     angles = tuple(float(group) for group in found.groups())
     if any(not 0 < abs(angle) < 90 for angle in angles) or (len(angles) == 2 and angles[1] < 0):
         remedy = "the rudder lies between 0 and 90 deg to either side, the heading of a zigzag between 0 and 90 deg"
-        raise InputError(option, text, "has an angle out of bounds", remedy)
+        raise ArgumentError(argument, text, "has an angle out of bounds", remedy)
     return InfluenceFigure(text.strip(), kind, tuple(math.radians(angle) for angle in angles))
 
 
-def _craft_figure(text: str, name: str, argument: str, option: str) -> InfluenceFigure:
-    word, _, number = argument.partition(":")
+def _craft_figure(text: str, name: str, value: str, argument: str) -> InfluenceFigure:
+    word, _, number = value.partition(":")
     kinds = CRAFT_FIGURE_KINDS[word]
     if name not in kinds:
         close = difflib.get_close_matches(name, kinds, n=1)
         remedy = f"did you mean {close[0]}?" if close else f"there are: {', '.join(kinds)}"
-        raise InputError(option, text, f"is not a figure of {word}", remedy)
+        raise ArgumentError(argument, text, f"is not a figure of {word}", remedy)
     try:
         rpm = float(number)
     except ValueError:
         rpm = 0.0
     if not rpm or not math.isfinite(rpm):
-        raise InputError(option, text, "cannot be read", f"give revolutions in rpm, as {name}@{word}:400")
+        raise ArgumentError(argument, text, "cannot be read", f"give revolutions in rpm, as {name}@{word}:400")
     return InfluenceFigure(text, kinds[name], (to_si("n_rpm", rpm)[1],))

@@ -15,12 +15,12 @@ from tank2sim.analysis.influence.equilibria import (
     turn_figures,
     turning_states,
 )
-from tank2sim.analysis.influence.figures import FIGURE_OPTION, STEADY, STRAIGHT, FigureManoeuvre, InfluenceFigure
+from tank2sim.analysis.influence.figures import STEADY, STRAIGHT, FigureManoeuvre, InfluenceFigure
 from tank2sim.analysis.influence.motion import HALF_TURN, MotionSlopes, overshoots_in
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -73,8 +73,8 @@ class Study:
         for figure, value in zip(self.figures, self.base, strict=True):
             if not math.isfinite(value):
                 remedy = "ask for another, or for another rudder"
-                raise InputError(
-                    FIGURE_OPTION, figure.text, f"{card.source} ({card.ship.name}) does not show this figure", remedy
+                raise ArgumentError(
+                    "figures", figure.text, f"{card.source} ({card.ship.name}) does not show this figure", remedy
                 )
 
     @cached_property
@@ -121,7 +121,7 @@ class Study:
         p[self._places] = values
         if figure.kind.family in (STRAIGHT, STEADY) and "rudder.command" not in self.model:
             remedy = "give one of its thrusters, as steady_diameter_m@difference:200"
-            raise InputError(FIGURE_OPTION, figure.text, "is of a rudder, and the craft has none", remedy)
+            raise ArgumentError("figures", figure.text, "is of a rudder, and the craft has none", remedy)
         if figure.kind.family == STRAIGHT:
             return self._linear(p, sloped)
         manoeuvre = figure.manoeuvre
@@ -169,10 +169,10 @@ class Study:
         if found is None or not rate > NO_TURN * self._speed / self._length:
             degrees = f"{math.degrees(turn.rudder):.4g} deg of rudder"
             problem = f"{self.card.ship.name} does not turn steadily to the side of {degrees}"
-            raise InputError(FIGURE_OPTION, text, problem, "ask at more rudder")
+            raise ArgumentError("figures", text, problem, "ask at more rudder")
         if found[1][3] > PLACE_FELT:
             problem = f"{self.card.ship.name} feels where it is or heads (wind or waves): no turn is steady"
-            raise InputError(FIGURE_OPTION, text, problem, "take that effect off the card, or ask for advance_m@35")
+            raise ArgumentError("figures", text, problem, "take that effect off the card, or ask for advance_m@35")
         return found[0]
 
     def _simulated(self, manoeuvre: FigureManoeuvre, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:

@@ -26,7 +26,7 @@ from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.cards.card import CraftCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import undisturbed_inputs
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 from tank2sim.units import from_si, to_si
 
@@ -146,7 +146,7 @@ def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftSta
     highest = craft.highest_speed(card.model.speed_mps)
     if not 0 < speed <= highest * (1 + 1e-9):
         problem = f"{speed:g} m/s is not a speed ahead that the thrusters hold"
-        raise InputError("--speed", "", problem, f"give one up to {highest:.4g} m/s")
+        raise ArgumentError("speed_mps", "", problem, f"give one up to {highest:.4g} m/s")
     run = craft.straight(speed)
     turns = tuple(craft.turns(run))
     return CraftStabilityStudy(

@@ -14,7 +14,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
 
@@ -55,9 +55,9 @@ class Means:
 
     def __post_init__(self) -> None:
         if self.by not in (FEWEST, UNCERTAIN):
-            raise InputError("--by", "", f"is {self.by!r}", f"give {FEWEST} or {UNCERTAIN}")
+            raise ArgumentError("by", "", f"is {self.by!r}", f"give {FEWEST} or {UNCERTAIN}")
         if not 0 < self.within < math.inf:
-            raise InputError("--within", "", f"is {self.within:g}", "a positive number of standard errors was expected")
+            raise ArgumentError("within", "", f"is {self.within:g}", "give a positive number")
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,7 @@ import re
 from dataclasses import dataclass
 
 from tank2sim.analysis.influence.figures import STRAIGHT, FigureKind, InfluenceFigure, parse_figure
-from tank2sim.errors import InputError
-
-TARGET_OPTION = "--tune"
+from tank2sim.errors import ArgumentError
 
 EQUAL, AT_MOST, AT_LEAST = "=", "<=", ">="
 
@@ -28,12 +26,12 @@ class Target:
 
     @property
     def text(self) -> str:
-        """In the form of the command line: ``steady_radius_m@20=424``."""
+        """As a text: ``steady_radius_m@20=424``."""
         return f"{self.figure.text}{self.relation}{self.value:g}"
 
 
 def parse_target(text: str) -> Target:
-    """Parse a target of a command line: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
+    """Parse a target: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
 
     Raises
     ------
@@ -43,19 +41,19 @@ def parse_target(text: str) -> Target:
     found = _TARGET.fullmatch(text.strip())
     if found is None or (found["at"] and found["behind"]):
         remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot1_deg@20/20<=25'"
-        raise InputError(TARGET_OPTION, text, "is not a target", remedy)
+        raise ArgumentError("targets", text, "is not a target", remedy)
     try:
         value = float(found["value"])
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(
-            TARGET_OPTION, text, f"{found['value'].strip()} is not a number", "give a value in the figure's unit"
+        raise ArgumentError(
+            "targets", text, f"{found['value'].strip()} is not a number", "give a value in the figure's unit"
         )
-    figure = parse_figure(found["name"].strip() + (found["at"] or found["behind"] or "").strip(), TARGET_OPTION)
+    figure = parse_figure(found["name"].strip() + (found["at"] or found["behind"] or "").strip(), "targets")
     if not _possible(figure.kind, value):
         problem = f"no ship has {figure.kind.description} of {value:g}"
-        raise InputError(TARGET_OPTION, text, problem, "give a value that a ship can have")
+        raise ArgumentError("targets", text, problem, "give a value that a ship can have")
     return Target(figure, found["relation"], value)
 
 

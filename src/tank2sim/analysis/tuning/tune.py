@@ -27,7 +27,7 @@ from tank2sim.analysis.tuning.result import FEWEST, Means, Move, Tuned
 from tank2sim.analysis.tuning.targets import AT_LEAST, AT_MOST, EQUAL, Target
 from tank2sim.arrays import Array
 from tank2sim.dynamics.card_parameters import CardParameter, agreed_by_name, find_parameter
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 
 Slice = NDArray[np.int64]
 
@@ -88,13 +88,13 @@ class _Problem:
     def _unknowns(self) -> tuple[Array, Array, Array]:
         """Change of the parameters by the unknowns (k, m), and the bounds of these (m,)."""
         parameters, means = self.study.parameters, self.means
-        held = {find_parameter(parameters, name, "--hold").name for name in means.hold}
-        stated = {find_parameter(parameters, name, "--bound").name: pair for name, pair in means.bounds.items()}
+        held = {find_parameter(parameters, name, "hold").name for name in means.hold}
+        stated = {find_parameter(parameters, name, "bounds").name: pair for name, pair in means.bounds.items()}
         for change in (
             parameter for parameter in parameters if parameter.name in stated and parameter.name in self._agreed
         ):
-            remedy = "leave out the bound, or take the parameter out of --agreed"
-            raise InputError("--bound", change.short, "moves with the agreed variation alone", remedy)
+            remedy = "leave out the bound, or take the parameter out of joint_variation"
+            raise ArgumentError("bounds", change.short, "moves with the agreed variation alone", remedy)
         columns, ends = [], []
         for place, parameter in enumerate(parameters):
             size = parameter.standard_error
@@ -114,7 +114,7 @@ class _Problem:
             )
             ends.append((-means.within, means.within))
         if not columns:
-            raise InputError("--tune", "", "nothing is left to change", "hold fewer parameters, or state --bound")
+            raise ArgumentError("targets", "", "nothing is left to change", "hold fewer parameters, or state bounds")
         lowest, highest = np.array(ends).T
         return np.array(columns).T, lowest, highest
 
@@ -350,5 +350,5 @@ def _ends(
     least, most = parameter.bounds
     low, high = max(low, -np.inf if least is None else least), min(high, np.inf if most is None else most)
     if not low < high:
-        raise InputError("--bound", parameter.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+        raise ArgumentError("bounds", parameter.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
     return (low - parameter.value) / size, (high - parameter.value) / size

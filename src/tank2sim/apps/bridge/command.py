@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tank2sim.api.verbs import verb
+from tank2sim.api.verbs import named_numbers, verb
 from tank2sim.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
@@ -21,25 +21,13 @@ LONGEST_ORDER, MORE_ORDERS = 24, 3
 """Characters of an order's name, and orders in addition to the form's. Project choice: one sheet has room for them."""
 
 
-def _parsed_orders(given: Sequence[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for text in given:
-        name, _, number = (part.strip() for part in text.partition("="))
-        try:
-            rpm = float(number)
-        except ValueError:
-            rpm = math.nan
-        problem = "is not NAME=RPM" if not math.isfinite(rpm) else "is given twice" if name in found else ""
-        if problem:
-            raise ArgumentError("order", text, problem, "give, for example, 'Half ahead=56'")
-        found[name] = rpm
-    return found
+_read_orders = named_numbers("order", "'Half ahead=56'")
 
 
 @verb(
     "a wheelhouse poster (A3)",
     page_required=True,
-    texts={"order": _parsed_orders},
+    texts={"order": _read_orders},
     name="poster",
     results=("tank2sim.apps.bridge.result:PosterResult",),
 )
@@ -73,7 +61,7 @@ def make_poster(
 @verb(
     "a pilot card (A4)",
     page_required=True,
-    texts={"order": _parsed_orders},
+    texts={"order": _read_orders},
     name="pilotcard",
     results=("tank2sim.apps.bridge.result:PilotCardResult",),
 )

@@ -21,7 +21,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run
@@ -248,7 +248,7 @@ def _check_orders(card: ManoeuvringCard, orders: Mapping[str, float]) -> None:
         if rpm > largest:
             nominal = f" (the card's nominal ones are {largest / _LARGEST_SHARE:.4g})" if engine else ""
             problem = f"is beyond {largest:,.0f} revolutions a minute{nominal}"
-            raise InputError("--order", f"{order}={rpm:g}", problem, "give the propeller's revolutions, rpm")
+            raise ArgumentError("order", f"{order}={rpm:g}", problem, "give the propeller's revolutions, rpm")
 
 
 def _rudder(card: ManoeuvringCard) -> float:

@@ -23,7 +23,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.dynamics.card_parameters import study_model
 from tank2sim.dynamics.ship import mass_faults
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.native.compiler import require_compiler
 from tank2sim.simulation.ensemble import Draws
 from tank2sim.simulation.lane_figures import LaneManoeuvres
@@ -176,7 +176,7 @@ def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: in
     prior, figures = first[keep], _rows(figures, keep)
     if len(prior) < LEAST_MEMBERS:
         problem = f"only {len(prior)} of {members} ships of these dimensions come round in all manoeuvres"
-        raise InputError("--length", "", problem, "check the dimensions and the speed, or take more members")
+        raise ArgumentError("length_m", "", problem, "check the dimensions and the speed, or take more members")
     before = figures
     for figure in given:
         _refuse_impossible(figure, before[figure.key])

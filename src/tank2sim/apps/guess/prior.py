@@ -18,8 +18,8 @@ from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, TestedRan
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS
 from tank2sim.dynamics.effects.hull import CROSS_FLOW_DRAG
 from tank2sim.dynamics.effects.loaded_rudder import LOADED_RUDDER
-from tank2sim.errors import InputError
-from tank2sim.units import KNOT_MPS
+from tank2sim.errors import ArgumentError
+from tank2sim.units import KNOT_MPS, in_words
 
 _THREE_SHIPS = "ESTIMATED: about what KVLCC2, Esso Osaka and Mariner have"
 
@@ -109,17 +109,17 @@ class ShipDimensions:
     speed_kn: float
 
     def __post_init__(self) -> None:
-        units = {"length": "m", "beam": "m", "draught": "m", "block": "", "speed": "kn"}
-        for (name, (low, high)), value in zip(_LIMITS.items(), vars(self).values(), strict=True):
+        for (low, high), (name, value) in zip(_LIMITS.values(), vars(self).items(), strict=True):
             if not low <= value <= high:
-                problem = f"is {value:g} {units[name]}".rstrip()
-                raise InputError(f"--{name}", "", problem, f"ships have {low:g} to {high:g} {units[name]}".rstrip())
+                unit = in_words(name)[1]
+                remedy = f"ships have {low:g} to {high:g} {unit}".rstrip()
+                raise ArgumentError(name, "", f"is {value:g} {unit}".rstrip(), remedy)
         if not 2.2 <= self.length_m / self.beam_m <= 12.0:  # harbour tugs have 2.6
             problem = f"is 1/{self.length_m / self.beam_m:.3g} of the length"
-            raise InputError("--beam", "", problem, "ships have 1/12 to 1/2.2: give metres")
+            raise ArgumentError("beam_m", "", problem, "ships have 1/12 to 1/2.2: give metres")
         if not 1.5 <= self.beam_m / self.draught_m <= 8.0:
             problem = f"is 1/{self.beam_m / self.draught_m:.3g} of the beam"
-            raise InputError("--draught", "", problem, "ships have 1/8 to 1/1.5: give metres")
+            raise ArgumentError("draught_m", "", problem, "ships have 1/8 to 1/1.5: give metres")
 
     @property
     def speed_mps(self) -> float:

@@ -4,46 +4,52 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from tank2sim.api.craft_identification import identify_craft
-from tank2sim.api.trial import TrialRecord
-from tank2sim.apps.logs.channels import ChannelSet, read_channels
-from tank2sim.apps.logs.reading import read_log
-from tank2sim.apps.logs.result import LogResult
-from tank2sim.apps.logs.stretches import find_stretches
-from tank2sim.apps.logs.study import study_log
-from tank2sim.apps.logs.trial_files import TrialCut, cut_trials
-from tank2sim.apps.logs.voyage import make_voyage
-from tank2sim.arguments import checked
-from tank2sim.cards import CraftCard
-from tank2sim.dynamics.vessel import Vessel, as_vessel
-from tank2sim.errors import InputError
-from tank2sim.files import write_together
-from tank2sim.results.craft_identification import CraftIdentificationResult
+from tank2sim.api.verbs import Written, verb
+from tank2sim.errors import ArgumentError, InputError
+from tank2sim.files import folder_made, write_together
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tank2sim.apps.logs.channels import ChannelSet
+    from tank2sim.apps.logs.result import LogResult
+    from tank2sim.apps.logs.streams import VesselLog
+    from tank2sim.apps.logs.trial_files import TrialCut
+    from tank2sim.dynamics.vessel import Vessel
+    from tank2sim.results.craft_identification import CraftIdentificationResult
 
 
-@checked
+@verb("a vessel's own log, cut into trials", results=("tank2sim.apps.logs.result:LogResult",))
 def log(
-    files: str | Path | Sequence[str | Path],
+    files: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame],
+    output: str | Annotated[Path, Written((), "DIR", by_function=True)] | None = None,
     *,
     channels: str | Path | ChannelSet | None = None,
     card: Vessel | str | Path | None = None,
 ) -> LogResult:
-    """Read logs of a vessel, find their channels and manoeuvres, and cut these into trials.
+    """Read the logs of one voyage, find which stream is which quantity, and cut its manoeuvres into trials.
 
     Formats: NMEA 0183, NMEA 2000 (candump, Actisense), ROS 1 and ROS 2 bags, MCAP, ArduPilot ``.bin`` and ``.tlog``,
-    PX4 ULog, any CSV. All but CSV need the extra ``tank2sim[logs]``.
+    PX4 ULog, any CSV. All but CSV need the extra ``tank2sim[logs]``. Channels are written to ``channels.toml`` with
+    their confidence; correct that file and run again, and it is used unchanged.
 
     Parameters
     ----------
-    files : path or sequence of paths
-        Logs of one voyage.
+    files : path, DataFrame, or sequence of them
+        Logs of one voyage; a data frame is read as a CSV file of its columns.
+    output : path, optional
+        Folder for ``channels.toml`` and the trials.
     channels : path or ChannelSet, optional
-        Which stream is which quantity, as ``channels.toml`` has it; by default they are found.
+        File that states which stream is which quantity; by default ``channels.toml`` of the folder if it exists, else
+        the channels are found.
     card : Vessel, str or path, optional
-        Of a small craft: what the trials say of each of its coefficients is then in the result.
+        Card of a small craft: states for each coefficient whether these trials determine it, and which five minutes
+        would.
 
     Raises
     ------
@@ -61,25 +67,61 @@ def log(
     >>> list(found.stretches["kind"])[-1]
     'zigzag'
     """
-    paths = [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]
-    if not paths:
-        raise InputError("log", "", "has no file", "give at least one log")
-    stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
-    craft = None if card is None else as_vessel(card)
-    if craft is not None and not isinstance(craft.card, CraftCard):
-        remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
-        raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
-    voyage = make_voyage([read_log(path) for path in paths], stated)
-    found = find_stretches(voyage)
-    cuts = cut_trials(voyage, found)
-    identified = None if craft is None else _identified(craft, cuts)
-    study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
-    trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
-    return LogResult(study, voyage, found, tuple(cuts), trials, identified)
+    from tank2sim.api.trial import TrialRecord
+    from tank2sim.apps.logs.channels import CHANNELS_FILE, ChannelSet, read_channels
+    from tank2sim.apps.logs.result import LogResult
+    from tank2sim.apps.logs.stretches import find_stretches
+    from tank2sim.apps.logs.study import study_log
+    from tank2sim.apps.logs.trial_files import cut_trials
+    from tank2sim.apps.logs.voyage import make_voyage
+    from tank2sim.cards import CraftCard
+    from tank2sim.dynamics.vessel import as_vessel
+    from tank2sim.records.csv_table import is_frame
+
+    if isinstance(files, str | Path) or is_frame(files):
+        named = {"files": files}
+    else:
+        named = {f"files[{number}]": file for number, file in enumerate(files)}
+    if not named:
+        raise ArgumentError("files", "", "is empty", "give at least one log")
+    folder = None if output is None else Path(output)
+    if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
+        channels = folder / CHANNELS_FILE
+    with nullcontext() if folder is None else folder_made(folder):
+        stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
+        craft = None if card is None else as_vessel(card)
+        if craft is not None and not isinstance(craft.card, CraftCard):
+            remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
+            raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
+        voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
+        found = find_stretches(voyage)
+        cuts = cut_trials(voyage, found)
+        identified = None if craft is None else _identified(craft, cuts)
+        study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
+        trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
+        result = LogResult(study, voyage, found, tuple(cuts), trials, identified)
+        return result if folder is None else result.written_to(folder)
+
+
+def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:
+    """A log; a data frame goes through a file, for a log may have dates, units and words in any form."""
+    from tank2sim.apps.logs.reading import read_log
+    from tank2sim.records.csv_table import is_frame
+
+    if not is_frame(file):
+        return read_log(Path(file))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.csv"
+        file.to_csv(path, index=file.index.name is not None)
+        return replace(read_log(path), path=Path(name))
 
 
 def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
     """Coefficients of a craft from all trials; None without any."""
+    from tank2sim.api.craft_identification import identify_craft
+    from tank2sim.api.trial import craft_trials_of
+    from tank2sim.cards import CraftCard
+
     assert isinstance(craft.card, CraftCard)
     turning = any(thruster.max_azimuth_rad is not None for thruster in craft.card.thrusters)
     taken = [cut for cut in cuts if turning or not cut.steered]
@@ -88,4 +130,4 @@ def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationR
     with tempfile.TemporaryDirectory() as name:
         paths = [Path(name) / cut.trial.path.name for cut in taken]
         write_together({path: cut.text for path, cut in zip(paths, taken, strict=True)})
-        return identify_craft(craft, paths)
+        return identify_craft(craft.card, craft_trials_of(paths, craft.card.thrusters), [])

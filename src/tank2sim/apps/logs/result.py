@@ -19,7 +19,7 @@ from tank2sim.apps.logs.study import LogStudy, StretchStudy
 from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Columns
-from tank2sim.files import writable_folder, write_together
+from tank2sim.files import folder_made, write_together
 from tank2sim.results.craft_identification import CraftIdentificationResult, craft_sections
 
 if TYPE_CHECKING:
@@ -63,6 +63,10 @@ class LogResult(Result[LogStudy]):
         The trials with a rudder.
     craft : CraftIdentificationResult, optional
         Coefficients of the craft from all trials, if its card was given.
+    written : tuple of Path
+        Files that were written.
+    remarks : tuple of str
+        Sentences on files of an earlier run.
     """
 
     study: LogStudy
@@ -71,6 +75,8 @@ class LogResult(Result[LogStudy]):
     cuts: tuple[TrialCut, ...] = ()
     trials: tuple[Any, ...] = ()
     craft: CraftIdentificationResult | None = None
+    written: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
     command: ClassVar[str] = "log"
 
     @property
@@ -123,11 +129,28 @@ class LogResult(Result[LogStudy]):
         InputError
             The folder or a file cannot be written.
         """
+        return list(self.written_to(Path(folder)).written)
+
+    def written_to(self, folder: Path) -> LogResult:
+        """Write :meth:`files` as :meth:`save` does, and return the result with them.
+
+        Trials that an earlier run cut into the folder, and this one did not, are removed.
+
+        Parameters
+        ----------
+        folder : Path
+        """
         files = self.files(folder)
-        writable_folder(Path(folder))
-        write_together(files, inputs=[Path(log.file) for log in self.study.logs])
-        remove_earlier_trials(Path(folder), files)
-        return list(files)
+        with folder_made(folder):
+            write_together(files, inputs=[Path(log.file) for log in self.study.logs])
+        removed = remove_earlier_trials(folder, files)
+        remarks = (f"removed trials that an earlier run cut: {', '.join(removed)}",) if removed else ()
+        return replace(self, written=tuple(files), remarks=remarks)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Limits of the log, and files of an earlier run that were removed."""
+        return (*self.study.notices, *self.remarks)
 
     @property
     def title(self) -> str:

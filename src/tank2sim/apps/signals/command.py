@@ -12,6 +12,8 @@ from tank2sim.errors import ArgumentError
 from tank2sim.files import TABLE
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.api.trial import TrialRecord
     from tank2sim.apps.signals.requests import FilterRequest
     from tank2sim.apps.signals.result import SignalsResult
@@ -31,7 +33,7 @@ def _written(result: SignalsResult, path: Path) -> dict[Path, str | bytes]:
     results=("tank2sim.apps.signals.result:SignalsResult",),
 )
 def signals(
-    trials: str | Path | TrialRecord | Sequence[str | Path | TrialRecord],
+    trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame],
     columns: str | Sequence[str] = (),
     *,
     max_gap_s: PositiveArgument | None = None,
@@ -42,7 +44,7 @@ def signals(
 
     Parameters
     ----------
-    trials : path, TrialRecord, or sequence of them
+    trials : path, TrialRecord, DataFrame, or sequence of them
         A folder means the trials in it.
     columns : sequence of str
         Columns to analyse (``"r_degps"``); by default all.

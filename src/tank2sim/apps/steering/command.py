@@ -2,71 +2,89 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.apps.steering.result import SteeringPageResult, SteeringStudy
-from tank2sim.cards import CraftCard, ManoeuvringCard
-from tank2sim.dynamics.vessel import Vessel
-from tank2sim.errors import InputError
+from tank2sim.api.verbs import Progress, verb
+from tank2sim.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from tank2sim.api.trial import TrialRecord
     from tank2sim.apps.steering.ghost import Ghost
     from tank2sim.apps.steering.page import PageShip
+    from tank2sim.apps.steering.result import SteeringPageResult
     from tank2sim.apps.steering.scenario import Scenario
+    from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.dynamics.model import Model
+    from tank2sim.dynamics.vessel import Vessel
 
 FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
 
+STEERED_SHIP = "esso-osaka-ship"
+"""Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
 
+
+@verb(
+    "a page on which the ship is steered",
+    default_ship=STEERED_SHIP,
+    page_required=True,
+    name="steer",
+    results=("tank2sim.apps.steering.result:SteeringPageResult",),
+)
 def make_steering_page(
     ship: Vessel,
-    ghost: str | Path | None = None,
+    *,
+    ghost: str | Path | TrialRecord | pd.DataFrame | None = None,
     scenario: str | Path | None = None,
     view_3d: bool = False,
-    report: Callable[[str], None] = lambda _: None,
+    report: Progress = lambda _: None,
 ) -> SteeringPageResult:
-    """Make the page, without writing it. Raises as :meth:`.Ship.steering_page`.
+    """Make a page on which a ship is steered in a browser; it needs no network.
 
     Parameters
     ----------
     ship : Vessel
-    ghost : path, optional
-        A measured trial.
+        A ship with a rudder, or a craft with thrusters.
+    ghost : path, TrialRecord or DataFrame, optional
+        Measured trial that moves next to the ship.
     scenario : path or str, optional
-        GeoJSON file of the waters, or the name of bundled ones.
+        Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
     view_3d : bool
-        Whether the page has the view from the bridge.
+        Also show the view from the bridge (three.js, 0.6 MB).
     report : callable
-        Called before what takes long.
+        Called with the stage that begins.
+
+    Raises
+    ------
+    InputError
+        The ship cannot be steered, the trial is at fault or has no positions, or the scenario is at fault.
     """
+    from tank2sim.api.trial import trials_of
     from tank2sim.apps.steering import ship as page_ship
     from tank2sim.apps.steering.ghost import ghost_of
     from tank2sim.apps.steering.members import members_of
     from tank2sim.apps.steering.scenario import read_scenario
+    from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.identification.trials.problem.prepare_trials import measured
 
     card, model = ship.card, ship.model
     if isinstance(card, CraftCard):
-        if ghost:
-            raise InputError(
-                "--ghost", "", "is a trial with a rudder, and a craft with thrusters has none", "leave it out"
-            )
+        if ghost is not None:
+            problem = "is a trial with a rudder, and a craft with thrusters has none"
+            raise ArgumentError("ghost", "", problem, "leave it out")
         waters = read_scenario(scenario) if scenario else None
         in_page = _page_ship(card, model, _compiled(model, report))
         return _result(in_page, None, model.notices, waters, view_3d)
     if not isinstance(card, ManoeuvringCard):
-        raise InputError(
-            card.source,
-            "",
-            "has no rudder",
-            "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered",
-        )
-    if ghost and scenario:
-        raise InputError("--scenario", "", "goes not with --ghost", "both say where the ship starts: leave one out")
+        remedy = "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered"
+        raise InputError(card.source, "", "has no rudder", remedy)
+    if ghost is not None and scenario:
+        raise ArgumentError("scenario", "", "does not go with a ghost: both set the start of the ship", "leave one out")
     waters = read_scenario(scenario) if scenario else None
-    trial = measured([Path(ghost)], card) if ghost else None
+    trial = None if ghost is None else measured(trials_of(ghost, "ghost"), card)
     shown = ghost_of(trial.trials[0], model) if trial else None
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)
@@ -89,6 +107,7 @@ def _result(
     ship: PageShip, ghost: Ghost | None, notices: Sequence[str], scenario: Scenario | None, view_3d: bool
 ) -> SteeringPageResult:
     from tank2sim.apps.steering.page import steering_page
+    from tank2sim.apps.steering.result import SteeringPageResult, SteeringStudy
 
     said = tuple(dict.fromkeys(notices))
     html = steering_page(ship, ghost, said, scenario, view_3d)
@@ -105,14 +124,14 @@ def _result(
     return SteeringPageResult(study, html)
 
 
-def _compiled(model: Model, report: Callable[[str], None]) -> str:
+def _compiled(model: Model, report: Progress) -> str:
     """The library of a model. Raises InputError without the compiler for WebAssembly."""
     from tank2sim.apps.steering import ship as page_ship
     from tank2sim.native.cross import has_compiled
 
     if not page_ship.has_compiler():
-        problem = "needs a compiler for WebAssembly, which is not installed: without it no ship is in the page"
-        raise InputError("steer", "", problem, "pip install tank2sim[platforms], and write the page again")
+        problem = "needs a compiler for WebAssembly, which is not installed"
+        raise InputError("the page", "", problem, "pip install tank2sim[platforms], and write the page again")
     if not has_compiled(page_ship.WEB):
         report(FIRST_COMPILATION)
     return page_ship.ship_in_page(model)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.charts.motion import TrackData, track_chart
@@ -40,6 +41,11 @@ class SteeringModelsResult(Result[SteeringComparison]):
     study: SteeringComparison
     card: SteeringCard | None = None
     command: ClassVar[str] = "influence"
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The card."""
+        return (Path(self.card.source),) if self.card else ()
 
     @property
     def title(self) -> str:

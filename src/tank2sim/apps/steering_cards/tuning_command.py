@@ -4,39 +4,53 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
-from tank2sim.apps.steering_cards.two_point_tuning import (
-    TwoPointStudy,
-    TwoPointTuning,
-    WantedTurn,
-    levers_of_ship,
-    tune_to_two_points,
-)
-from tank2sim.cards import Card, ManoeuvringCard
-from tank2sim.cards.card import MmgCard
-from tank2sim.cards.covariance_reading import derived_card
-from tank2sim.cards.reading import revised
-from tank2sim.errors import InputError
+from tank2sim.api.verbs import Output, verb
+from tank2sim.errors import ArgumentError
+from tank2sim.files import CARD
 
 if TYPE_CHECKING:
+    from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
+    from tank2sim.apps.steering_cards.two_point_tuning import TwoPointTuning, WantedTurn
+    from tank2sim.cards import Card, ManoeuvringCard
     from tank2sim.dynamics.vessel import Vessel
 
-THROUGH_OPTION = "--through"
-THROUGH_REMEDY = "give two, as --through 61@35 47@15 (deg/min at deg of rudder) or 424m@20 (radius in m)"
+_REMEDY = "give two, as 61@35 47@15 (deg/min at deg of rudder) or 424m@20 (radius in m)"
 
 _POINT = re.compile(r"(?P<value>[\d.]+)(?P<metre>m?)@(?P<rudder>[+-]?[\d.]+)")
 
 
-def tune_ship_through(ship: Vessel, first: str, second: str) -> TurnTuningResult:
-    """Scale hull and rudder. Raises as :meth:`.Ship.tune_through`.
+@verb(
+    "hull and rudder scaled until the steady turns meet two points",
+    Output("-o", CARD, "Write the tuned card.", lambda result, path: result.card.files(path), "CARD.toml"),
+    name="influence.through",
+    options={"points": "--through"},
+    results=("tank2sim.apps.steering_cards.tuning_result:TurnTuningResult",),
+)
+def tune_ship_through(ship: Vessel, points: Sequence[str]) -> TurnTuningResult:
+    """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.
 
     Parameters
     ----------
-    ship, first, second
-        As of :meth:`.Ship.tune_through`.
+    ship : Vessel
+    points : sequence of str
+        Scale the hull's moments and the rudder until the steady turns meet these two points, RATE@RUDDER: the yaw rate
+        in deg/min, without a sign, and the rudder in deg, positive to starboard (``61@35``; ``20@-3`` is 20 deg/min to
+        port at 3 deg to port; ``20@0`` of an unstable ship is to starboard), or a radius, ``424m@20``.
+
+    Raises
+    ------
+    InputError
+        A point cannot be read, or no factors between 1/5 and 5 meet both.
     """
+    from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
+    from tank2sim.apps.steering_cards.two_point_tuning import TwoPointStudy, levers_of_ship, tune_to_two_points
+
+    if len(points) != 2:
+        raise ArgumentError("points", "", f"has {len(points)} point{'s' * (len(points) != 1)}", _REMEDY)
+    first, second = points
     card = ship.manoeuvring()
     levers = levers_of_ship(card, ship.model)
     tuning = tune_to_two_points(ship.model, levers, parse_point(first), parse_point(second))
@@ -53,7 +67,11 @@ def tune_ship_through(ship: Vessel, first: str, second: str) -> TurnTuningResult
 def _scaled_card(
     card: ManoeuvringCard, tuning: TwoPointTuning, points: tuple[str, str]
 ) -> tuple[Card, tuple[str, ...]]:
-    """The card with the scaled derivatives, whose standard errors keep their share, and notices."""
+    """The card with the scaled derivatives, whose relative standard errors stay, and notices."""
+    from tank2sim.cards.card import MmgCard
+    from tank2sim.cards.covariance_reading import derived_card
+    from tank2sim.cards.reading import revised
+
     changed: dict[str, tuple[float, float]] = {}
     others: dict[str, object] = {}
     for place, value in tuning.parameters.items():
@@ -75,20 +93,22 @@ def _scaled_card(
 def parse_point(text: str) -> WantedTurn:
     """A point of the steering diagram: ``61@35`` (deg/min at deg of rudder) or ``424m@20`` (a radius).
 
-    A yaw rate is to the side of the rudder; with the rudder amidships it is to starboard.
+    A yaw rate is to the side of the rudder, and to starboard with the rudder amidships.
 
     Raises
     ------
     InputError
         It cannot be read.
     """
+    from tank2sim.apps.steering_cards.two_point_tuning import WantedTurn
+
     found = _POINT.fullmatch(text.strip())
     try:
         value, rudder = (float(found[key]) for key in ("value", "rudder")) if found else (math.nan, math.nan)
     except ValueError:
         value = rudder = math.nan
     if not found or not value > 0 or not abs(rudder) < 90:
-        raise InputError(THROUGH_OPTION, text, "is not a point", THROUGH_REMEDY)
+        raise ArgumentError("points", text, "is not a point", _REMEDY)
     angle = math.radians(rudder)
     if found["metre"]:
         return WantedTurn(angle, radius_m=value)

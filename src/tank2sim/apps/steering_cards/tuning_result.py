@@ -30,7 +30,7 @@ class TurnTuningResult(Result[TwoPointStudy]):
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> found = t2s.load("mariner").tune_through("35@35", "1400m@3")
+    >>> found = t2s.load("mariner").tune_through(["35@35", "1400m@3"])
     >>> [round(radius) for radius in found.turns["radius_after_m"]][1]
     1400
     """

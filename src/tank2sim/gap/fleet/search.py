@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 from tank2sim.cards.card import Card, ManoeuvringCard
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.gap.fleet.ships import ShipFolder
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.result import Gap
@@ -142,8 +142,8 @@ def _executor_kept(name: str) -> Iterator[None]:
         yield
     except (BrokenExecutor, CancelledError):
         problem = f"a worker was lost while {name} was sought (is there memory enough for all workers?)"
-        remedy = "give fewer --workers; the same command goes on where this one stopped"
-        raise InputError("--executor", "", problem, remedy) from None
+        remedy = "give fewer workers; the same search goes on where this one stopped"
+        raise ArgumentError("executor", "", problem, remedy) from None
 
 
 def _find_in_worker(ship: ShipTask, options: GapOptions) -> Gap | Fault:

@@ -80,9 +80,12 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
     InputError
         The file cannot be read any more.
     """
-    raw = read_trial_file(path, rising=False)
-    repaired, _ = repair_trial(raw)
-    sized = _at_size_of(repaired, trial, found)
+    if in_file := path.is_file():
+        raw = read_trial_file(path, rising=False)
+        repaired, _ = repair_trial(raw)
+        sized = _at_size_of(repaired, trial, found)
+    else:  # a data frame: written at the size of the ship
+        raw, repaired, sized = trial, trial, list(found)
     fixed = correct_sensor_faults(repaired, sized)
     touched = [name for name in repaired.signals if not _equal_signal(repaired, fixed, name)]
     if not touched:
@@ -91,7 +94,7 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
     columns = ", ".join(repaired.heading(name) for name in touched)
     names = " and ".join(f"{fault[0]} ({in_short(*fault)})" for fault in faults)
     text = f"{columns} corrected by tank2sim gap for {names}"
-    sheet = _sheet(path)
+    sheet = _sheet(path) if in_file else None
     if sheet is None or not _same(raw, repaired, touched):
         return trial_text(fixed, [f"from {path.name}", text])
     return _edited(sheet, _Columns(path, raw, fixed, touched), f"# {' '.join(text.split())}")

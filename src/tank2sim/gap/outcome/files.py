@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from tank2sim.cards.covariance import covariance_file
 from tank2sim.errors import InputError
-from tank2sim.files import writable_folder, write_together
+from tank2sim.files import folder_made, write_together
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE
 
@@ -34,39 +33,19 @@ FOLDERS = (CORRECTED, SURROUNDED)
 GapFiles = dict[Path, str | bytes]
 
 
-@contextmanager
-def folder_made(path: Path) -> Iterator[None]:
-    """A folder for outputs, made before the long work that fills it, and removed if that fails."""
-    made = not path.exists()
-    writable_folder(path)
-    try:
-        yield
-    except BaseException:
-        if made:
-            with contextlib.suppress(OSError):
-                path.rmdir()
-        raise
-
-
-def refuse_early(folder: Path, json_file: Path | None, inputs: Sequence[Path]) -> None:
-    """Refuse, before the long work, files that could not be written.
+def refuse_early(folder: Path, inputs: Sequence[Path]) -> None:
+    """Refuse, before the long work, a folder of results in which an input would be overwritten.
 
     Parameters
     ----------
     folder : Path
-        Of the results.
-    json_file : Path or None
-        Where the JSON goes, too.
     inputs : sequence of Path
-        Files that must not be overwritten.
     """
     for name in ALWAYS:
         for path in inputs:
             if (folder / name).exists() and (folder / name).samefile(path):
-                remedy = "give another folder with -o"
+                remedy = "give another folder"
                 raise InputError(folder / name, "", f"is an input ({path}), which would be overwritten", remedy)
-    if json_file and not json_file.parent.is_dir():
-        raise InputError(json_file, "", "cannot be written: its folder does not exist", "give one that exists")
 
 
 def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path]) -> list[str]:

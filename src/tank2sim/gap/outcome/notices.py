@@ -72,7 +72,7 @@ def gap_notices(
         )
         if structure := structure_that_adds(card, decision.best.hypothesis.effects):
             notices.append(
-                f"identify with --structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
+                f"identify with structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
                 "trials together with the hull's derivatives, from the card as it was given"
             )
     notices += [

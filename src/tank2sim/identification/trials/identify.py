@@ -15,7 +15,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
 from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
 from tank2sim.identification.trials.assessment.method_choice import (
@@ -50,7 +50,14 @@ from tank2sim.identification.trials.methods.posterior_sampling import (
     sample_posterior,
 )
 from tank2sim.identification.trials.methods.recursive import recursive
-from tank2sim.identification.trials.options import BY_RESIDUALS, PIECE, IdentificationOptions
+from tank2sim.identification.trials.options import (
+    AUTO,
+    AVERAGE,
+    BY_EVIDENCE,
+    BY_RESIDUALS,
+    PIECE,
+    IdentificationOptions,
+)
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.picklable import portable
@@ -62,7 +69,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     problem_from_card,
     with_range,
 )
-from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.identification.trials.problem.water_current import (
     WaterCurrent,
     at_sea,
@@ -118,10 +125,10 @@ class Identification:
     forced : tuple of str
         Evidence that the trials are not of the card's ship, where the fit was forced.
     structures : mapping
-        Cross-validation of each structure; empty unless the structure is :data:`.structures.AUTO` or
-        :data:`.structures.AVERAGE`.
+        Cross-validation of each structure; empty unless the structure is :data:`.options.AUTO` or
+        :data:`.options.AVERAGE`.
     weights : mapping
-        Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.structures.AVERAGE`.
+        Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.options.AVERAGE`.
     criteria : Criteria or None
         Information criteria of the fit, for comparison with another model of the same trials; None where the
         velocities were not measured.
@@ -167,7 +174,7 @@ class Identification:
         return fitted, ("held out", self.before_holdout, self.holdout)
 
 
-_OF_ONE_SHIP = "give the card and the trials of one ship, in the same units and signs, or --force"
+_OF_ONE_SHIP = "give the card and the trials of one ship, in the same units and signs, or force the fit"
 
 
 def identify_trials(
@@ -206,7 +213,7 @@ def identify_trials(
             return _identified(card, trials, holdout, options, progress, executor)
     except np.linalg.LinAlgError:
         names = ", ".join(trial.name for trial in trials.trials)
-        remedy = "add runs in which rudder, yaw, sway and speed change, or hold terms (--hold)"
+        remedy = "add runs in which rudder, yaw, sway and speed change, or hold terms"
         raise InputError(names, "", "excites too little to estimate anything", remedy) from None
 
 
@@ -219,17 +226,16 @@ def _identified(
     executor: Executor | None,
 ) -> Identification:
     if trials.captive is not None and not _by_output_error(options):
-        problem_text = f"{options.method} fits trials alone"
-        raise InputError("--campaign", "", problem_text, "leave --method out, or fit the card that reduce makes of it")
+        remedy = "leave the method out, or fit the card that reduce makes of the campaign"
+        raise ArgumentError("campaign", "", f"{options.method} fits trials alone", remedy)
     if options.posterior:
         check_sampler(options.posterior)
         if not _by_output_error(options):
-            raise InputError("--posterior", "", f"{options.method} has no density to sample", "leave --method out")
+            raise ArgumentError("posterior", "", f"{options.method} has no density to sample", "leave the method out")
     if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
         problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
-        raise InputError(
-            "--structure", "", problem_text, "leave it out, or fit what tank2sim convert makes of the card"
-        )
+        remedy = "leave it out, or fit the card that convert makes of this one"
+        raise ArgumentError("structure", "", problem_text, remedy)
     given, card = card, polynomial_over_trials(card, trials.trials)
     drifts = of_unknown_current(card, trials.trials)
     if drifts:
@@ -338,7 +344,7 @@ def _over_pieces(problem: Problem, options: IdentificationOptions, progress: Sea
     length = options.piece_s or PIECE * problem.ship_time
     if length < LEAST_PIECE * problem.ship_time:
         least = LEAST_PIECE * problem.ship_time
-        raise InputError("--piece", "", f"is {length:g} s", f"give {least:.3g} s or more ({LEAST_PIECE:g} L/u0)")
+        raise ArgumentError("piece_s", "", f"is {length:g} s", f"give {least:.3g} s or more ({LEAST_PIECE:g} L/u0)")
     settings = OutputErrorSettings(piece_s=length, scale_prior=options.scale_prior)
     return output_error(problem, _start(problem), settings, progress)
 
@@ -533,7 +539,7 @@ def _choice_notice(choice: MethodChoice | None) -> Sequence[str]:
     if choice is None:
         return ()
     name, other = METHOD_WORDS[choice.method]
-    return (f"method: {name}, because {choice.reason}; --method {other} takes the other",)
+    return (f"method: {name}, because {choice.reason}; method {other} takes the other",)
 
 
 def _unseen_notice(names: Sequence[str]) -> Sequence[str]:

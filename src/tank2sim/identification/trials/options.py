@@ -1,21 +1,40 @@
-"""Options of a fit to trials."""
+"""Options of a fit to trials. Nothing heavy is imported here: the help of the command has these names."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN
-from tank2sim.identification.trials.problem.structures import BY_EVIDENCE
+from typing import Literal
 
 PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
 small against the motion; shorter pieces show less of the derivatives, longer ones diverge on unstable ships."""
 
-BY_RESIDUALS = "residuals"
-"""Name of the choice between output error and the Kalman filter by the residuals of the former."""
-
-TRIAL_METHODS: tuple[str, ...] = (BY_RESIDUALS, "output_error", "equation_error", "kalman", "recursive")
+TrialMethod = Literal["residuals", "output_error", "equation_error", "kalman", "recursive"]
 """Methods of the fit, by name."""
+
+BY_RESIDUALS: TrialMethod = "residuals"
+"""The residuals of output error decide between output error and the Kalman filter."""
+
+AUTO, AVERAGE, BY_EVIDENCE = "auto", "average", "evidence"
+"""Structures that are not one structure: see :data:`STRUCTURE_WORDS`."""
+
+STRUCTURE_WORDS = {
+    "linear": "linear derivatives alone (3.5)",
+    "card": "the terms and effects of the card",
+    "cross_flow": "linear hull, cross-flow drag, rudder in the propeller's slipstream",
+    "third_order": "the card's terms and all third-order terms in v and r",
+    AUTO: "cross-validation decides",
+    AVERAGE: "intervals of all structures, weighted by their predictions, with the card of the best",
+    BY_EVIDENCE: "cross_flow, or card if an information criterion or predictions of trials left out clearly prefer it",
+}
+"""Built-in structures of the model and choices among them, in a few words."""
+
+Sampler = Literal["nuts", "ensemble"]
+"""Samplers of the posterior: no-U-turn, and an ensemble of walkers."""
+
+DRAWS_OF_CHAIN = 400
+"""Draws of each chain of the posterior. Each is worth about one independent draw; 1600 in four chains bring R-hat of 24
+parameters below its limit (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +44,10 @@ class IdentificationOptions:
     Parameters
     ----------
     method : str
-        One of :data:`TRIAL_METHODS`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts
+        One of :data:`TrialMethod`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts
         or waves, and all others by output error (:mod:`.method_choice`).
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.BY_EVIDENCE`,
-        :data:`.structures.AUTO` or :data:`.structures.AVERAGE`.
+        One of :data:`STRUCTURE_WORDS` or of an installed package.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
@@ -44,13 +62,13 @@ class IdentificationOptions:
         Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
     force : bool
         Fit trials even if they look like those of another ship (:mod:`.other_ship`).
-    posterior : str
-        One of :data:`.posterior_sampling.SAMPLERS`; "" for none.
+    posterior : str, optional
+        One of :data:`Sampler`.
     draws : int
         Draws of each chain of the posterior.
     """
 
-    method: str = BY_RESIDUALS
+    method: TrialMethod = BY_RESIDUALS
     structure: str = BY_EVIDENCE
     inertia: bool = False
     piece_s: float | None = None
@@ -59,5 +77,5 @@ class IdentificationOptions:
     bootstrap: int = 0
     hold: tuple[str, ...] = ()
     force: bool = False
-    posterior: str = ""
+    posterior: Sampler | None = None
     draws: int = DRAWS_OF_CHAIN

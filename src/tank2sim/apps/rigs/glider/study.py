@@ -31,7 +31,7 @@ from tank2sim.apps.rigs.glider.transient import (
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 
 _STEEPEST = math.radians(89.5)
@@ -105,9 +105,9 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
     InputError
         Budget or depth is not positive, or the glide has no buoyancy or turns.
     """
-    for name, value in (("--budget-kg", budget_kg), ("--depth-m", depth_m)):
+    for name, value in (("budget_kg", budget_kg), ("depth_m", depth_m)):
         if not 0 < value < math.inf:
-            raise InputError(name, "", f"is {value:g}", "a positive number was expected")
+            raise ArgumentError(name, "", f"is {value:g}", "a positive number was expected")
     if not glide.buoyancy_kg or glide.turn_rate_radps:
         raise InputError(card.source, "range", "a glide without buoyancy or with roll has no range", "give another")
     size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
@@ -464,6 +464,6 @@ def _ranges(card: GliderCard, question: GlideQuestion, glides: tuple[SteadyGlide
     if budget is None and depth is None:
         return []
     if budget is None or depth is None:
-        missing = "--budget-kg" if budget is None else "--depth-m"
-        raise InputError(missing, "", "is missing", "a range needs the ballast to push out and the depth")
+        missing = "budget_kg" if budget is None else "depth_m"
+        raise ArgumentError(missing, "", "is missing", "a range needs the ballast to expel and the depth")
     return [glide_range(card, glide, budget_kg=budget, depth_m=depth) for glide in glides if not glide.turn_rate_radps]

@@ -11,6 +11,8 @@ from tank2sim.arguments import NumberArgument
 from tank2sim.files import CARD
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.apps.rigs.tow.result import TowResult
 
 
@@ -28,7 +30,7 @@ def _parsed_force(text: str) -> float | list[float]:
     results=("tank2sim.apps.rigs.tow.result:TowResult",),
 )
 def tow(
-    tows: str | Path,
+    tows: str | Path | pd.DataFrame,
     *,
     force_N: float | Sequence[float] | None = None,
     mass_kg: NumberArgument | None = None,
@@ -45,7 +47,7 @@ def tow(
 
     Parameters
     ----------
-    tows : path
+    tows : path or DataFrame
         CSV file with ``t_s`` and the speeds ``speed_1_mps``, ...
     force_N : float or sequence of float, optional
         Towing force T, N: a constant, or the coefficients of a polynomial of the time since the release in rising
@@ -89,8 +91,9 @@ def tow(
     from tank2sim.apps.rigs.tow.records import read_tows
     from tank2sim.apps.rigs.tow.result import TowResult
     from tank2sim.apps.rigs.tow.study import study_tows, towed_body
+    from tank2sim.records.csv_table import table_or_path
 
-    read = read_tows(tows)
+    read = read_tows(table_or_path(tows, "tows"))
     force = force_N if force_N is None or isinstance(force_N, int | float) else Polynomial(list(force_N))
     chosen = parse_terms(terms if isinstance(terms, str) else ",".join(terms) or "none")
     result = identify_tow(read, force, mass_kg, terms=chosen, options=TowOptions(start_delay, total_mass_kg))

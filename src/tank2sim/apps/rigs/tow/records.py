@@ -89,7 +89,7 @@ class Tows:
         return replace(self, names=names, time_s=self.time_s[read], speed_mps=speed[read])
 
 
-def read_tows(path: Path | str) -> Tows:
+def read_tows(path: Path | str | CsvTable) -> Tows:
     """Read tows: ``t_s,speed_1_mps,speed_2_mps,...``, with comments ``# force_N: 11.63`` and ``# mass_kg: 2243``.
 
     The body may be described by further comments (:data:`BODY_KEYS`), as in ``# length_m: 3.8``.

@@ -4,71 +4,135 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
-from tank2sim.apps.rigs.yaw.card import YawRigCard
-from tank2sim.apps.rigs.yaw.control import AdaptiveController, Controller
-from tank2sim.apps.rigs.yaw.found_card import BEST
-from tank2sim.apps.rigs.yaw.identify import (
-    YAW_METHODS,
-    YawOptions,
-    identify_yaw,
-    parse_yaw_terms,
-    torque_constant,
-)
-from tank2sim.apps.rigs.yaw.programme import Similarity, YawProgramme, programme_of
-from tank2sim.apps.rigs.yaw.records import Medium, read_yaw_record, yaw_record_text
-from tank2sim.apps.rigs.yaw.result import YawResult
-from tank2sim.apps.rigs.yaw.study import study_yaw
-from tank2sim.apps.rigs.yaw.theory import FloatingBody, theory_values
+from tank2sim.api.verbs import Output, verb
 from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument, checked
-from tank2sim.cards import Card
-from tank2sim.dynamics.vessel import Vessel, as_vessel
-from tank2sim.errors import InputError
-from tank2sim.files import write_together
+from tank2sim.errors import ArgumentError, InputError
+from tank2sim.files import CARD, write_together
 
-CONTROLLERS: dict[str, Controller | None] = {"tuned": None, "adaptive": AdaptiveController()}
-"""Names of the controllers (4), from the right inertia, and (6)."""
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tank2sim.apps.rigs.yaw.card import YawRigCard
+    from tank2sim.apps.rigs.yaw.programme import YawProgramme
+    from tank2sim.apps.rigs.yaw.records import YawRecord
+    from tank2sim.apps.rigs.yaw.result import YawResult
+    from tank2sim.apps.rigs.yaw.theory import FloatingBody
+    from tank2sim.cards import Card
+    from tank2sim.dynamics.vessel import Vessel
+
+YawMethod = Literal[
+    "energy_least_squares",
+    "as_many_equations",
+    "two_intervals",
+    "output_error",
+    "energy_least_squares_reference",
+    "two_intervals_reference",
+]
+"""Methods, the best one first."""
 
 
-@checked
+def write_yaw_card(
+    result: YawResult,
+    path: Path,
+    *,
+    card: Vessel | str | Path | None = None,
+    length_m: PositiveArgument | None = None,
+) -> YawResult:
+    """Return the result with the card as its file, and a notice about it.
+
+    Parameters
+    ----------
+    result : YawResult
+    path : Path
+        File of the card.
+    card : Vessel, str or path, optional
+        Ship whose card gets N_rdot, in place of a card of the rig.
+    length_m : float, optional
+        Length of the model for N_rdot, m; by default as the records say.
+    """
+    from tank2sim.dynamics.vessel import as_vessel
+
+    if card is None:
+        text, files = f"{path}: the rig's card has the estimates of {result.method}", result.rig_card(path.stem)
+        return _with_notice(replace(result, files=files.files(path)), text)
+    before, ship = as_vessel(card).manoeuvring(), result.with_nrdot(card, length_m)
+    value, error = result.nrdot(length_m)
+    spread = "" if error is None else f" ± {error:.2g}"
+    was = f"{before.derivatives['Nrdot']:.4g} before" if "Nrdot" in before.derivatives else "not on the card before"
+    text = f"{path}: N_rdot' = {value:.4g}{spread} ({was}) of {ship.name}, by {result.method}"
+    return _with_notice(replace(result, files={path: ship.card.text}), text)
+
+
+@verb(
+    "added yaw inertia and dissipation from records of a yaw rig",
+    Output("-o", CARD, "Write the card of the ship, or a card of the rig.", write_yaw_card, "CARD.toml"),
+    results=("tank2sim.apps.rigs.yaw.result:YawResult",),
+)
 def yaw(
-    records: Sequence[str | Path] | str | Path,
+    records: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame],
     *,
     inertia_kgm2: PositiveArgument | None = None,
     inertia_error_kgm2: NonNegativeArgument | None = None,
     torque_constant_NmpA: PositiveArgument | None = None,
-    reference: str | Path | None = None,
+    reference: str | Path | pd.DataFrame | None = None,
     reference_inertia_kgm2: PositiveArgument | None = None,
     rig: Vessel | Card | str | Path | None = None,
     terms: str | Sequence[str] | None = None,
     mirror_percent: Percent = 25.0,
-    method: str = BEST,
+    method: YawMethod = "energy_least_squares",
     theory: str | None = None,
+    simulate: Vessel | Card | str | Path | None = None,
+    medium: Literal["water", "air"] = "water",
+    controller: Literal["tuned", "adaptive"] = "tuned",
+    similar_to: str | None = None,
+    noise_A: NonNegativeArgument = 0.0,
 ) -> YawResult:
     """Estimate added yaw inertia and dissipation from records of the yaw rig (Alyshev 2019).
 
+    Records have the columns t_s, phi_rad and current_A; comments of the file state the programme. Records in air
+    (``# medium: air``) give J_zz.
+
     Parameters
     ----------
-    records : path or sequence of paths
-        CSV files with ``t_s,phi_rad,current_A``; records of a body in air (``# medium: air``) give J_zz.
-    inertia_kgm2, inertia_error_kgm2 : float, optional
-        J_zz of body and rotor and its standard error; by default from records in air, or as the file says.
+    records : path, DataFrame, or sequence of them
+        CSV files of the records; the ``attrs`` of a data frame are its comments.
+    inertia_kgm2 : float, optional
+        J_zz of body and rotor, kg m2; by default from records in air, or as the file says.
+    inertia_error_kgm2 : float, optional
+        Standard error of J_zz, kg m2.
     torque_constant_NmpA : float, optional
         k_t, N m/A; by default as the records say.
-    reference, reference_inertia_kgm2 : path and float, optional
-        A record in air of a body of this known inertia, from which k_t is taken.
+    reference : path or DataFrame, optional
+        Record in air of a body of known inertia, from which k_t is taken.
+    reference_inertia_kgm2 : float, optional
+        Inertia of the body of the reference, kg m2.
     rig : Vessel, Card, str or path, optional
-        Card of the rig: its walls, gravity, accelerating and braking count.
+        Card of the rig; its walls, gravity, and inertias of accelerating and braking are taken into account.
     terms : str or sequence of str, optional
-        Terms in addition to the inertia (``"coulomb,viscous,quadratic"``); by default the terms of (3) for the medium.
+        Terms in addition to the inertia, of coulomb, viscous, quadratic, braking_quadratic, gravity_sine,
+        gravity_cosine, with commas between; by default the terms of (3) for the medium.
     mirror_percent : float
         Largest difference of mirror images that is accepted, % of the largest rate.
     method : str
-        Method whose numbers a card gets.
+        Method whose estimates a card gets.
     theory : str, optional
-        Also (7) to (9) for ``"L,B,T,H"`` or ``"L,B,T,H,CB"``: length, beam, draught and depth of water in m, block
-        coefficient; or for a card with these.
+        Also compare with (7) to (9) for ``"L,B,T,H"`` or ``"L,B,T,H,CB"``: length, beam, draught and depth of water in
+        m, block coefficient; or for a card with these.
+    simulate : Vessel, Card, str or path, optional
+        Card of a rig. Its record is simulated and written to the one file of records first.
+    medium : str
+        Medium of the simulated body; air leaves out the water, and keeps the friction f_c and f_1 of the card.
+    controller : str
+        Controller of the simulated rig: ``tuned`` is (4), ``adaptive`` is (6).
+    similar_to : str, optional
+        Motion of a ship that the simulated body follows at its size: ``"L,B,R,T"``, length and beam in m, yaw rate in
+        deg/min, time in s; by default the programme of the card.
+    noise_A : float
+        Noise of the simulated current, A, standard deviation.
 
     Raises
     ------
@@ -84,15 +148,21 @@ def yaw(
     >>> round(found.added_inertia_kgm2, 3)
     0.03
     """
-    if method not in YAW_METHODS:
-        raise InputError("--method", "", f"{method!r} is not known", f"there are: {', '.join(YAW_METHODS)}")
+    from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw, parse_yaw_terms, torque_constant
+    from tank2sim.apps.rigs.yaw.records import read_yaw_record
+    from tank2sim.apps.rigs.yaw.result import YawResult
+    from tank2sim.apps.rigs.yaw.study import study_yaw
+    from tank2sim.apps.rigs.yaw.theory import theory_values
+    from tank2sim.records.csv_table import is_frame, table_or_path
+
     if (reference is None) != (reference_inertia_kgm2 is None):
-        raise InputError("--reference", "", "goes with --reference-inertia-kgm2", "give both, or neither")
+        missing = "reference" if reference is None else "reference_inertia_kgm2"
+        raise ArgumentError(missing, "", "is missing", "give both, the reference and its inertia, or neither")
     error = 0.0
     if reference is not None and reference_inertia_kgm2 is not None:
-        in_air = identify_yaw([read_yaw_record(reference)])
+        in_air = identify_yaw([read_yaw_record(table_or_path(reference, "reference"))])
         torque_constant_NmpA, error = torque_constant(in_air, reference_inertia_kgm2)
-    known = None if rig is None else _rig_card(rig, "--rig")
+    known = None if rig is None else _rig_card(rig, "rig")
     options = YawOptions(
         inertia_kgm2=inertia_kgm2,
         inertia_error_kgm2=inertia_error_kgm2,
@@ -103,10 +173,41 @@ def yaw(
         mirror_limit=mirror_percent / 100,
     )
     body = _floating_body(theory) if theory else None
-    paths = [records] if isinstance(records, str | Path) else records
-    found = identify_yaw([read_yaw_record(path) for path in paths], options)
-    values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
-    return YawResult(study_yaw(found, values), method, found, known)
+    if isinstance(records, str | Path) or is_frame(records):
+        sources = [table_or_path(records, "records")]
+    else:
+        sources = [table_or_path(source, f"records[{number}]") for number, source in enumerate(records)]
+
+    def result(read: Sequence[YawRecord]) -> YawResult:
+        found = identify_yaw(read, options)
+        values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
+        return YawResult(study_yaw(found, values), method, found, known)
+
+    rest = {
+        "medium": medium != "water",
+        "controller": controller != "tuned",
+        "similar_to": similar_to,
+        "noise_A": noise_A,
+    }
+    if simulate is None:
+        if given := next((name for name, value in rest.items() if value), ""):
+            raise ArgumentError(given, "", "is of a simulated rig", "give the card to simulate as well")
+        return result([read_yaw_record(source) for source in sources])
+    path = sources[0] if sources else None
+    if len(sources) != 1 or not isinstance(path, Path):
+        raise ArgumentError("simulate", "", f"has {len(sources)} records to write", "give the name of one file")
+    card = _rig_card(simulate, "simulate")
+    record, text = _simulated(card, path, medium, controller, similar_to, noise_A)
+    try:
+        found = result([record])
+    except InputError as fault:
+        if fault.source != str(path):
+            raise
+        raise InputError(
+            card.source, fault.place, f"the record simulated of it: {fault.problem}", fault.remedy
+        ) from None
+    write_together({path: text}, inputs=[Path(card.source)])
+    return _with_notice(found, _similarity(record, similar_to)) if similar_to else found
 
 
 @checked
@@ -114,8 +215,8 @@ def simulate_yaw(
     card: Vessel | Card | str | Path,
     path: str | Path,
     *,
-    medium: Medium = "water",
-    controller: str = "tuned",
+    medium: Literal["water", "air"] = "water",
+    controller: Literal["tuned", "adaptive"] = "tuned",
     similar_to: str | None = None,
     noise_A: NonNegativeArgument = 0.0,
 ) -> Path:
@@ -127,53 +228,68 @@ def simulate_yaw(
         Card of the rig with its body (``"alyshev"``).
     path : path
         The new file.
-    medium : str
-        ``water`` or ``air``; in air with the card's friction f_c, f_1.
-    controller : str
-        ``tuned`` (4) or ``adaptive`` (6).
-    similar_to : str, optional
-        A ship's motion ``"L,B,R,T"`` to run at the size of the body: length and beam in m, yaw rate in deg/min, time
-        in s; by default the programme of the card.
-    noise_A : float
-        Standard deviation of the noise of the recorded current, A.
+    medium, controller, similar_to, noise_A
+        As of :func:`yaw`.
 
     Raises
     ------
     InputError
         The file exists, the card is not one of a yaw rig, or the motor saturates.
     """
+    rig = _rig_card(card, "card")
+    _, text = _simulated(rig, Path(path), medium, controller, similar_to, noise_A)
+    write_together({Path(path): text}, inputs=[Path(rig.source)])
+    return Path(path)
+
+
+def _simulated(
+    rig: YawRigCard,
+    path: Path,
+    medium: Literal["water", "air"],
+    controller: str,
+    similar_to: str | None,
+    noise_A: float,
+) -> tuple[YawRecord, str]:
+    """A simulated record, and the text of its file."""
+    from tank2sim.apps.rigs.yaw.control import AdaptiveController
+    from tank2sim.apps.rigs.yaw.records import yaw_record_text
     from tank2sim.apps.rigs.yaw.simulation import simulated_record
 
-    path = Path(path)
     if path.exists():
-        raise InputError(path, "", "is there already, and may be a measurement", "give --simulate a new name")
-    if controller not in CONTROLLERS:
-        raise InputError("--controller", "", f"{controller!r} is not known", f"there are: {', '.join(CONTROLLERS)}")
-    rig = _rig_card(card, "--simulate")
+        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
+    chosen = AdaptiveController() if controller == "adaptive" else None
     programme = _similar(rig, similar_to) if similar_to else None
-    record = simulated_record(
-        rig, path, noise_A, medium=medium, controller=CONTROLLERS[controller], programme=programme
-    )
-    write_together({path: yaw_record_text(record)}, inputs=[Path(rig.source)])
-    return path
+    record = simulated_record(rig, path, noise_A, medium=medium, controller=chosen, programme=programme)
+    return record, yaw_record_text(record)
 
 
-def _rig_card(given: Vessel | Card | str | Path, option: str) -> YawRigCard:
+def _rig_card(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
+    from tank2sim.apps.rigs.yaw.card import YawRigCard
+    from tank2sim.dynamics.vessel import as_vessel
+
     card = as_vessel(given).card
     if not isinstance(card, YawRigCard):
-        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give {option} a card of the yaw rig")
+        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give a card of the yaw rig as {argument}")
     return card
 
 
-def _similar(card: YawRigCard, text: str) -> YawProgramme:
-    """The programme that is a ship's motion ``L,B,R,T`` at the size of the card's body."""
+def _ship_motion(text: str) -> tuple[float, ...]:
+    """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
     try:
         length, beam, rate_degpmin, time_s = (float(word) for word in text.split(","))
     except ValueError:
         length = beam = rate_degpmin = time_s = 0.0
     if not all(0 < value < math.inf for value in (length, beam, abs(rate_degpmin), time_s)):
         remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
-        raise InputError("--similar-to", "", f"{text!r} is not a motion of a ship", remedy)
+        raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)
+    return length, beam, rate_degpmin, time_s
+
+
+def _similar(card: YawRigCard, text: str) -> YawProgramme:
+    """The programme of a ship's motion at the size of the card's body."""
+    from tank2sim.apps.rigs.yaw.programme import Similarity, programme_of
+
+    length, beam, rate_degpmin, time_s = _ship_motion(text)
     body = card.ship
     if body.length_m is None or body.beam_m is None:
         raise card.fault("ship", "has no length_m or no beam_m", "add them, on the waterline")
@@ -181,11 +297,28 @@ def _similar(card: YawRigCard, text: str) -> YawProgramme:
     try:
         return ratio.programme(math.radians(rate_degpmin / 60), time_s, programme_of(card))
     except ValueError as error:
-        raise InputError("--similar-to", "", str(error), "give another motion of the ship") from None
+        raise ArgumentError("similar_to", "", str(error), "give another motion of the ship") from None
+
+
+def _similarity(record: YawRecord, text: str) -> str:
+    """Sentence on the scale of rates between a ship's motion and its record."""
+    length, beam, rate_degpmin, time_s = _ship_motion(text)
+    model_degps = math.degrees(record.programme.max_rate_radps)
+    return (
+        f"{length:g} m x {beam:g} m at model size: rates times {60 * model_degps / rate_degpmin:.4g}, so "
+        f"{rate_degpmin:g} deg/min in {time_s:g} s is {model_degps:.4g} deg/s in {3 * record.programme.rise_s:.4g} s"
+    )
+
+
+def _with_notice(result: YawResult, text: str) -> YawResult:
+    return replace(result, study=replace(result.study, notes=(*result.study.notes, text)))
 
 
 def _floating_body(text: str) -> FloatingBody:
     """From ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
+    from tank2sim.apps.rigs.yaw.theory import FloatingBody
+    from tank2sim.dynamics.vessel import as_vessel
+
     if "," not in text:
         ship = as_vessel(text).card.ship
         sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
@@ -198,7 +331,7 @@ def _floating_body(text: str) -> FloatingBody:
     if missing or (sizes[4:] and sizes[4] is not None and not 0 < sizes[4] <= 1):
         problem = f"{text!r} does not state length, beam, draught and depth of water"
         remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
-        raise InputError("--theory", "", problem, remedy)
+        raise ArgumentError("theory", "", problem, remedy)
     length, beam, draught, depth = (size or 0.0 for size in sizes[:4])
     block = sizes[4] if len(sizes) > 4 else None
     return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)

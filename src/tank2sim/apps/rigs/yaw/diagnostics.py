@@ -106,7 +106,7 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
                     f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
                     "allowed"
                 )
-                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise --mirror-percent"
+                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise mirror_percent"
                 raise InputError(record.path, "", problem, remedy)
             place += 1
     worst = max(mirror)
@@ -210,6 +210,6 @@ def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[
     if nonlinear.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
         return [
             f"output_error is more accurate, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
-            f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; --method output_error puts it into a card."
+            f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; a card gets it with output_error as method."
         ]
     return []

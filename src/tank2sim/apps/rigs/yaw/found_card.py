@@ -14,7 +14,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import BYTE_ORDER_MARK
 
 TANK_WATER_KGPM3 = 1000.0
@@ -45,7 +45,7 @@ def known_added_inertia(result: YawIdentification, method: str) -> tuple[float, 
     source = result.records[0].path
     found = result.added_inertia(method)
     if found is None:
-        remedy = "give records in water, and in air or --inertia-kgm2"
+        remedy = "give records in water, and the inertia of the body: records in air, or inertia_kgm2"
         raise InputError(source, "", "does not separate the added inertia from the inertia of the body", remedy)
     if found[0] <= 0:
         raise InputError(source, "", "gives a negative added inertia, which no body has", "check J_zz and k_t")
@@ -58,12 +58,12 @@ def body_length(result: YawIdentification, given_m: float | None) -> float:
     Raises
     ------
     InputError
-        Neither the option nor a record states it.
+        Neither the argument nor a record states it.
     """
     for value in (given_m, *(record.constants.get("length_m") for record in result.records)):
         if value is not None:
             return value
-    remedy = "give --length-m, the model's length between perpendiculars, or a line '# length_m: 0.67'"
+    remedy = "give length_m, the model's length between perpendiculars, or a line '# length_m: 0.67'"
     raise InputError(result.records[0].path, "", "does not state the length of the model", remedy)
 
 
@@ -117,8 +117,8 @@ def rig_card_text(result: YawIdentification, method: str, *, name: str, source: 
     """
     estimate = result.estimates[method]
     if not estimate.friction:
-        remedy = "take --method energy_least_squares, as_many_equations or output_error"
-        raise InputError("--method", "", f"{method} gives no friction, and a rig card needs it", remedy)
+        remedy = "take energy_least_squares, as_many_equations or output_error"
+        raise ArgumentError("method", "", f"{method} gives no friction, and a rig card needs it", remedy)
     added = known_added_inertia(result, method) if result.medium == "water" else None
     base = known or UNKNOWN_RIG
     kept = ("current_lag_s", "max_current_A", "inertia_accelerating_kgm2", "inertia_braking_kgm2", "gravity_Nm",

@@ -32,7 +32,7 @@ from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS, Interval, intervals, 
 from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
 from tank2sim.apps.rigs.yaw.output_error import AngleFit, fit_angle
 from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, refuse_copied_records
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 
 YAW_METHODS = (
     "energy_least_squares",
@@ -162,7 +162,7 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     wet = tuple(record for record in records if record.medium == "water")
     dry = tuple(record for record in records if record.medium == "air")
     if not records:
-        raise InputError("tank2sim yaw", "", "no record was given", "give one or more CSV files")
+        raise ArgumentError("records", "", "is empty", "give one or more CSV files")
     alike = refuse_copied_records(records)
     if not wet:
         found = _result(dry, "air", options, None)
@@ -202,8 +202,8 @@ def parse_yaw_terms(text: str) -> tuple[str, ...]:
     for word in words:
         if word not in ENERGY_TERMS or words.count(word) > 1:
             known = ", ".join(term for term in ENERGY_TERMS if term != "inertia")
-            raise InputError(
-                "--terms", "", f"{word!r} is not a term, or is repeated", f"take any of {known}, once each"
+            raise ArgumentError(
+                "terms", "", f"{word!r} is not a term, or is repeated", f"take any of {known}, once each"
             )
     return ("inertia", *(term for term in ENERGY_TERMS if term in words))
 
@@ -318,7 +318,10 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
         return options.torque_constant_NmpA, []
     if len(constants) > 1:
         raise InputError(
-            records[0].path, "comment torque_constant_NmpA", "is not the same in all records", "give --torque-constant"
+            records[0].path,
+            "comment torque_constant_NmpA",
+            "is not the same in all records",
+            "give torque_constant_NmpA",
         )
     (stated,) = constants
     if stated is not None:
@@ -352,7 +355,7 @@ def _body(
             return inertia, _lacking(inertia)
     return None, [
         "J_zz is unknown, so that the added inertia cannot be separated from the total: give a record in air as "
-        "well, or --inertia-kgm2."
+        "well, or inertia_kgm2."
     ]
 
 
@@ -361,5 +364,5 @@ def _lacking(body: BodyInertia) -> list[str]:
         return []
     return [
         "J_zz has no standard error, and the error of the added inertia does not include one: give "
-        "--inertia-error-kgm2, or a line '# inertia_error_kgm2: 0.0002'."
+        "inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
     ]

@@ -72,7 +72,7 @@ class YawRecord:
     notes: tuple[str, ...] = ()
 
 
-def read_yaw_record(path: Path | str) -> YawRecord:
+def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     """Read ``t_s,phi_rad,current_A`` (or phi_deg), with the programme in comments.
 
     ``# medium: air``, ``# programme: reversing`` (or unidirectional, full_turn), ``# max_rate_degps: 15``, ``# rise_s:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import PurePath
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.answer.numbers import format_number
@@ -31,7 +31,7 @@ from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, YawIdentification
 from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
 from tank2sim.apps.rigs.yaw.study import YawMethodEstimate, YawStudy
 from tank2sim.cards import Card, parse_card
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,12 +71,15 @@ class YawResult(Result[YawStudy]):
         None if the result was read from its JSON.
     rig : YawRigCard, optional
         What is known of the rig.
+    files : mapping, optional
+        Paths and contents of the card's files, if the command writes one.
     """
 
     study: YawStudy
     method: str = BEST
     identification: YawIdentification | None = None
     rig: YawRigCard | None = None
+    files: Mapping[Path, str | bytes] = field(default_factory=dict)
     command: ClassVar[str] = "yaw"
 
     @property
@@ -88,7 +91,7 @@ class YawResult(Result[YawStudy]):
     def _known_method(self) -> str:
         if self.method not in self.study.methods:
             problem = f"{self.method} gave no estimate from these records"
-            raise InputError("--method", "", problem, f"take one of {', '.join(self.study.methods)}")
+            raise ArgumentError("method", "", problem, f"take one of {', '.join(self.study.methods)}")
         return self.method
 
     @property

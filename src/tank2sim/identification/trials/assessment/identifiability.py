@@ -196,8 +196,7 @@ def _remedy(missing: list[str]) -> str:
     needed = [word for letter, word in motions.items() if any(getattr(term, letter) for term in terms)]
     verb = "changes" if len(needed) == 1 else "change"
     moving = f"add a run in which {_listed(needed)} {verb}, or " if needed else ""
-    held = " ".join(f"--hold {_short(name)}" for name in missing)
-    return f"{moving}hold them at the card's values: {held}"
+    return f"{moving}hold them at the card's values: {' '.join(map(_short, missing))}"
 
 
 def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str, float], ...]:

@@ -50,7 +50,7 @@ def _chosen(result: Identification) -> list[str]:
         return []  # it has one structure
     if not result.structures and result.structure == "card":
         return [
-            "other structures were not tried: --structure auto cross-validates them, cross_flow extrapolates to turns"
+            "other structures were not tried: structure auto cross-validates them, cross_flow extrapolates to turns"
         ]
     if not result.structures:
         return []
@@ -68,8 +68,7 @@ def _widened(result: Identification) -> list[str]:
     far = max(scale.values()) > LACKING
     mark = f"{CHECK} " if far and result.started.uncertainty else ""  # assumed errors may be too small
     found = [
-        f"{mark}the card's standard errors were widened as the trials demand: {', '.join(wide)}; --trust-card keeps "
-        "them"
+        f"{mark}the card's standard errors were widened as the trials demand: {', '.join(wide)}; trust_card keeps them"
     ]
     if far:
         found.append(

@@ -93,10 +93,10 @@ def structure_by_evidence(
     criterion = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
     chosen = (
         "structure: the card's own third-order terms, which predict trials that were left out better than cross-flow "
-        f"drag {criterion}; --structure cross_flow takes that"
+        f"drag {criterion}; structure cross_flow takes that"
         if taken == "card"
         else "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer "
-        f"strongly {criterion}; --structure card keeps them"
+        f"strongly {criterion}; structure card keeps them"
     )
     hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
     in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER

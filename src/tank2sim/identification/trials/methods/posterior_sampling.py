@@ -23,15 +23,14 @@ import numpy as np
 from scipy.linalg import eigh
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.shooting import Shooting, cut, whitened, whitening_transposed
+from tank2sim.identification.trials.options import DRAWS_OF_CHAIN, Sampler
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.rows import Chain
 from tank2sim.simulation.scheme import runge_kutta_step
-
-SAMPLERS = ("nuts", "ensemble")
 
 CHAINS = 4
 """Independent chains, the number for which the limit of R-hat is stated (Vehtari et al. 2021, Bayesian Analysis 16)."""
@@ -41,10 +40,6 @@ LARGEST_R_HAT = 1.01
 
 FEWEST_EFFECTIVE = 400
 """Effective sample size from which R-hat and quantiles are reliable with four chains (Vehtari et al. 2021)."""
-
-DRAWS_OF_CHAIN = 400
-"""Draws of each of :data:`CHAINS` chains. Each is worth about one independent draw; 1600 bring R-hat of 24 parameters
-below its limit (project choice)."""
 
 TUNE = 100
 """Draws in which the step of the Hamiltonian sampler adapts; coordinates are scaled by the estimate's covariance, so
@@ -80,7 +75,7 @@ class PosteriorSamples:
     r_hat, effective : array (k,)
         Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al. 2021).
     sampler : str
-        One of :data:`SAMPLERS`.
+        One of :data:`.options.Sampler`.
     simulations : int
         Simulations of all trials; one with its adjoint is one.
     """
@@ -89,7 +84,7 @@ class PosteriorSamples:
     values: Array
     r_hat: Array
     effective: Array
-    sampler: str
+    sampler: Sampler
     simulations: int
 
     @property
@@ -123,23 +118,15 @@ class PosteriorSamples:
         words = f"posterior of {len(self.free)} parameters by {self.sampler}, {len(self.flat)} draws: {reached}"
         if self.converged:
             return [words]
-        wanted = f"below {LARGEST_R_HAT} and {FEWEST_EFFECTIVE} or more are wanted: give more --draws"
+        wanted = f"below {LARGEST_R_HAT} and {FEWEST_EFFECTIVE} or more are wanted: give more draws"
         return [f"{NOT_CONVERGED}: {words}; {wanted}"]
 
 
-def check_sampler(name: str) -> None:
-    """Refuse an unknown sampler, or one whose library is not installed.
-
-    Raises
-    ------
-    InputError
-        See above.
-    """
-    if name not in SAMPLERS:
-        raise InputError("--posterior", "", f"{name!r} is not known", f"there are: {', '.join(SAMPLERS)}")
+def check_sampler(name: Sampler) -> None:
+    """Raise ArgumentError for a sampler whose library is not installed."""
     for library in ("nutpie" if name == "nuts" else "emcee", "arviz"):
         if find_spec(library) is None:
-            raise InputError("--posterior", "", f"{library} is not installed", "pip install 'tank2sim[posterior]'")
+            raise ArgumentError("posterior", "", f"{library} is not installed", "pip install 'tank2sim[posterior]'")
 
 
 class LogPosterior:
@@ -327,7 +314,7 @@ def _stretch(estimate: Estimate, before: Array) -> Array:
 def sample_posterior(
     problem: Problem,
     estimate: Estimate,
-    sampler: str = "nuts",
+    sampler: Sampler = "nuts",
     draws: int = DRAWS_OF_CHAIN,
     *,
     seed: int = 0,
@@ -350,7 +337,7 @@ def sample_posterior(
     Raises
     ------
     InputError
-        The sampler is not known or not installed.
+        The library of the sampler is not installed.
     """
     check_sampler(sampler)
     density = LogPosterior(problem, estimate, robust=robust)

@@ -25,7 +25,7 @@ from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.model import Model, Quantity, same_symbol
 from tank2sim.dynamics.roll import roll_terms
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, noise_alone
 from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
@@ -297,7 +297,7 @@ def problem_from_card(
         known = next((known for known in (name, f"mmg.{name}") if known in free), f"derivatives.{name}")
         if known not in free:
             text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
-            raise InputError("--hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
+            raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
         del free[known]
     if not free:
         raise InputError(card.source, "derivatives", "nothing is left to estimate", "give derivatives with a value")

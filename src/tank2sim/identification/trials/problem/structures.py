@@ -19,6 +19,7 @@ from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.effects import hull, loaded_rudder
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.identification.trials.options import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURE_WORDS
 from tank2sim.plugins import Registry
 
 TYPICAL = {"v": 0.3, "r": 0.7, "d": 0.6, "u": 0.4}
@@ -58,7 +59,7 @@ class ModelStructure:
     Parameters
     ----------
     name : str
-        Value of ``--structure`` on the command line.
+        Value of the argument `structure`.
     description : str
         A sentence for the help text.
     start : callable
@@ -95,22 +96,13 @@ def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
     return with_effect(bare, loaded_rudder.LOADED_RUDDER.name, _LOADED_RUDDER)
 
 
-AUTO = "auto"
-"""Name of the choice of the structure that cross-validation prefers."""
-
-AVERAGE = "average"
-"""Name of the average over structures, by the weights of their predictions."""
-
-BY_EVIDENCE = "evidence"
-"""Name of the choice between the terms of the card and cross-flow drag by an information criterion."""
-
 STRUCTURES: Registry[ModelStructure] = Registry(
     "tank2sim.structures",
     (
-        ModelStructure("linear", "linear derivatives alone (3.5)", _linear),
-        ModelStructure("card", "the terms and effects that the card has", lambda card: card),
-        ModelStructure("cross_flow", "linear hull, cross-flow drag, rudder in the propeller's slipstream", _cross_flow),
-        ModelStructure("third_order", "the card's terms and all third-order terms in v and r", _third_order),
+        ModelStructure("linear", STRUCTURE_WORDS["linear"], _linear),
+        ModelStructure("card", STRUCTURE_WORDS["card"], lambda card: card),
+        ModelStructure("cross_flow", STRUCTURE_WORDS["cross_flow"], _cross_flow),
+        ModelStructure("third_order", STRUCTURE_WORDS["third_order"], _third_order),
     ),
     ModelStructure,
     reserved=(AUTO, AVERAGE, BY_EVIDENCE),
