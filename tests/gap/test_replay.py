@@ -8,12 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
-from tank2sim.gap.proof.open_loop import later
 from tank2sim.gap.proof.replay import TrialReplays, replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.trials import Trial
@@ -169,14 +166,3 @@ def test_an_order_that_a_gear_with_a_largest_rate_follows_keeps_its_time(mariner
     fine = {"motion.psi": np.radians(0.1), "motion.r": np.radians(0.02), "motion.x": 0.6, "motion.y": 0.6}
     (replay,) = replay_trials(mariner_card, mariner_card, measured, fine, held_out=False)
     assert replay.misfit("before") < 0.5
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.lists(st.floats(-1, 1), min_size=3, max_size=20), st.floats(-2.5, 2.5))
-def test_values_that_come_later_are_means_over_the_shifted_step(values: list[float], steps: float) -> None:
-    fine = 1000
-    held = np.concatenate([np.full(5 * fine, values[0]), np.repeat(values, fine), np.full(5 * fine, values[-1])])
-    shift = round(steps * fine)
-    begin = 5 * fine - shift
-    expected = held[begin : begin + len(values) * fine].reshape(len(values), fine).mean(axis=1)
-    np.testing.assert_allclose(later(np.array(values), steps), expected, atol=2e-3)

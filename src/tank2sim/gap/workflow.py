@@ -65,8 +65,8 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     lowered_bound_notice,
     polynomial_over_trials,
 )
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 RIVALS = 12
 """Explanations that are reported."""

@@ -24,7 +24,6 @@ from tank2sim.answer.charts.parts import (
 )
 from tank2sim.gap.outcome.study import GapReplay, GapStudy, TrialMisfit
 from tank2sim.gap.result import MisfitPlace
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_points
 from tank2sim.results.gap_text import trial_name
@@ -37,6 +36,7 @@ from tank2sim.results.trial_charts import (
     history_grid,
     track_grid,
 )
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import to_si
 
 MOST_TRIALS_DRAWN = 12

@@ -25,29 +25,11 @@ from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.motion_record import FED, STATES
 from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, holds_other_angles, rudder_before
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.zigzag_reversals import COURSE_ERROR, FittedZigzag, fitted_zigzag
-
-STATES = {
-    "u_mps": "motion.u",
-    "v_mps": "motion.v",
-    "r_radps": "motion.r",
-    "psi_rad": "motion.psi",
-    "x_m": "motion.x",
-    "y_m": "motion.y",
-}
-"""Signal of a trial to the state of a model that it measures."""
-
-FED = {
-    "n_radps": "propeller.speed",
-    "wind_speed_mps": "wind.speed",
-    "wind_direction_rad": "wind.direction",
-    "current_speed_mps": "current.speed",
-    "current_direction_rad": "current.direction",
-}
-"""Signal of a trial to the input of a model, in addition to the rudder."""
 
 SMOOTHING = 0.3
 """Smoothing time of recorded signals for figures, L/u0 (project choice: below the time of any peak)."""

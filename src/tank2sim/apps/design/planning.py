@@ -32,8 +32,8 @@ from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.writing import TestedRange
 from tank2sim.errors import ArgumentError
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.marks import ASSUMED, ASSUMED_TANK, CHECK, LINEARISED
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import from_si, to_si
 
 _LISTED = 6

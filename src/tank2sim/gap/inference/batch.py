@@ -24,7 +24,8 @@ from tank2sim.identification.trials.problem.measured_motion import MEASURED_STAT
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, seen_in
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.trials import Trial, sampling_step
-from tank2sim.simulation.recorded import FED, SMOOTHING
+from tank2sim.simulation.motion_record import FED
+from tank2sim.simulation.recorded import SMOOTHING
 
 _Truths = NDArray[np.bool_]
 

@@ -32,9 +32,9 @@ from tank2sim.gap.outcome.study import (
 )
 from tank2sim.gap.proof.cross_check import proof_cautions
 from tank2sim.gap.result import NO_EFFECT_MISSING, Acting, Gap, MisfitPlace, Named, NextTest, Passed
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import Indices, drawn_columns, thin_points
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import from_si, in_words, to_si
 
 NEXT_TEST_FILE = "next_test.csv"

@@ -14,7 +14,7 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND
 from tank2sim.dynamics.mmg.equivalent import linear_equivalent
-from tank2sim.dynamics.model import Input, Parameter
+from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.gap.inference.prior import CLOCK_SHARE
 from tank2sim.gap.outcome.next_test_candidates import (
     REVOLUTIONS,
@@ -25,10 +25,10 @@ from tank2sim.gap.outcome.next_test_candidates import (
     on_heading,
     orders_csv,
 )
-from tank2sim.gap.proof.open_loop import INSTANTS, delayed, parts_of, shown_by
+from tank2sim.gap.proof.open_loop import COARSEST, INSTANTS, delays_of, shown_by
 from tank2sim.gap.result import NextTest
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_held
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
 
@@ -374,7 +374,7 @@ class SailedShip:
 
     def _after(self, x: Array, inputs: Array, p: Array) -> Array:
         """States (rows, nx) a step later."""
-        parts = parts_of(self.model, self.step_s)
+        parts = max(1, math.ceil(self.step_s / (COARSEST * self.model.step_s) - 1e-9))
         for _ in range(parts):
             x = self._step(x, inputs, p, np.array([self.step_s / parts]))[0]
         return x
@@ -435,7 +435,7 @@ class SailedShip:
         p = self.p + self._of_parameters(change)
         if not any(EFFECTS[entry.name].delays for entry in self.card.effects):
             return acting
-        return np.stack([delayed(self.card, self.model, rows, self.step_s, p) for rows in acting])
+        return np.stack([_delayed(self.card, self.model, rows, self.step_s, p) for rows in acting])
 
     def _of_parameters(self, change: Mapping[str, float]) -> Array:
         return np.array([change.get(name, 0.0) for name in self.names])
@@ -471,3 +471,13 @@ def _independent(covariance: Array) -> Array:
     kept = spread > 1e-9
     columns: Array = scale[:, None] * axes[:, kept] * np.sqrt(spread[kept])
     return columns
+
+
+def _delayed(card: ManoeuvringCard, model: Model, inputs: Array, step_s: float, p: Array) -> Array:
+    """Inputs (n, nu), each row held for `step_s`, with the delays of the card's effects at parameters `p`."""
+    late = inputs.copy()
+    edges = step_s * np.arange(len(inputs) + 1, dtype=float)
+    for name, delay in delays_of(card, model, p).items():
+        column = model.input_names.index(name)
+        late[:, column] = means_of_held(edges[:-1], inputs[:, column], edges - delay)
+    return late

@@ -14,8 +14,8 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
 from tank2sim.gap.result import Surroundings
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 ByTrial = Mapping[str, Mapping[str, Surroundings]]
 """Effect to the name of a trial to its wind or current."""
@@ -77,7 +77,7 @@ class SurroundedTrial:
             self.replayer, with_columns(trial, self._in_trial(np.zeros(len(self.typical))))
         )
         self._known = ~np.isnan(still.readings)
-        self.passage = card.ship.length_m / card.model.speed_mps / (still.step_s * still.every)
+        self.passage = self.replayer.passage_s / float(np.median(np.diff(still.times)))
         self._state = self.replayer.guess_initial_state(still, self.sigma, self.replayer.model.parameter_values())
         self.compare(1.0)
 

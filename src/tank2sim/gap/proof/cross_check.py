@@ -15,7 +15,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, downhill, input_record
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 _LINEAR = ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd", "Xu")
 """Terms of the linear black box: sway velocity, yaw rate and rudder in Y and N, speed in X."""

@@ -15,9 +15,10 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS, prepare
 from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.simulation.motion_record import motion_record
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import step_and_constants
 
@@ -44,45 +45,50 @@ ASTERN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class InputRecord:
-    """A trial on the equal steps of a replayer.
+    """A trial on its own rows, thinned where they are closer than a step of the model.
 
     Parameters
     ----------
     name : str
         Name of the trial.
-    begin_s, step_s : float
-        First instant in the trial's own time, and the step of the inputs, s.
+    time_s : array (n,)
+        Times of the rows, s, in the trial's own time, however uneven.
     inputs : array (n, nu)
-        Each row held for a step: as fine as the sampling, for the mean of two orders was never ordered, and a
-        gear at its largest rate responds differently to it.
-    every : int
-        Each n-th instant is compared.
+        Inputs from each row to the next: means of measured ones, and the order that the row shows. The mean of two
+        orders was never ordered, and a gear at its largest rate responds differently to it.
+    compared : array (m,) of int
+        Rows at which simulated and measured are compared.
     readings : array (m, ny)
-        Single readings at those instants; nan where there is none.
+        Single readings at those rows; nan where there is none.
+    late_s : float
+        Delay of the order by the card, s.
     instants : array (n,), optional
-        Share of the interval before each row at which its order was given (with a delay it may lie half an interval
-        outside); without it, half.
+        Share of the interval before each row at which the order of the row was given; without it, half.
     """
 
     name: str
-    begin_s: float
-    step_s: float
+    time_s: Array
     inputs: Array
-    every: int
+    compared: NDArray[np.intp]
     readings: Array
+    late_s: float = 0.0
     instants: Array | None = None
 
     @property
-    def middle(self) -> float:
-        """Share of an interval at which an order was given on average: half of it, and what a delay adds."""
-        return 0.5 if self.instants is None else float(self.instants[0])
+    def times(self) -> Array:
+        """Compared times (m,), s."""
+        return self.time_s[self.compared]
 
     @property
-    def times(self) -> Array:
-        """Compared instants (m,) in the trial's own time, s."""
-        times: Array = self.begin_s + self.every * self.step_s * np.arange(len(self.readings), dtype=float)
-        return times
+    def given_s(self) -> Array:
+        """Time (n,), s, from which the order of each row holds; that of the first row holds from the beginning."""
+        shares = 0.5 if self.instants is None else self.instants[1:]
+        after = self.time_s[:-1] + shares * np.diff(self.time_s) + self.late_s
+        return np.concatenate([[-np.inf], np.maximum.accumulate(after)])
 
+
+_FEWEST_ROWS = 10
+"""Rows of a record at least (project choice: a state of six and a noise are found from them)."""
 
 _LEAST_RUDDER = math.radians(1.0)
 """A first order below this is not an execute (project choice)."""
@@ -96,9 +102,9 @@ _NEAR = 2.0
 
 _ORDER = "rudder.command"
 
-_UNSURE_FROM = 0.01
+_UNSURE_FROM = 0.004
 """Interval between two readings of the order, in L/u0, from which the instants of its steps are estimated (project
-choice: a shorter one moves a ship by less than its sensors show)."""
+choice: of zigzags read to 0.05 deg of heading, 0.005 is seen)."""
 
 _REACH = 0.02
 """Change of the instant of an order, as a share of the interval in which it was given, for the derivative in it
@@ -156,15 +162,18 @@ class Replayer:
         self._shown = shown_by(self.model, seen)
         ordered = driven_by == "order" and _ORDER in self.model.input_names
         self._order = self.model.input_names.index(_ORDER) if ordered else None
-        self._passage_s = card.ship.length_m / card.model.speed_mps
+        self.passage_s = card.ship.length_m / card.model.speed_mps
         self._nominal = np.array([state.nominal for state in self.model.states])
 
-    def states(self, record: InputRecord, start: Array, p: Array) -> Array:
-        """States (n, nx) at the instants of a record's inputs; nan once out of bounds."""
+    def states(self, record: InputRecord, start: Array, p: Array, begin: int = 0) -> Array:
+        """States (n - begin, nx) at the rows of a record, from the state `start` at the row `begin`; nan once out of
+        bounds."""
         lengths, inputs, places = self._integration_steps(record)
+        first = places[begin]
         constants = np.array(self._constants(p)).ravel()
         with np.errstate(all="ignore"):
-            states = self._steps.run(start, inputs, p, constants, lengths[:, None])[places]
+            steps = self._steps.run(start, inputs[first:], p, constants, lengths[first:, None])
+            states: Array = steps[places[begin:] - first]
             lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)
         if lost.any():
             states[int(np.argmax(lost)) :] = np.nan
@@ -173,29 +182,29 @@ class Replayer:
     def _integration_steps(self, record: InputRecord) -> tuple[Array, Array, NDArray[np.intp]]:
         """Lengths (k,), s, and inputs (k, nu) of the integration steps, and the places (n,) of the record's rows.
 
-        An order is given, on average, half an interval before the first reading that shows it. Where it matters, a step
-        ends where one is given: a gear at its largest rate takes no notice of the mean of two orders.
+        A step ends where an order is given, on average half an interval before the first row that shows it: a gear at
+        its largest rate takes no notice of the mean of two orders.
         """
-        parts, count = parts_of(self.model, record.step_s), len(record.inputs) - 1
-        if self._order is None or not self._coarse(record):
-            inputs = np.repeat(record.inputs[:-1], parts, axis=0)
-            if self._order is not None:
-                inputs[:, self._order] = np.repeat(record.inputs[:, self._order], parts)[parts // 2 :][: len(inputs)]
-            return np.full(len(inputs), record.step_s / parts), inputs, np.arange(count + 1) * parts
-        order = record.inputs[:, self._order]
-        shares = np.full(count, record.middle) if record.instants is None else record.instants[1:]
-        given = np.maximum.accumulate(np.clip(np.arange(count) + shares, 0, count))
-        edges = np.sort(np.append(np.arange(count * parts + 1) / parts, given[np.diff(order) != 0]))
-        inputs = record.inputs[np.minimum(edges[:-1].astype(np.intp), count - 1)]
-        inputs[:, self._order] = order[np.searchsorted(given, edges[:-1], side="right")]
-        return np.diff(edges) * record.step_s, inputs, np.searchsorted(edges, np.arange(count + 1))
+        time, spans = record.time_s, np.diff(record.time_s)
+        parts = np.maximum(1, np.ceil(spans / (COARSEST * self.model.step_s) - 1e-9)).astype(np.intp)
+        first = np.cumsum(parts) - parts
+        share = (np.arange(parts.sum()) - np.repeat(first, parts)) / np.repeat(parts, parts)
+        edges = np.append(np.repeat(time[:-1], parts) + share * np.repeat(spans, parts), time[-1])
+        if self._order is None:
+            return np.diff(edges), np.repeat(record.inputs[:-1], parts, axis=0), np.append(first, parts.sum())
+        given, order = record.given_s, record.inputs[:, self._order]
+        moves = given[1:][np.diff(order) != 0]
+        edges = np.union1d(edges, moves[(moves > time[0]) & (moves < time[-1])])
+        inputs = record.inputs[np.searchsorted(time, edges[:-1], side="right") - 1]
+        inputs[:, self._order] = order[np.searchsorted(given, edges[:-1], side="right") - 1]
+        return np.diff(edges), inputs, np.searchsorted(edges, time)
 
     def motion(self, record: InputRecord, start: Array, p: Array) -> Array:
-        """Readings of the sensors (m, ny) at the compared instants of a record."""
+        """Readings of the sensors (m, ny) at the compared rows of a record."""
         return self._readings(record, self.states(record, start, p), p)
 
     def _readings(self, record: InputRecord, states: Array, p: Array) -> Array:
-        return self._shown(states[:: record.every], record.inputs[:: record.every], p)[0]
+        return self._shown(states[record.compared], record.inputs[record.compared], p)[0]
 
     def fit_record(
         self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None
@@ -217,35 +226,15 @@ class Replayer:
                 return found[:2]
         return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
 
-    def delayed_by_instants(self, record: InputRecord, given: Array) -> InputRecord:
-        """A coarse record whose order a fault of the card delays, with that delay in its instants.
-
-        The mean of two orders, by which a part of an interval is else delayed, was never ordered. `given` (n, nu) are
-        the inputs without the delay.
-        """
-        known = dict(zip(self.model.parameter_names, self.model.parameter_values(), strict=True))
-        effects = [EFFECTS[entry.name] for entry in self.card.effects]
-        keys = [effect.model_names()[effect.delays[_ORDER]] for effect in effects if _ORDER in effect.delays]
-        late = sum(known[key] for key in keys) / record.step_s
-        if self._order is None or not late or not self._coarse(record):
-            return record
-        whole = math.floor(late + 0.5)
-        inputs = record.inputs.copy()
-        inputs[:, self._order] = later(given[:, self._order], whole)
-        return replace(record, inputs=inputs, instants=np.full(len(inputs), 0.5 + late - whole))
-
-    def _coarse(self, record: InputRecord) -> bool:
-        """Whether it matters when an order between two readings was given."""
-        return record.step_s > _UNSURE_FROM * self._passage_s
-
     def _unsure_steps(self, record: InputRecord) -> NDArray[np.intp]:
         """Rows (m,) at which a step of the order is seen first that was given at an unknown instant before."""
         none: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
-        if self._order is None or not self._coarse(record):
+        if self._order is None:
             return none
         change = np.abs(np.diff(record.inputs[:, self._order]))
         others = np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1]))
-        rows = np.flatnonzero((change > _STEP_OF_ORDER) & (others < _ALONE * change)) + 1
+        unsure = np.diff(record.time_s) > _UNSURE_FROM * self.passage_s
+        rows = np.flatnonzero(unsure & (change > _STEP_OF_ORDER) & (others < _ALONE * change)) + 1
         return rows if len(rows) <= _MOST_STEPS else none
 
     def _least_squares_instants(
@@ -264,14 +253,13 @@ class Replayer:
         early step of an unstable ship is a large one later, where the motion is not nearly linear in it. None where a
         beginning is missed by more than `most`, or a motion exceeds all bounds.
         """
-        middle = record.middle
         guess, spread = _first_state(self, record, sigma, p)
         known, size = ~np.isnan(record.readings), len(guess)
-        unknown = np.append(guess if near is None else near, np.full(len(rows), middle))
+        unknown = np.append(guess if near is None else near, np.full(len(rows), 0.5))
         reach = np.append(1e-4 * self._nominal, np.full(len(rows), _REACH))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
-            last = int(rows[count]) if count < len(rows) else len(record.inputs)
+            last = int(rows[count]) if count < len(rows) else len(record.time_s)
             part, moved = _beginning_of(record, last), rows[:count]
             compared = known[: len(part.readings)]
             free = np.arange(size + count)
@@ -285,7 +273,7 @@ class Replayer:
                 begun, shares = values[:size], values[size:]
                 shown = self.motion(self._given_at(part, moved, shares), begun, p)
                 away = ((shown - part.readings) / sigma)[compared]
-                return np.concatenate([away, (begun - guess) / spread, (shares - middle) * math.sqrt(12.0)])
+                return np.concatenate([away, (begun - guess) / spread, (shares - 0.5) * math.sqrt(12.0)])
 
             def slopes(
                 values: Array,
@@ -293,7 +281,7 @@ class Replayer:
                 moved: NDArray[np.intp] = moved,
                 compared: NDArray[np.bool_] = compared,
             ) -> Array:
-                inward = np.where(values > middle, -1.0, 1.0)  # of an instant, away from the nearer bound
+                inward = np.where(values > 0.5, -1.0, 1.0)  # of an instant, away from the nearer bound
                 inward[:size] = 1.0
                 begun, shares = values[:size], values[size:]
                 by_value = self._slopes_of_motion(part, moved, shares, begun, p, inward * reach[: len(values)])
@@ -301,7 +289,7 @@ class Replayer:
                 return np.concatenate([(by_value / sigma[:, None])[compared], of_prior])
 
             low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
-            low[size:], high[size:] = middle - 0.5, middle + 0.5
+            low[size:], high[size:] = 0.0, 1.0
             if not np.isfinite(misfit(unknown[free])).all():
                 return None
             scale = np.append(spread, np.full(count, 0.3))
@@ -337,26 +325,20 @@ class Replayer:
         for place, (row, step) in enumerate(zip(rows, reach[len(start) :], strict=True)):
             moved_shares = shares.copy()
             moved_shares[place] += step
-            begin = self._unmoved_before(record, int(row))
-            rest = _from(self._given_at(record, rows, moved_shares), begin)
-            after = shown[begin // record.every :]
-            change = (self.motion(rest, states[begin], p) - after) / step
-            slopes[begin // record.every :, :, len(start) + place] = change
+            begin = _compared_before(record, int(row))
+            first = int(record.compared[begin])
+            changed = self._given_at(record, rows, moved_shares)
+            after = np.full((len(record.time_s), len(start)), np.nan)
+            after[first:] = self.states(changed, states[first], p, first)
+            change = (self._readings(changed, after, p) - shown)[begin:] / step
+            slopes[begin:, :, len(start) + place] = change
         return np.nan_to_num(slopes)
-
-    def _unmoved_before(self, record: InputRecord, row: int) -> int:
-        """The last compared row before a step of the order at `row` around which no order changes, or 0."""
-        order = record.inputs[:, self._order]
-        for begin in range((row - 2) // record.every * record.every, 0, -record.every):
-            if order[begin - 1] == order[begin] == order[begin + 1]:
-                return begin
-        return 0
 
     @staticmethod
     def _given_at(record: InputRecord, rows: NDArray[np.intp], shares: Array) -> InputRecord:
         if not len(rows):
             return record
-        instants = np.full(len(record.inputs), record.middle)
+        instants = np.full(len(record.time_s), 0.5)
         instants[rows] = shares
         return replace(record, instants=instants)
 
@@ -434,19 +416,22 @@ class Replayer:
 
 def _beginning_of(record: InputRecord, rows: int) -> InputRecord:
     """The first `rows` rows of a record."""
-    return replace(record, inputs=record.inputs[:rows], readings=record.readings[: -(-rows // record.every)])
-
-
-def _from(record: InputRecord, row: int) -> InputRecord:
-    """A record with instants from a compared row on."""
-    assert record.instants is not None
+    kept = record.compared < rows
     return replace(
         record,
-        begin_s=record.begin_s + row * record.step_s,
-        inputs=record.inputs[row:],
-        readings=record.readings[row // record.every :],
-        instants=record.instants[row:],
+        time_s=record.time_s[:rows],
+        inputs=record.inputs[:rows],
+        compared=record.compared[kept],
+        readings=record.readings[kept],
+        instants=None if record.instants is None else record.instants[:rows],
     )
+
+
+def _compared_before(record: InputRecord, row: int) -> int:
+    """The last of the compared rows, as a place among them, before the interval in which the order of `row` was
+    given; the first one if there is none."""
+    earliest = record.time_s[row - 1] + record.late_s
+    return max(int(np.searchsorted(record.times, earliest, side="right")) - 1, 0)
 
 
 def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:
@@ -455,11 +440,6 @@ def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:
     shown = ca.vcat([model.symbol(sensor if sensor in model else name) for sensor, name in pairs])
     arguments = [model.x, model.u, model.p]
     return RowFunction(ca.Function("shown", arguments, [ca.densify(model.expand(shown))], {"cse": True}))
-
-
-def parts_of(model: Model, step_s: float) -> int:
-    """Integration steps, none longer than :data:`COARSEST` of the model's own, in a step of the inputs."""
-    return max(1, math.ceil(step_s / (COARSEST * model.step_s) - 1e-9))
 
 
 def difference_slopes(function: Callable[[Array], Array], at: Array, value: Array, reach: Array) -> Array:
@@ -488,67 +468,68 @@ def downhill(misfit: Callable[[Array], Array], at: Array, value: Array, slopes: 
 
 
 def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
-    """A trial on equal steps: of one sample, or of as many (an odd number) as a step of the model holds.
+    """A trial on its own rows, thinned where they are closer than a step of the model; each order keeps its row.
 
     Raises
     ------
     InputError
         The trial is too short, or has none of the compared signals.
     """
-    model, sampling = replayer.model, sampling_step(trial)
-    stride = max(1, int(model.step_s / sampling + 1e-6))
-    stride -= 1 - stride % 2  # the middle of an odd number of samples is a sample
-    run = prepare(model, trial, replayer.seen, step_s=(stride + 1e-3) * sampling)
+    model, record = replayer.model, motion_record(replayer.model, trial, replayer.seen)
+    if len(record.time_s) < _FEWEST_ROWS:
+        raise InputError(trial.path, "", f"has only {len(record.time_s)} rows", "leave it out")
+    if np.isnan(record.measured).all():
+        raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
+    time, sampling = record.time_s, sampling_step(trial)
     known = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    every = max(1, round(known["ship.length"] / known["ship.speed"] / INSTANTS / run.step_s))
-    times = run.times[::every]
-    nearest = np.clip(np.searchsorted(trial.time_s, times - 0.5 * sampling), 0, len(trial.time_s) - 1)
-    off = np.abs(trial.time_s[nearest] - times) > 0.5 * sampling
-    variables = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
-    readings = np.full((len(times), len(replayer.seen)), np.nan)
-    for place, name in enumerate(replayer.seen):
-        if (values := trial.signals.get(variables[name])) is not None:
-            readings[:, place] = np.where(off, np.nan, values[nearest])
-    inputs = delayed(replayer.card, model, run.inputs, run.step_s)
-    record = InputRecord(run.name, run.begin_s, run.step_s, inputs, every, readings)
-    return replayer.delayed_by_instants(record, run.inputs)
+    step = max(1, int(model.step_s / sampling + 1e-6)) * sampling
+    every = max(1, round(known["ship.length"] / known["ship.speed"] / INSTANTS / step)) * step
+    wanted = np.arange(time[0], time[-1] + 1e-6 * sampling, every)
+    nearest = np.clip(np.searchsorted(time, wanted - 0.5 * sampling), 0, len(time) - 1)
+    seen = np.abs(time[nearest] - wanted) <= 0.5 * sampling
+    moved = np.flatnonzero((np.diff(record.inputs[:, record.orders], axis=0) != 0).any(axis=1)) + 1
+    bins = np.floor((time - time[0]) / step + 1e-6)
+    kept = np.flatnonzero(np.diff(bins, prepend=-1.0) > 0)
+    kept = np.union1d(np.concatenate([kept, moved, moved - 1, nearest[seen]]), len(time) - 1)
+    instants = np.union1d(time[kept], wanted[~seen])  # times without a row stay gaps
+    late = delays_of(replayer.card, model)
+    edges = np.append(instants, 2 * instants[-1] - instants[-2])
+    inputs = np.tile(model.input_values(), (len(instants), 1))
+    row = np.searchsorted(time, instants, side="right") - 1
+    for column, name in enumerate(model.input_names):
+        if name == _ORDER and record.orders[column]:
+            inputs[:, column] = record.inputs[row, column]
+        else:
+            inputs[:, column] = record.means(column, edges - late.get(name, 0.0))
+    compared = np.searchsorted(instants, np.where(seen, time[nearest], wanted))
+    readings = np.where(seen[:, None], record.measured[nearest], np.nan)
+    delay = late.get(_ORDER, 0.0) if record.orders[model.input_names.index(_ORDER)] else 0.0
+    return InputRecord(trial.name, instants, inputs, compared, readings, delay)
 
 
-def delayed(card: ManoeuvringCard, model: Model, inputs: Array, step_s: float, p: Array | None = None) -> Array:
-    """Inputs (n, nu), each row held for `step_s`, with the delays of the card's effects at parameters `p`."""
+def delays_of(card: ManoeuvringCard, model: Model, p: Array | None = None) -> dict[str, float]:
+    """Delay of each input by the effects of the card at parameters `p`, s."""
     known = dict(zip(model.parameter_names, model.parameter_values() if p is None else p, strict=True))
-    late = inputs.copy()
-    for entry in card.effects:
-        effect = EFFECTS[entry.name]
+    delays: dict[str, float] = {}
+    for effect in (EFFECTS[entry.name] for entry in card.effects):
         for name, key in effect.delays.items():
-            place = model.input_names.index(name)
-            late[:, place] = later(late[:, place], known[effect.model_names()[key]] / step_s)
-    return late
-
-
-def later(values: Array, steps: float) -> Array:
-    """Values (n,), each held for a step, delayed by `steps` (any number); the first value is held before."""
-    n = len(values)
-    edges: Array = np.arange(-1, n + 2, dtype=float)
-    edges[0], edges[-1] = -n - abs(steps), n + 1 + abs(steps)
-    areas = np.concatenate([[values[0] * edges[0], 0.0], np.cumsum(values)])
-    areas = np.append(areas, areas[-1] + values[-1] * (edges[-1] - n))
-    at = np.interp(np.arange(n + 1) - steps, edges, areas)
-    means: Array = np.diff(at)
-    return means
+            delays[name] = delays.get(name, 0.0) + known[effect.model_names()[key]]
+    return delays
 
 
 def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array) -> tuple[Array, Array]:
     """State read off the first :data:`FIRST` L/u0 of a record by straight lines, and how far to trust it (nx,) each."""
-    model, step = replayer.model, record.every * record.step_s
-    n = max(3, round(FIRST * INSTANTS))
-    readings = zip(replayer.seen, record.readings[:n].T, sigma, strict=True)
-    values = {name: _straight(column, error) for name, column, error in readings}
+    model, times = replayer.model, record.times - record.times[0]
+    early = times < FIRST * replayer.passage_s
+    early[:3] = True
+    span = float(times[early][-1]) * early.sum() / (early.sum() - 1)
+    readings = zip(replayer.seen, record.readings[early].T, sigma, strict=True)
+    values = {name: _straight(times[early], column, error) for name, column, error in readings}
     read = {name: value[:2] for name, value in values.items() if value is not None}
     track = [values.get(f"motion.{axis}") for axis in "xy"]
     if track[0] is not None and track[1] is not None:
-        north, east = track[0][2] / step, track[1][2] / step
-        rate = sum(line[1] for line in track if line is not None) / (n * step)
+        north, east = track[0][2], track[1][2]
+        rate = sum(line[1] for line in track if line is not None) / span
         way = float(np.hypot(north, east))
         if way > rate:
             read.setdefault("motion.u", (way, rate + ASTERN * way))
@@ -569,10 +550,10 @@ def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array
     return start, spread
 
 
-def _straight(values: Array, sigma: float) -> tuple[float, float, float] | None:
-    """First value, its standard error and the change per step of a straight line; None for fewer than three values."""
+def _straight(times: Array, values: Array, sigma: float) -> tuple[float, float, float] | None:
+    """First value, its standard error and the change per second of a straight line; None of fewer than three."""
     places = np.flatnonzero(~np.isnan(values))
     if len(places) < 3:
         return None
-    slope, first = np.polyfit(places, values[places], 1)
+    slope, first = np.polyfit(times[places], values[places], 1)
     return float(first), 2 * sigma / float(np.sqrt(len(places))), float(slope)  # 2: of the end of a line

@@ -26,11 +26,11 @@ from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.posterior_sampling import PosteriorSamples
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.identification.trials.problem.water_current import WaterCurrent, card_in
 from tank2sim.marks import FORCED
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import from_si
 
 SET_KEYS = {"fitted": "fit", "held out": "holdout"}

@@ -17,11 +17,12 @@ from tank2sim.identification.trials.methods.shooting import Pieces, Shooting, cu
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS, SampledRun
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.records.audit import record_noise
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.simulation.recorded import recorded, repeat, steerable
 from tank2sim.simulation.trajectory import Trajectory
 

@@ -19,8 +19,8 @@ from tank2sim.identification.trials.assessment.evaluation import replay_error
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.measured_motion import sensor_noise
-from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 ABOVE_NOISE = 2.0
 """Residuals of whole runs of this many times the sensor's white noise are not that noise (project choice: on made-up

@@ -12,18 +12,10 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.records.audit.noise import white_noise
-from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial
-from tank2sim.simulation.recorded import FED, STATES, TURNS_AT_EXECUTE, straight_over_gaps
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_lines, motion_record
+from tank2sim.simulation.recorded import TURNS_AT_EXECUTE, straight_over_gaps
 from tank2sim.simulation.rudder_record import is_over
-
-OBSERVED_SIGNALS = {
-    **STATES,
-    "u_ground_mps": "motion.u_ground",
-    "v_ground_mps": "motion.v_ground",
-    "sog_mps": "motion.sog",
-    "phi_rad": "motion.phi",
-}
-"""Signal of a trial to the variable of a model that it measures."""
 
 MOST_INSTANTS_A_ROW = 100
 """Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
@@ -111,7 +103,7 @@ def prepare(
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
     of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
     holds until the next and enters with its mean over the step; a measured angle is taken as straight between samples.
-    With `orders_before` an order was given before the first row that shows it, by :data:`.ROWS_TO_SHOW_AN_ORDER`.
+    With `orders_before` an order was given before the first row that shows it (:attr:`.MotionRecord.given_s`).
     `rudder` are times and angles of the rudder that take the place of the trial's (:class:`.ordered_rudder`).
 
     Raises
@@ -131,24 +123,16 @@ def prepare(
         lasts = trial.time_s[-1] - trial.time_s[0]
         problem = f"lasts {lasts:g} s, and has {len(trial.time_s)} rows, most of them {sampling:g} s apart"
         raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
-    inputs = np.tile(model.input_values(), (count, 1))
-    for name, values in _input_signals(model, trial).items():
-        held = (name == "rudder.command" and "delta_rad" not in trial.signals) or any(
-            signal in trial.signals for signal in (_ordered_signal(name), _ordered_azimuth(name))
-        )
-        if name == "rudder.command" and rudder is not None:
-            inputs[:, model.input_names.index(name)] = _means(*rudder, grid, step, held=False)
-            continue
-        given = trial.time_s - (ROWS_TO_SHOW_AN_ORDER * sampling if orders_before and held else 0.0)
-        inputs[:, model.input_names.index(name)] = _means(given, values, grid, step, held=held)
-    signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
-    measured = np.full((count, len(seen)), np.nan)
-    for place, name in enumerate(seen):
-        if (signal := trial.signals.get(signals[name])) is not None:
-            measured[:, place] = _averaged(trial.time_s, signal, grid, step, stride)
+    record, edges = motion_record(model, trial, seen), np.append(grid, grid[-1] + step)
+    columns = [record.means(column, edges, given_before=orders_before) for column in range(record.inputs.shape[1])]
+    if rudder is not None:
+        columns[model.input_names.index("rudder.command")] = means_of_lines(*rudder, edges)
+    inputs = np.column_stack(columns) if columns else np.zeros((count, 0))
+    inputs[-1] = inputs[-2]
+    measured = [_averaged(trial.time_s, signal, grid, step, stride) for signal in record.measured.T]
     if np.isnan(measured).all():
         raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
-    return SampledRun(trial.name, begin, step, inputs, measured, tuple(seen), str(trial.path))
+    return SampledRun(trial.name, begin, step, inputs, np.column_stack(measured), tuple(seen), str(trial.path))
 
 
 def rudder_at_start(run: SampledRun, order: Array, ship_time: float) -> float:
@@ -202,61 +186,6 @@ def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Variables of the model that at least one trial measured."""
     measured = {signal for trial in trials for signal in trial.signals}
     return tuple(variable for signal, variable in OBSERVED_SIGNALS.items() if signal in measured and variable in model)
-
-
-def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
-    given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
-    if "rudder.command" in model:
-        angle = trial.signals.get("delta_rad")
-        given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
-    for name in model.input_names:  # revolutions of a craft's thrusters, as measured, else as ordered
-        ordered = _ordered_signal(name)
-        azimuth = _ordered_azimuth(name)
-        for signal in (ordered, ordered.replace("order_", "n_", 1), azimuth, azimuth.replace("order_", "", 1)):
-            if signal in trial.signals:
-                given[name] = trial.signals[signal]
-    return {
-        name: _continuous(values) if name.endswith("direction") else values
-        for name, values in given.items()
-        if name in model.input_names
-    }
-
-
-def _ordered_signal(name: str) -> str:
-    """Signal of a trial with the ordered revolutions of an input ``thrusters.<name>.command``; of other inputs none."""
-    return f"order_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
-
-
-def _ordered_azimuth(name: str) -> str:
-    """Signal of a trial with the order of an input ``thrusters.<name>.azimuth_command``; of other inputs none."""
-    return f"azimuth_order_{name.removeprefix('thrusters.').removesuffix('.azimuth_command')}_rad"
-
-
-def _continuous(direction: Array) -> Array:
-    """A direction without jumps of a full turn, so that it can be averaged."""
-    known = ~np.isnan(direction)
-    whole = direction.copy()
-    whole[known] = np.unwrap(direction[known])
-    return whole
-
-
-def _means(time: Array, values: Array, grid: Array, step: float, *, held: bool) -> Array:
-    """Mean of a signal from each instant of the grid to the next, (n,)."""
-    known = ~np.isnan(values)
-    time, values = time[known], values[known]
-    edges = np.append(grid, grid[-1] + step)
-    if held:
-        time, values = np.append(time, max(time[-1], edges[-1]) + step), np.append(values, values[-1])
-    if not held and len(time) < len(edges):  # straight lines go on within a row
-        fine = np.union1d(time, edges)
-        time, values = fine, np.interp(fine, time, values)
-    lengths = np.diff(time)
-    areas = lengths * (values[:-1] if held else 0.5 * (values[:-1] + values[1:]))
-    whole = np.concatenate([[0.0], np.cumsum(areas)])
-    at = np.interp(edges, time, whole)
-    means: Array = np.diff(at) / step
-    means[-1] = means[-2]
-    return means
 
 
 def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int) -> Array:

@@ -1,0 +1,190 @@
+"""A trial as it was recorded, for a model that its rudder drives: on its own rows, however uneven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial
+
+STATES = {
+    "u_mps": "motion.u",
+    "v_mps": "motion.v",
+    "r_radps": "motion.r",
+    "psi_rad": "motion.psi",
+    "x_m": "motion.x",
+    "y_m": "motion.y",
+}
+"""Signal of a trial to the state of a model that it measures."""
+
+OBSERVED_SIGNALS = {
+    **STATES,
+    "u_ground_mps": "motion.u_ground",
+    "v_ground_mps": "motion.v_ground",
+    "sog_mps": "motion.sog",
+    "phi_rad": "motion.phi",
+}
+"""Signal of a trial to the variable of a model that it measures."""
+
+FED = {
+    "n_radps": "propeller.speed",
+    "wind_speed_mps": "wind.speed",
+    "wind_direction_rad": "wind.direction",
+    "current_speed_mps": "current.speed",
+    "current_direction_rad": "current.direction",
+}
+"""Signal of a trial to the input of a model, in addition to the rudder."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRecord:
+    """The rows of a trial.
+
+    Parameters
+    ----------
+    name, file : str
+        Name of the trial, and its file for messages.
+    time_s : array (n,)
+        s, rising.
+    inputs : array (n, nu)
+        The model's inputs at the rows: an order as the row shows it, other inputs straight between their readings.
+    orders : array (nu,) of bool
+        True for inputs that are orders: each holds until the next.
+    measured : array (n, ny)
+        In the order of `seen`; nan where not measured.
+    seen : tuple of str
+        Names of the model's variables that are measured.
+    """
+
+    name: str
+    file: str
+    time_s: Array
+    inputs: Array
+    orders: NDArray[np.bool_]
+    measured: Array
+    seen: tuple[str, ...]
+
+    @property
+    def given_s(self) -> Array:
+        """Time (n,), s, at which the order that a row shows was given on average: halfway from the row before."""
+        given: Array = self.time_s.copy()
+        given[1:] -= ROWS_TO_SHOW_AN_ORDER * np.diff(self.time_s)
+        return given
+
+    def means(self, column: int, edges: Array, *, given_before: bool = False) -> Array:
+        """Mean of an input from each of the times `edges` (k,), s, to the next, (k - 1,).
+
+        With `given_before` an order begins at :attr:`given_s`, else at the row that shows it. Before the first row and
+        after the last one an input keeps its value.
+        """
+        time, values = self.time_s, self.inputs[:, column]
+        if self.orders[column]:
+            if given_before:
+                time = self.given_s
+            return means_of_held(time, values, edges)
+        return means_of_lines(time, values, edges)
+
+
+def motion_record(model: Model, trial: Trial, seen: Sequence[str]) -> MotionRecord:
+    """Return the rows of a trial for a model that the trial's rudder drives, by angle or by order.
+
+    Parameters
+    ----------
+    model : Model
+    trial : Trial
+        With ``delta_rad``, or ``delta_order_rad``, if the model has a rudder.
+    seen : sequence of str
+        Variables of the model to be compared, those of :data:`OBSERVED_SIGNALS`.
+    """
+    inputs = np.tile(model.input_values(), (len(trial.time_s), 1))
+    orders = np.zeros(inputs.shape[1], dtype=bool)
+    for name, values in _input_signals(model, trial).items():
+        column = model.input_names.index(name)
+        orders[column] = _is_order(name, trial)
+        known = np.flatnonzero(~np.isnan(values))
+        if orders[column]:
+            last = np.clip(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0, None)
+            inputs[:, column] = values[known[last]]
+        else:
+            inputs[:, column] = np.interp(trial.time_s, trial.time_s[known], values[known])
+    signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
+    measured = np.full((len(trial.time_s), len(seen)), np.nan)
+    for place, name in enumerate(seen):
+        if (readings := trial.signals.get(signals[name])) is not None:
+            measured[:, place] = readings
+    return MotionRecord(trial.name, str(trial.path), trial.time_s, inputs, orders, measured, tuple(seen))
+
+
+def means_of_held(time_s: Array, values: Array, edges: Array) -> Array:
+    """Means (k - 1,) between the times `edges` (k,) of values (n,), each held from its time (n,) to the next."""
+    areas = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(time_s))])
+    return _means(time_s, values, areas, edges)
+
+
+def means_of_lines(time_s: Array, values: Array, edges: Array) -> Array:
+    """Means (k - 1,) between the times `edges` (k,) of values (n,) at times (n,), with straight lines between them."""
+    fine = np.union1d(time_s, edges)
+    at = np.interp(fine, time_s, values)
+    areas = np.concatenate([[0.0], np.cumsum(0.5 * (at[:-1] + at[1:]) * np.diff(fine))])
+    return _means(fine, at, areas, edges)
+
+
+def _means(time: Array, values: Array, areas: Array, edges: Array) -> Array:
+    """Means between edges from the integral (n,) at times (n,); the first and the last value hold outside."""
+    at = np.interp(edges, time, areas)
+    at += values[0] * np.minimum(edges - time[0], 0.0) + values[-1] * np.maximum(edges - time[-1], 0.0)
+    means: Array = np.diff(at) / np.diff(edges)
+    return means
+
+
+def usual_step(record: MotionRecord) -> float:
+    """Median of the time between rows, s."""
+    return float(np.median(np.diff(record.time_s)))
+
+
+def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
+    given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
+    if "rudder.command" in model:
+        angle = trial.signals.get("delta_rad")
+        given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
+    for name in model.input_names:  # revolutions of a craft's thrusters, as measured, else as ordered
+        ordered = _ordered_signal(name)
+        azimuth = _ordered_azimuth(name)
+        for signal in (ordered, ordered.replace("order_", "n_", 1), azimuth, azimuth.replace("order_", "", 1)):
+            if signal in trial.signals:
+                given[name] = trial.signals[signal]
+    return {
+        name: _continuous(values) if name.endswith("direction") else values
+        for name, values in given.items()
+        if name in model.input_names
+    }
+
+
+def _is_order(name: str, trial: Trial) -> bool:
+    """Whether an input is an order of the trial."""
+    if name == "rudder.command":
+        return "delta_rad" not in trial.signals
+    return _ordered_signal(name) in trial.signals or _ordered_azimuth(name) in trial.signals
+
+
+def _ordered_signal(name: str) -> str:
+    """Signal of a trial with the ordered revolutions of an input ``thrusters.<name>.command``; of other inputs none."""
+    return f"order_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
+
+
+def _ordered_azimuth(name: str) -> str:
+    """Signal of a trial with the order of an input ``thrusters.<name>.azimuth_command``; of other inputs none."""
+    return f"azimuth_order_{name.removeprefix('thrusters.').removesuffix('.azimuth_command')}_rad"
+
+
+def _continuous(direction: Array) -> Array:
+    """A direction without jumps of a full turn, so that it can be averaged."""
+    known = ~np.isnan(direction)
+    whole = direction.copy()
+    whole[known] = np.unwrap(direction[known])
+    return whole
