@@ -217,11 +217,11 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
                 return _as_kind(name, value, part)
             except ArgumentError as fault:
                 faults.append(fault)
-        main = next((each for each in faults if each.remedy.startswith("give a")), faults[0])
-        kinds = dict.fromkeys(each.remedy.removeprefix("give ") for each in faults if each.remedy.startswith("give a"))
-        raise ArgumentError(
-            main.source, main.place, main.problem, f"give {' or '.join(kinds)}" if kinds else main.remedy
-        )
+        told = sorted(faults, key=lambda each: (not each.place, not each.remedy.startswith("give a")))[0]
+        words = list(dict.fromkeys(_in_words(kind)))
+        several = told.remedy.startswith("give a") and len(words) > 1
+        remedy = f"give {', '.join(words[:-1])} or {words[-1]}" if several else told.remedy
+        raise ArgumentError(told.source, told.place, told.problem, remedy)
     if get_origin(kind) is Annotated:
         bounds = bounds_of(kind)
         return _as_kind(name, value, get_args(kind)[0]) if bounds is None else bounds.checked(name, value)
@@ -235,17 +235,37 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
     if origin is float:
         return ArgumentBounds().checked(name, value)
     if not _is_a(value, origin):
-        called = getattr(origin, "__name__", str(origin))
-        words = {"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"}
-        raise ArgumentError(
-            name, "", f"is {_short(value)}", f"give {words.get(called, f'a value of the type {called}')}"
-        )
+        raise ArgumentError(name, "", f"is {_short(value)}", f"give {' or '.join(_in_words(kind))}")
     if origin is Sequence and parts and isinstance(value, list | tuple):
-        return type(value)(_as_kind(name, item, parts[0]) for item in value)
+        return type(value)(_item(name, place, item, parts[0]) for place, item in enumerate(value))
     if origin is Mapping and parts:
         keys, items = parts
         return {_as_kind(name, key, keys): _as_kind(f"{name}: {key}", item, items) for key, item in value.items()}
     return value
+
+
+def _item(name: str, place: int, value: Any, kind: Any) -> Any:
+    """An item of a list as its kind has it; a fault says which item."""
+    try:
+        return _as_kind(name, value, kind)
+    except ArgumentError as fault:
+        raise ArgumentError(name, fault.place or f"[{place}]", fault.problem, fault.remedy) from None
+
+
+_WORDS = {"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"}
+
+
+def _in_words(kind: Any) -> list[str]:
+    """What a kind takes, in words: ``a text``, ``a path``, ``a DataFrame``."""
+    if get_origin(kind) in (Union, UnionType):
+        parts = [part for part in get_args(kind) if part is not type(None)]
+        single = [word for part in parts if get_origin(part) is not Sequence for word in _in_words(part)]
+        return [*single, *["a list of them" if single else "a list"][: len(parts) - len(single)]]
+    if get_origin(kind) is Annotated:
+        bounds = bounds_of(kind)
+        return _in_words(get_args(kind)[0]) if bounds is None else ["a whole number" if bounds.whole else "a number"]
+    called = getattr(get_origin(kind) or kind, "__name__", str(kind))
+    return [{"float": "a number", "int": "a whole number"}.get(called) or _WORDS.get(called, f"a {called}")]
 
 
 def _is_a(value: Any, kind: Any) -> bool:

@@ -6,7 +6,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, get_args, get_origin
 
 import click
 import numpy as np
@@ -229,7 +229,8 @@ def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:
         function = VERBS[name].function
         for argument in inspect.signature(function).parameters.values():
             kind = annotated_kind(argument.annotation, function)
-            for bounds in filter(None, map(bounds_of, get_args(kind) or (kind,))):
+            parts = (kind,) if get_origin(kind) is Annotated else get_args(kind) or (kind,)
+            for bounds in filter(None, map(bounds_of, parts)):
                 option = kinds[argument.name]
                 if bounds != ArgumentBounds():
                     assert isinstance(option, click.IntRange | click.FloatRange), (name, argument.name)

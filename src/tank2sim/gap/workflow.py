@@ -129,7 +129,8 @@ def run_gap_workflow(
         forces along the measured motion are not finite.
     """
     options = options or GapOptions()
-    given, card = card, polynomial_over_trials(card, (*fitted.trials, *held.trials))
+    given, card = card, polynomial_over_trials(card, fitted.trials)
+    lowest = polynomial_over_trials(given, (*fitted.trials, *held.trials)).model.low_speed_bound_mps
     fitted, held = above_low_speed(card, fitted), above_low_speed(card, held)
     if evidence := evidence_of_other_ship(card, fitted):
         remedy = "give the card and the trials of one ship, in the same units and signs"
@@ -138,8 +139,9 @@ def run_gap_workflow(
         fitted, held = _without_heel(fitted), _without_heel(held)
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
+        run = _Run(options, progress, pool, lowest)
         try:
-            gap, trials = _search_once(card, (fitted, held), options, progress, pool)
+            gap, trials = _search_once(card, (fitted, held), run)
         except FloatingPointError as error:
             problem = f"gives no finite forces along the motion of the trials ({error})"
             remedy = "check the units of its numbers and of the trials' columns"
@@ -156,13 +158,13 @@ def run_gap_workflow(
             excluded = (*options.without, *known, *simpler)
             more = replace(options, effects=wanted, without=excluded, max_effects=most)
             try:
-                further, found_trials = _search_once(gap.improved, trials, more, progress, pool, without)
+                further, found_trials = _search_once(gap.improved, trials, replace(run, options=more), without)
             except FloatingPointError:
                 break
             if not _adds(gap, further, 1 - options.false_discovery):
                 break
             both = combine_passes(gap, further)
-            smaller = _smaller(card, (fitted, held), (gap, both), options, pool)
+            smaller = _smaller(card, (fitted, held), (gap, both), run)
             gap, trials = smaller or (both, found_trials)
         tried = of_tried_effects(_names(card, fitted, options), candidate_explanations(card, fitted.driven_by))
         return replace(gap, notices=(*doubts(given), *lowered_bound_notice(given, card), *tried, *gap.notices))
@@ -180,23 +182,33 @@ def _without_heel(group: Measured) -> Measured:
     return replace(group, trials=trials, notices=(*group.notices, notice))
 
 
+@dataclass(frozen=True)
+class _Run:
+    """What all searches of a run share; speed down to which cards hold in trials held out, m/s."""
+
+    options: GapOptions
+    progress: StageReport
+    pool: Executor | None
+    lowest_mps: float
+
+
 def _search_once(
-    card: ManoeuvringCard,
-    trials: tuple[Measured, Measured],
-    options: GapOptions,
-    progress: StageReport,
-    pool: Executor | None,
-    without: ManoeuvringCard | None = None,
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], run: _Run, without: ManoeuvringCard | None = None
 ) -> tuple[Gap, tuple[Measured, Measured]]:
     """One search, decision and proof, and the trials in the surroundings found; `without` lacks earlier effects."""
+    options, progress = run.options, run.progress
     names = _names(card, trials[0], options)
-    found = search(likelihood_from_card(card, trials[0], without), progress, pool, names, most=options.max_effects)
+    found = search(likelihood_from_card(card, trials[0], without), progress, run.pool, names, most=options.max_effects)
     decision = decide(found, options.false_discovery)
     progress("proving")
-    replays = TrialReplays({name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, pool)
-    prover = Prover(card, trials, found.likelihood, replays)
+    replays = TrialReplays(
+        {name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, run.pool
+    )
+    prover = Prover(card, trials, found.likelihood, replays, run.lowest_mps)
     judged = Judge(prover, options.false_discovery).judge(found, decision)
     judged = judge_surroundings(prover, found, judged, names)
+    judged = replace(judged, decision=_with_verdict_of_coefficients(judged.decision, judged.proof))
+    judged = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
     progress("where and how much")
     return _assemble_gap(prover, found, judged), judged.proof.trials
 
@@ -228,8 +240,7 @@ def _smaller(
     card: ManoeuvringCard,
     trials: tuple[Measured, Measured],
     passes: tuple[Gap, Gap],
-    options: GapOptions,
-    pool: Executor | None,
+    run: _Run,
 ) -> tuple[Gap, tuple[Measured, Measured]] | None:
     """The result without an effect of the first search that those of the second make superfluous; None without one.
 
@@ -247,7 +258,8 @@ def _smaller(
     reached = misfit_of(both.passed, "after", held_out=False)
     for dropped in first.effects:
         others = tuple(effect.name for effect in both.effects if effect.name != dropped.name)
-        again, found_trials = _search_once(card, trials, replace(options, effects=others), lambda text: None, pool)
+        alone = replace(run, options=replace(run.options, effects=others), progress=lambda text: None)
+        again, found_trials = _search_once(card, trials, alone)
         same = again.verdict == MISSING and {effect.name for effect in again.effects} == set(others)
         if same and misfit_of(again.passed, "after", held_out=False) <= (1 + BETTER) * reached:
             return without_effect(again, both, dropped.name), found_trials
@@ -282,7 +294,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
     card, (fitted, held), replays = prover.card, prover.trials, prover.replays
     without = found.likelihood.without
     given = card if without is None else without.card  # before an earlier search
-    decision, proof = _with_verdict_of_coefficients(judged.decision, judged.proof), judged.proof
+    decision, proof = judged.decision, judged.proof
     estimated = proof.named.estimated
     box = _begin_black_box(card, proof, replays)
     hidden = could_hide(found, decision.best, EVIDENCE_NEEDED)
@@ -317,7 +329,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         could_hide=hidden,
         agreement=agreement,
         next_test=_next(card, found, decision, replays.noise),
-        notices=gap_notices(given, replace(judged, decision=decision), agreement, prover.trials, waves),
+        notices=gap_notices(given, judged, agreement, prover.trials, waves),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -20,6 +21,7 @@ from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surrounding
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import Passed, Refitted, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import with_polynomial_down_to
 
 BETTER = 0.05
 """Share by which the misfit of the fitted trials must fall for coefficients to be refitted together with an effect
@@ -39,23 +41,22 @@ class NamedEffects:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """An improved card, and all trials replayed by it and by the given one.
+    """An improved card, and the trials replayed by it and by the given one.
 
     Parameters
     ----------
     trials : tuple of Measured
         Fitted ones and those held out, in the winds and currents that were found for them.
     named : NamedEffects
-        With the winds and currents of the trials held out as well.
     base, improved : ManoeuvringCard
         Without the effects, coefficients refitted where this follows the fitted trials better, and with them.
     results : list of Passed
-        Fitted trials first.
+        Of the fitted trials; those held out follow once they are opened (:meth:`Prover.open_holdout`).
     coefficients : tuple of Refitted
         Coefficients of the base that differ from the given card's.
     effect_alone : mapping
-        Misfit of the effects without refitted coefficients, noise units: ``fit`` and ``holdout``; empty where the
-        coefficients are the given ones.
+        Misfit of the effects without refitted coefficients, noise units: ``fit``, and ``holdout`` once that is opened;
+        empty where the coefficients are the given ones.
     """
 
     trials: tuple[Measured, Measured]
@@ -83,7 +84,7 @@ class Proof:
 
 @dataclass(frozen=True, eq=False)
 class Prover:
-    """Proofs of explanations, by replays of trials.
+    """Proofs of explanations, by replays of the fitted trials; trials held out are opened for the last one.
 
     Parameters
     ----------
@@ -94,18 +95,19 @@ class Prover:
     likelihood : Likelihood
         Likelihood of the fitted trials.
     replays : TrialReplays
+    lowest_mps : float
+        Speed down to which the cards' polynomials are used in trials held out, m/s, where it is below their own.
     """
 
     card: ManoeuvringCard
     trials: tuple[Measured, Measured]
     likelihood: Likelihood
     replays: TrialReplays
+    lowest_mps: float = math.inf
 
     def prove(self, best: ExplanationFit, named: NamedEffects | None = None) -> Proof:
         """The card with the effects of an explanation, and with coefficients fitted together with them if fitted trials
-        are then followed better by :data:`BETTER`; replays by both cards.
-
-        Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
+        are then followed better by :data:`BETTER`; replays of the fitted trials by both cards.
 
         Parameters
         ----------
@@ -124,37 +126,57 @@ class Prover:
         joint = self._replayed(card, base, proof.named)
         if joint.misfit >= (1 - BETTER) * proof.misfit or not most_are_closer(proof.results, joint.results):
             return proof
-        keys = {"fit": False, "holdout": True} if self.trials[1].trials else {"fit": False}
-        alone = {key: misfit_of(proof.results, "after", held_out=held) for key, held in keys.items()}
-        return replace(joint, coefficients=refitted, effect_alone=alone if named.estimated else {})
+        alone = {"fit": proof.misfit} if named.estimated else {}
+        return replace(joint, coefficients=refitted, effect_alone=alone)
+
+    def open_holdout(self, proof: Proof) -> Proof:
+        """The proof with the trials held out, which the named effects have not seen.
+
+        Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
+        """
+        fitted, held = proof.trials
+        if not held.trials:
+            return proof
+        named = proof.named
+        card, base, improved = (
+            with_polynomial_down_to(each, self.lowest_mps) for each in (self.card, proof.base, proof.improved)
+        )
+        if named.by_trial:
+            found = fit_surroundings(improved, held, tuple(named.by_trial), self.replays.noise)
+            named = replace(
+                named, by_trial={name: {**at, **found.get(name, {})} for name, at in named.by_trial.items()}
+            )
+            held = with_surroundings(held, named.by_trial)
+        faultless = corrected(held, sensor_faults(named.estimated))
+        results = [*proof.results, *self.replays.by_cards(card, improved, held, True, faultless)]
+        alone = dict(proof.effect_alone)
+        if alone:
+            by_effects = self.replays.by_cards(card, add_effects_to_card(card, named.estimated), held, True, faultless)
+            alone["holdout"] = misfit_of(by_effects, "after")
+        return replace(
+            proof,
+            trials=(fitted, held),
+            named=named,
+            base=base,
+            improved=improved,
+            results=results,
+            effect_alone=alone,
+        )
 
     def _replayed(self, card: ManoeuvringCard, base: ManoeuvringCard, named: NamedEffects) -> Proof:
-        """All trials by the given card and by a base with effects, in the winds and currents that were found."""
+        """The fitted trials by the given card and by a base with effects, in the winds and currents that were found."""
         improved = add_effects_to_card(base, named.estimated)
-        trials, named = self._in_surroundings(improved, named)
-        sensors = sensor_faults(named.estimated)
-        results: list[Passed] = []
-        for group, held_out in zip(trials, (False, True), strict=True):
-            if group.trials:
-                results += self.replays.by_cards(card, improved, group, held_out, corrected(group, sensors))
-        return Proof(trials, named, base, improved, results)
-
-    def _in_surroundings(
-        self, card: ManoeuvringCard, named: NamedEffects
-    ) -> tuple[tuple[Measured, Measured], NamedEffects]:
-        """The trials in the winds and currents found for them, and those, with the ones of the trials held out."""
-        if not named.by_trial:
-            return self.trials, named
         fitted, held = self.trials
-        found = fit_surroundings(card, held, tuple(named.by_trial), self.replays.noise) if held.trials else {}
-        every = {name: {**values, **found.get(name, {})} for name, values in named.by_trial.items()}
-        return (with_surroundings(fitted, every), with_surroundings(held, every)), replace(named, by_trial=every)
+        fitted = with_surroundings(fitted, named.by_trial) if named.by_trial else fitted
+        faultless = corrected(fitted, sensor_faults(named.estimated))
+        results = list(self.replays.by_cards(card, improved, fitted, False, faultless))
+        return Proof((fitted, held), named, base, improved, results)
 
 
 def most_are_closer(before: Sequence[Passed], after: Sequence[Passed]) -> bool:
     """Whether at least half of the fitted trials are followed no worse: coefficients hold in all of them, and must not
     follow what happened in one."""
-    pairs = [pair for pair in zip(before, after, strict=True) if not pair[0].held_out]
+    pairs = zip(before, after, strict=True)
     return bool(np.median([new.misfit("after") / old.misfit("after") for old, new in pairs]) <= 1.0)
 
 

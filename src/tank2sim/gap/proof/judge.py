@@ -194,8 +194,6 @@ class Judge:
 
 
 def _closes_clearly(results: Sequence[Passed]) -> bool:
-    """Whether a gap that is far above the noise becomes clearly smaller, in the trials held out as well."""
+    """Whether a gap that is far above the noise becomes clearly smaller."""
     before, after = (misfit_of(results, version) for version in ("before", "after"))
-    held = [result for result in results if result.held_out]
-    alike = not held or misfit_of(held, "after") < CLEARLY * misfit_of(held, "before")
-    return before > MUCH and after < CLEARLY * before and alike and closes_gap(results, CLEARLY)
+    return before > MUCH and after < CLEARLY * before and closes_gap(results, CLEARLY)

@@ -66,7 +66,7 @@ class _Simulated:
 
     @property
     def misfit(self) -> float:
-        """Misfit of all trials, noise units."""
+        """Misfit of the fitted trials, noise units."""
         return misfit_of(self.proof.results, "after")
 
 
@@ -128,8 +128,7 @@ def _closes_most(search: Search, judged: Judged) -> bool:
     ):
         return False
     results = judged.proof.results
-    groups = [results, [result for result in results if result.held_out]]
-    most = all(misfit_of(group, "after") < REMAINS_OF_MOST * misfit_of(group, "before") for group in groups if group)
+    most = misfit_of(results, "after") < REMAINS_OF_MOST * misfit_of(results, "before")
     return most and search.none.score - judged.decision.best.score >= DECISIVE
 
 
@@ -184,7 +183,7 @@ def probabilities_by_simulation(
     fitted : Measured
         T trials.
     proofs : mapping
-        Effects of an explanation to the replays with it, of the fitted trials first.
+        Effects of an explanation to the replays of the fitted trials with it.
     by_trial : collection of str
         Winds and currents that have two numbers of their own in each trial.
     """
@@ -192,7 +191,7 @@ def probabilities_by_simulation(
     readings = np.array([(trial.time_s[-1] - trial.time_s[0]) / passage for trial in fitted.trials])
     scores = []
     for effects, proof in proofs.items():
-        misfits = np.array([result.misfit("after") for result in proof.results if not result.held_out])
+        misfits = np.array([result.misfit("after") for result in proof.results])
         numbers = 2 * len(fitted.trials) * sum(name in by_trial for name in effects)
         scores.append(2 * readings @ np.log(np.maximum(misfits, 1.0)) + numbers * np.log(np.sum(readings)))
     logs = -0.5 * np.array(scores) / TEMPER

@@ -74,10 +74,14 @@ def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> Ma
     nominal = card.model.speed_mps
     known = (slowest_speed(trial, card.ship.length_m / nominal) for trial in trials)
     ahead = [speed for speed in known if speed >= SLOWEST_OF_TURNS * nominal]
-    bound = float(f"{0.95 * min(ahead, default=np.inf):.3g}")
-    if bound >= card.model.low_speed_bound_mps:
+    return with_polynomial_down_to(card, float(f"{0.95 * min(ahead, default=np.inf):.3g}"))
+
+
+def with_polynomial_down_to(card: ManoeuvringCard, speed_mps: float) -> ManoeuvringCard:
+    """The card with its polynomial down to a speed; as it is where its own bound is as low."""
+    if card.model.kind != "abkowitz" or speed_mps >= card.model.low_speed_bound_mps:
         return card
-    return revised(card, {}, {"model.low_speed_below_mps": bound}, comment="slowest speed of the trials")
+    return revised(card, {}, {"model.low_speed_below_mps": speed_mps}, comment="slowest speed of the trials")
 
 
 def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[str, ...]:
