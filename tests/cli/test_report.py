@@ -61,4 +61,4 @@ def test_a_towed_vehicle_has_nothing_to_steer(tmp_path: Path) -> None:
 
 def test_a_steering_card_is_distinguished_from_a_ship(tmp_path: Path) -> None:
     result = tank2sim("steer", "poznyakov-yudin", "-o", "s.html", cwd=tmp_path)
-    refused(result, "poznyakov-yudin", "is a steering card", "tank2sim influence")
+    refused(result, "poznyakov-yudin", "not as a ship card", "tank2sim influence")

@@ -213,13 +213,15 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
             return [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
         usual = verb.default_ship or None
         card = "[CARD]" if usual else "CARD"
-        return [click.Argument([one.name], metavar=card, required=not usual, default=usual), change]
+        usually = {"default": usual} if usual else {}
+        return [click.Argument([one.name], metavar=card, required=not usual, **usually), change]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
         usual = None if one.default is inspect.Parameter.empty else one.default
         required = usual is None and (written.by_function or one.default is inspect.Parameter.empty)
+        usually = {"default": usual, "show_default": True} if usual else {"required": required}
         return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
-                        required=required, default=usual, show_default=bool(usual))]  # fmt: skip
+                        **usually)]  # fmt: skip
     required = one.default is inspect.Parameter.empty
     by_position = one.kind is not inspect.Parameter.KEYWORD_ONLY and one.name not in verb.options
     if by_position and (required or one.name == _first_list(verb.function)):
