@@ -101,7 +101,7 @@ def test_a_beginning_that_the_first_search_loses_is_found_without_steps_of_the_o
 def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_misses_the_motion_by_far(
     tmp_path: Path,
 ) -> None:
-    """A play in the gear, a step every few seconds: whole seconds of orders end 100 noises away."""
+    """A play in the gear, a step every few seconds: orders in the middle of each second end many noises away."""
     (made,) = make([Setting(("rudder_backlash",), 24, ship="model", manoeuvres=("random_steps",))])
     write(sampled(made, 1), tmp_path)
     given = read_card(tmp_path / "ship.toml")
@@ -115,7 +115,7 @@ def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_miss
     replayer = Replayer(card, trials.driven_by, list(noise))
     p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
     _, misfit = replayer._least_squares_start(input_record(replayer, trials.trials[0]), sigma, p, wrong=False)
-    assert misfit > 100
+    assert misfit > 10
     (replay,) = replay_trials(card, card, trials, noise, held_out=False)
     assert replay.misfit("after") < 1.5
 
