@@ -115,11 +115,12 @@ def test_a_smaller_set_takes_the_place_only_where_it_follows_the_trials_as_close
 
     asked = []
 
-    def search_again(card, trials, options, progress, pool):
-        asked.append(options.effects)
+    def search_again(card, trials, run):
+        asked.append(run.options.effects)
         return replace(passes[1], effects=(DRAG,), passed=tuple(map(away, both.passed))), trials
 
     monkeypatch.setattr(workflow, "_search_once", search_again)
-    found = workflow._smaller(both.card, (), (passes[0], both), workflow.GapOptions(), None)
+    run = workflow._Run(workflow.GapOptions(), lambda text: None, None, np.inf)
+    found = workflow._smaller(both.card, (), (passes[0], both), run)
     assert asked == [("cross_flow_drag",)]
     assert (found is not None) == dropped

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -92,6 +92,20 @@ def test_a_current_is_found_and_proved_on_a_trial_held_out(made, tmp_path: Path)
     after, share = misfit_and_share(case, held_out=True)
     assert after < 1.5 and share < 0.1
     assert case.gap.equation == "kinematics"
+
+
+@pytest.mark.essential
+@pytest.mark.slow
+def test_a_trial_held_out_of_another_ship_changes_neither_the_name_nor_its_probability(made, tmp_path: Path) -> None:
+    (other,) = make([Setting((), SEED, ship="tanker", manoeuvres=HELD)])
+    foreign = replace(made["current"], trials={**made["current"].trials, **other.trials})
+    gaps = [sought(tmp_path, each, HELD, FEW).gap for each in (made["current"], foreign)]
+    assert gaps[0].verdict == gaps[1].verdict == MISSING
+    for mine, others in zip(gaps[0].effects, gaps[1].effects, strict=True):
+        assert (mine.name, mine.parameters, mine.confidence) == (others.name, others.parameters, others.confidence)
+    assert gaps[0].rivals == gaps[1].rivals
+    proved, missed = (gap.misfit("after", held_out=True) for gap in gaps)
+    assert proved is not None and missed is not None and missed > 5 * proved
 
 
 @pytest.mark.essential
