@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 from tank2sim.answer.parts import KeyFigure, Section, Table, notices_section
 from tank2sim.files import json_text, schema_name, write_together
 from tank2sim.marks import marked
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import altair as alt
@@ -52,9 +53,9 @@ class Result(ABC, Generic[_S]):
         """One or a few sentences with the main findings."""
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Limits of the result, one sentence each."""
-        notices: tuple[str, ...] = getattr(self.study, "notices", ())
+        notices: tuple[Notice, ...] = getattr(self.study, "notices", ())
         return tuple(notices)
 
     @property

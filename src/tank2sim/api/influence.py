@@ -12,6 +12,7 @@ from tank2sim.api.verbs import Output, named_numbers, verb
 from tank2sim.arguments import PROCESSES, EnsembleSize, Seed, TuningRange
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     from tank2sim.analysis.ensemble.results import FigureBands
@@ -265,7 +266,7 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
     return [texts] if isinstance(texts, str) else list(texts)
 
 
-def _reported(found: CardInfluence, notices: Sequence[str] = ()) -> InfluenceStudy:
+def _reported(found: CardInfluence, notices: Sequence[Notice] = ()) -> InfluenceStudy:
     """The study, with further notices."""
     from tank2sim.native.compiler import find_compiler
     from tank2sim.simulation.integrator import NO_COMPILER

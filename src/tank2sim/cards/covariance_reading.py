@@ -218,7 +218,7 @@ def derived_card(card: Card, text: str, source: str) -> tuple[Card, tuple[str, .
     -------
     card : Card
         Its ``files`` and ``save`` write the covariance, too.
-    notices : tuple of str
+    notices : tuple of Notice
         What of the covariance was lost.
 
     Raises

@@ -17,6 +17,7 @@ from tank2sim.errors import ArgumentError
 from tank2sim.escaping import file_name, one_line
 from tank2sim.files import PICTURE, STANDARD_OUTPUT, writable_folder, write_together
 from tank2sim.marks import marked
+from tank2sim.notices import Notice
 
 screen = Console(highlight=False)
 """Where summaries go."""
@@ -42,13 +43,13 @@ def show_table(shown: Table) -> None:
         screen.print(escape(one_line(note)), soft_wrap=True)
 
 
-def show_notices(notices: Iterable[str]) -> None:
+def show_notices(notices: Iterable[Notice]) -> None:
     """Print what the user should know, a line each."""
     for notice in notices:
         screen.print(f"[yellow]note:[/yellow] {escape(one_line(notice))}", soft_wrap=True)
 
 
-def show_marked(notices: Iterable[str]) -> list[str]:
+def show_marked(notices: Iterable[Notice]) -> list[str]:
     """Print the notices that mark the result as one that its data do not carry; return the others, for its end."""
     notices = list(notices)
     first = marked(notices)

@@ -25,6 +25,7 @@ from tank2sim.dynamics.propulsion import propulsion, revolutions
 from tank2sim.dynamics.rigid_body import Inertia, inertia
 from tank2sim.dynamics.roll import roll_fault, roll_parameters, roll_terms, with_roll
 from tank2sim.dynamics.steering_gear import steering_gear
+from tank2sim.notices import Notice
 from tank2sim.units import rounded_down
 
 OPPOSED = tuple(name for name, _ in OPPOSITE.values())
@@ -97,21 +98,25 @@ def ship_model(card: ManoeuvringCard) -> Model:
     return with_roll(planar, hull, card) if card.roll else planar
 
 
-def _without_yaw(card: ManoeuvringCard) -> list[str]:
+def _without_yaw(card: ManoeuvringCard) -> list[Notice]:
     if card.model.valid_yaw_rate_prime > 0:
         return []
     return [
-        "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r, and with them course "
-        "stability and every turn, are estimates"
+        Notice(
+            "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r, and with them course "
+            "stability and every turn, are estimates"
+        )
     ]
 
 
-def _one_sided(card: ManoeuvringCard) -> list[str]:
+def _one_sided(card: ManoeuvringCard) -> list[Notice]:
     if not isinstance(card, MmgCard) or card.rudder.gamma_R_plus == card.rudder.gamma_R_minus:
         return []
     return [
-        "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
-        "rudder) has gamma_R_minus"
+        Notice(
+            "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
+            "rudder) has gamma_R_minus"
+        )
     ]
 
 

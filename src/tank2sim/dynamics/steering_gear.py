@@ -29,7 +29,7 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         Inputs ``rudder.command`` (rad, + starboard) and ``steering.failed``, state ``rudder.angle``, quantities
         ``rudder.rate``, ``rudder.error`` (order less angle, which drives the rate) and ``rudder.effective`` (the angle
         that the hull forces see), parameters ``steering.*``.
-    notices : list of str
+    notices : list of Notice
     """
     gear = gear or SteeringGear()
     notices = [] if gear.time_constant_s else [assumed_lag_notice(ship_time_s)]

@@ -24,6 +24,7 @@ from tank2sim.fmu.process import Drive, drive_apart
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors, relative_errors
 from tank2sim.fmu.reference_run import read_reference
 from tank2sim.fmu.unpacking import FmuType, UnpackedFmu, unpack
+from tank2sim.notices import Notice
 
 LIMITS: dict[FmuType, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
 """Largest error allowed. Co-Simulation is held against the same scheme, Model Exchange against the exact solution."""
@@ -54,7 +55,7 @@ class CheckReport:
         Output to the larger of its errors.
     reference_error : float, optional
         Largest error of an output when the FMU repeats the reference result that it carries, relative as above.
-    notices : tuple of str
+    notices : tuple of Notice
         Doubts about the card.
     compared : bool
         False if there was no model to compare with, and the file alone was validated.
@@ -72,7 +73,7 @@ class CheckReport:
     duration_s: float = 0.0
     reference_error: float | None = None
     passed: bool = False
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
 
 def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport:

@@ -13,6 +13,7 @@ from typing import Any
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.fmu.provenance import ABSENT, STATED_ERROR, Documents, ValueOrigin
 from tank2sim.fmu.reference_run import EXTRA
+from tank2sim.notices import Notice
 from tank2sim.simulation.run import Run
 
 PASSPORT_FILE = f"{EXTRA}/passport.json"
@@ -75,7 +76,7 @@ class Passport:
     validity: str
     speed_range_mps: tuple[float, float] | None
     coefficients: tuple[PassportCoefficient, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     figures: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     card_range: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     replay: Replay = field(default_factory=Replay)

@@ -66,6 +66,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     polynomial_over_trials,
 )
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 
 RIVALS = 12
@@ -177,7 +178,7 @@ def _without_heel(group: Measured) -> Measured:
         for trial in group.trials
     )
     notice = "heel is computed and not compared: only what it changes of the motion in the plane is seen"
-    return replace(group, trials=trials, notices=(*group.notices, notice))
+    return replace(group, trials=trials, notices=(*group.notices, Notice(notice)))
 
 
 def _search_once(

@@ -14,6 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.number_rows import NumberRows, number_rows, read_bytes_as_text
 from tank2sim.records.trials import TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
@@ -78,7 +79,11 @@ def read_simman(path: Path | str) -> Trial:
     signals: dict[str, Array] = {name: column for name, column in named.items() if name in TRIAL_SIGNALS}
     signals["psi_rad"] = unwrapped(signals["psi_rad"])
     signals["delta_rad"] = 0.0 - signals["delta_rad"]
-    notices = [laboratory.omission, laboratory.values, "the rudder is positive to port in the file, to starboard here"]
+    notices = [
+        laboratory.omission,
+        laboratory.values,
+        Notice("the rudder is positive to port in the file, to starboard here"),
+    ]
     time = named["t_s"]
     if np.any(np.diff(time) <= 0):
         time, notice = _uniform_time(path, rows)

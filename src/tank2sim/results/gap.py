@@ -29,6 +29,7 @@ from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.notices import Notice
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.results.gap_cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.results.gap_charts import (
@@ -157,7 +158,7 @@ class GapResult(Result[GapStudy]):
         Trials that name the effect, and trials that only prove it.
     written : tuple of Path
         Files that were written.
-    remarks : tuple of str
+    remarks : tuple of Notice
         Messages about them.
     """
 
@@ -166,7 +167,7 @@ class GapResult(Result[GapStudy]):
     fitted: Measured = NO_TRIALS
     held: Measured = NO_TRIALS
     written: tuple[Path, ...] = ()
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Notice, ...] = ()
     command: ClassVar[str] = "gap"
 
     @property
@@ -270,7 +271,7 @@ class GapResult(Result[GapStudy]):
         )
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Messages about trials and files; objections to the verdict are in :attr:`headline`."""
         return *self.study.notices[len(self.study.cautions) :], *self.remarks
 

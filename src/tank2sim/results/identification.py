@@ -25,6 +25,7 @@ from tank2sim.identification.trials.study import (
     WindowError,
     pooled_error,
 )
+from tank2sim.notices import Notice
 from tank2sim.results.parameter_charts import (
     correlation_chart,
     parameter_chart,
@@ -176,7 +177,7 @@ class IdentificationResult(Result[IdentificationStudy]):
         return [text if word == HELD_OUT else f"{text} None was held out, so this card is untested."]
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Changes to the data, and limits of the result; without those of the headline."""
         every = dict.fromkeys((*self.study.notices, *self.study.warnings))
         return tuple(notice for notice in every if notice not in self._not_converged)

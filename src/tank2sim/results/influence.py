@@ -19,6 +19,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.errors import ArgumentError
 from tank2sim.marks import assumed_words
+from tank2sim.notices import Notice
 from tank2sim.results.ensembles import figures_section
 from tank2sim.results.influence_charts import (
     InfluenceData,
@@ -83,7 +84,7 @@ class InfluenceResult(Result[InfluenceStudy]):
         return f"Parameters: {len(self.study.parameters)}. Figures: {len(self.study.figures)}."
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Those of the study, and of its ensemble."""
         members = self.study.ensemble.notices if self.study.ensemble else ()
         return tuple(dict.fromkeys([*self.study.notices, *members]))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.member_streams import member_stream
 
 Histories = NDArray[np.float32]
@@ -253,15 +253,17 @@ class Redrawn:
         counted = Counter(name for names in beyond for name in names)
         return Redrawn(sum(map(bool, beyond)), dict(counted.most_common()))
 
-    def in_words(self, members: int) -> list[str]:
+    def in_words(self, members: int) -> list[Notice]:
         """Notices for an ensemble of `members`."""
         if not self.members:
             return []
         counts = ", ".join(f"{name} {count}" for name, count in self.beyond.items())
         share = 100 * self.members / members
         return [
-            f"{self.members} of {members} members ({share:.2g} %) were drawn again, being beyond what numbers can be "
-            f"({counts}): their distribution is normal, cut off there"
+            Notice(
+                f"{self.members} of {members} members ({share:.2g} %) were drawn again, being beyond what numbers can be "
+                f"({counts}): their distribution is normal, cut off there"
+            )
         ]
 
 
@@ -297,11 +299,12 @@ class Ensemble:
         return self.members - sum(self.unusable.values())
 
     @property
-    def notices(self) -> list[str]:
+    def notices(self) -> list[Notice]:
         """Notices on members that were drawn again, or that are unusable."""
-        mark = f"{CHECK} " if self.members - self.usable > TAIL * self.members else ""
+        mark = caution("") if self.members - self.usable > TAIL * self.members else ""
         messages = [
-            f"{mark}{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()
+            Notice(f"{mark}{count} of {self.members} members cannot be used: {why}")
+            for why, count in self.unusable.items()
         ]
         return [*self.redrawn.in_words(self.members), *messages]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.records.csv_table import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
@@ -30,7 +31,7 @@ class Run:
         The motion.
     figures : dict
         Manoeuvring figures, units in their names; None for a figure that the run does not show.
-    notices : tuple of str
+    notices : tuple of Notice
         Messages for the user.
     reading : CardRangeReading
         The figures outside the card's range.
@@ -38,7 +39,7 @@ class Run:
 
     trajectory: Trajectory
     figures: Figures
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     reading: CardRangeReading
 
 

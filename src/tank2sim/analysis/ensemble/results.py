@@ -27,6 +27,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, band_of, figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, Draws, Ensemble, Question, ensemble
 from tank2sim.simulation.lane_figures import USUAL_PACE
@@ -60,7 +61,7 @@ class Members:
     seed: int
     usable: int
     unusable: dict[str, int]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -182,7 +182,7 @@ def tails(
         By criterion.
     any : Tail or None
         Tail of ships that fail at least one of `limits`; None if that is not rare.
-    notices : list of str
+    notices : list of Notice
         Why there are none.
     """
     names = rare_names(found, limits)

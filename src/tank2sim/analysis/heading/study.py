@@ -36,7 +36,7 @@ from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -158,7 +158,7 @@ class AutopilotStudy:
         North and east; empty without a track.
     histories, track_histories : dict
         Columns to draw by run, and by guidance.
-    notices : tuple of str
+    notices : tuple of Notice
     export : AutopilotExport, optional
         The controller as an FMU, if one was made.
     """
@@ -177,7 +177,7 @@ class AutopilotStudy:
     waypoints_m: Array
     histories: dict[str, Columns]
     track_histories: dict[str, Columns]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     export: AutopilotExport | None = None
 
 
@@ -273,21 +273,25 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     return study, Piloted(ship, design.autopilot, runs)
 
 
-def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[str]:
+def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[Notice]:
     """Marks of a weather in which the ship leaves its course, or is carried away."""
     found = []
     if max(abs(kept.heading_error_mean_deg), kept.heading_error_rms_deg) > HELD_DEG:
         rudder = math.degrees(float(np.mean(run["rudder.angle"][len(run.t) // 2 :])))
         found.append(
-            f"{CHECK} the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
-            f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg "
-            "of rudder in the mean; the figures of course keeping mean nothing."
+            caution(
+                f"the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
+                f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg "
+                "of rudder in the mean; the figures of course keeping mean nothing."
+            )
         )
     speed = float(np.mean(run["motion.u"][len(run.t) // 2 :]))
     if weather.current_mps >= abs(speed):
         found.append(
-            f"{CHECK} the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
-            "the water): it may hold its heading, but cannot hold a course over the ground."
+            caution(
+                f"the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
+                "the water): it may hold its heading, but cannot hold a course over the ground."
+            )
         )
     return found
 
@@ -374,39 +378,49 @@ def _notices(
     runs: Mapping[str, Trajectory],
     changes: Mapping[str, CourseChange],
     tracks: Mapping[str, TrackRun],
-) -> list[str]:
-    notices = [f"the loop is not stable at {margin.speed_mps:.4g} m/s" for margin in margins if not margin.stable]
+) -> list[Notice]:
+    notices = [
+        Notice(f"the loop is not stable at {margin.speed_mps:.4g} m/s") for margin in margins if not margin.stable
+    ]
     notices += [
-        f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s"
+        Notice(f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s")
         for name, change in changes.items()
         if change.settling_time_s is None
     ]
     return notices + [
-        f"the track is not finished, {name}" for name, track in tracks.items() if not track.figures.finished
+        Notice(f"the track is not finished, {name}") for name, track in tracks.items() if not track.figures.finished
     ]
 
 
-def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[str]:
+def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[Notice]:
     """Notices on the load of the gear in waves, and on limits of the autopilot below those of the gear."""
     notices = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
         remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
         filtered = "wave_filter_radps" in design.gains
         notices.append(
-            f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
-            + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
+            Notice(
+                f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
+                + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
+            )
         )
     limit = {parameter.name: parameter.start for parameter in ship.parameters}.get("steering.max_angle", 0.0)
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
         notices.append(
-            f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
-            f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
+            Notice(
+                f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
+                f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
+            )
         )
     return notices
 
 
-def _begun_at(speed: float | None) -> list[str]:
-    return [] if speed is None else [f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed"]
+def _begun_at(speed: float | None) -> list[Notice]:
+    return (
+        []
+        if speed is None
+        else [Notice(f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed")]
+    )
 
 
 def _in_degrees(values: Mapping[str, float]) -> dict[str, float]:

@@ -20,6 +20,7 @@ from tank2sim.analysis.tuning.result import TunedStudy
 from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, agreed_by_name, joint_errors
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 
 CURVED = 1.5
 """Reported factor between slope and 10 % difference. Project choice: the figure bends or jumps there."""
@@ -56,7 +57,7 @@ class CardInfluence:
     difference : array (nf, k)
         K % by the 10 % difference; nan where the changed ship does not show the figure, or the parameter is zero.
     agreed : Agreed or None
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -66,7 +67,7 @@ class CardInfluence:
     slopes: Array
     difference: Array
     agreed: Agreed | None = None
-    notices: tuple[str, ...] = field(default=())
+    notices: tuple[Notice, ...] = field(default=())
 
     @property
     def parameters(self) -> tuple[CardParameter, ...]:
@@ -216,7 +217,7 @@ class InfluenceStudy:
         By their keys on the card.
     influence_percent : dict
         Figure to parameter to its coefficient.
-    notices : tuple of str
+    notices : tuple of Notice
     agreed : AgreedVariation, optional
     tuned : TunedStudy, optional
         The card tuned to targets.
@@ -228,7 +229,7 @@ class InfluenceStudy:
     figures: dict[str, FigureErrors]
     parameters: dict[str, CardNumber]
     influence_percent: dict[str, dict[str, InfluenceCoefficient]]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     agreed: AgreedVariation | None = None
     tuned: TunedStudy | None = None
     ensemble: FigureBands | None = None

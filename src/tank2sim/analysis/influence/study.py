@@ -21,6 +21,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import ArgumentError
+from tank2sim.notices import Notice
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -90,7 +91,7 @@ class Study:
         return straight_courses(self.model)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Notices on the limits of the card's ship and its manoeuvres."""
         return tuple(self._notices)
 

@@ -20,6 +20,7 @@ from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, rever
 from tank2sim.dynamics.effects import EFFECTS, undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 
 _FAR = 0.05
 """Distance from the diagram, as a share of the largest yaw rate, from which a steady point of a spiral is reported."""
@@ -63,7 +64,7 @@ class StabilityStudy(StraightLine):
         At the speed of expansion.
     steady_speeds : tuple of SteadySpeed
         Speeds straight ahead that the engine holds at the revolutions of the start.
-    notices : tuple of str
+    notices : tuple of Notice
         Messages for the user.
     ensemble : StabilityBands, optional
     """
@@ -76,7 +77,7 @@ class StabilityStudy(StraightLine):
     spirals: Spirals
     imo: tuple[ImoCriterion, ...]
     steady_speeds: tuple[SteadySpeed, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     ensemble: StabilityBands | None = None
 
 
@@ -105,7 +106,7 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         turning = steady_turning(model)
         notices += turning.notices
     except InputError as error:
-        notices.append(f"no steady-turning diagram: {_reason(error)}")
+        notices.append(Notice(f"no steady-turning diagram: {_reason(error)}"))
     if turning is not None and spirals:
         spiralled, spiral_notes = _spirals(model, turning)
         notices += spiral_notes

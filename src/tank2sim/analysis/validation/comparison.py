@@ -31,6 +31,7 @@ from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCa
 from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.marks import ASSUMED, EXTRAPOLATED
+from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.simulation.run import Run
@@ -136,7 +137,7 @@ class CardComparison:
         Whether the cards are those of a craft with thrusters.
     members : int
         Size of the ensembles behind the deviations of the figures.
-    notices : tuple of str
+    notices : tuple of Notice
     kind : str
         Always ``compare``.
     """
@@ -148,7 +149,7 @@ class CardComparison:
     trials: tuple[TrialComparison, ...]
     craft: bool
     members: int
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     kind: str = "compare"
 
     @property
@@ -360,36 +361,44 @@ def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
     return CardTrack(card=label, t_s=time[::every], x_m=ratio * x[::every], y_m=ratio * y[::every])
 
 
-def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[str]:
-    messages = [f"{label}: {doubt}" for card, label in zip(cards, labels, strict=True) for doubt in doubts(card)]
+def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[Notice]:
+    messages = [
+        Notice(f"{label}: {doubt}") for card, label in zip(cards, labels, strict=True) for doubt in doubts(card)
+    ]
     reference = cards[0]
     for card, label in zip(cards, labels, strict=True):
         ratio = reference.ship.length_m / card.ship.length_m
         if apart := differences_of_size(reference, card, 1 / ratio):
             form = "; ".join(apart)
             messages.append(
-                f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared"
+                Notice(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
             )
         elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
-            messages.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
+            messages.append(
+                Notice(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
+            )
         present = [name for name, value in card.derivatives.items() if value]
         if assumed := [name for name in present if name not in card.uncertainty]:
             mark = f"{ASSUMED}, not measured ones: " if assumed == present else ""
             share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
-            messages.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
+            messages.append(Notice(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}"))
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):
-            messages.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
+            messages.append(
+                Notice(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
+            )
         speed = _start(reference, card).get("initial.u", card.model.speed_mps)
         if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
-            messages.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
+            messages.append(
+                Notice(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
+            )
         if _effects(card) != _effects(reference):
             effects, expected = (", ".join(_effects(ship)) or "none" for ship in (card, reference))
             messages.append(
-                f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them"
+                Notice(f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them")
             )
         engines = [ship.propulsion is None for ship in (card, reference) if isinstance(ship, ManoeuvringCard)]
         if len(set(engines)) > 1:
-            messages.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
+            messages.append(Notice(f"{label}: only one of it and the reference has propulsion: no stop is compared"))
     return messages
 
 

@@ -43,6 +43,7 @@ from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, stu
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.marks import EXTRAPOLATED
+from tank2sim.notices import Notice
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbers
@@ -180,7 +181,7 @@ class Validation:
 
     figures: tuple[Validated, ...]
     members: int
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -225,7 +226,7 @@ def validate_card(
     drawn, of_errors = members(card, model, count)
     known = [(trial, recognise(trial, model)) for trial in trials]
     messages = [
-        f"{trial.name}: no turning circle and no zigzag, for {what}: only replayed"
+        Notice(f"{trial.name}: no turning circle and no zigzag, for {what}: only replayed")
         for trial, what in known
         if isinstance(what, str)
     ]
@@ -244,15 +245,17 @@ def validate_card(
         if fitted:
             named = f" (as {copied})" if copied not in (None, trial.name) else ""
             messages.append(
-                f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted"
+                Notice(f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted")
             )
     if whats and not between:
         messages.append(
-            "no manoeuvre was run twice alike: u_D is of the record's noise and the errors of its point, heading and "
-            "orders, without weather and helmsman, and so a lower bound"
+            Notice(
+                "no manoeuvre was run twice alike: u_D is of the record's noise and the errors of its point, heading and "
+                "orders, without weather and helmsman, and so a lower bound"
+            )
         )
     if not count:
-        messages.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
+        messages.append(Notice("no ensemble was run: u_input and U_val are not known, and no figure can be judged"))
     return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)))
 
 

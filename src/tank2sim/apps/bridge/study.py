@@ -22,6 +22,7 @@ from tank2sim.cards.examination import doubts
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run
@@ -112,7 +113,7 @@ class Bridge:
         Rudder that keeps a straight course, + to starboard; None without one.
     squat : tuple of Squat
         Empty without block coefficient, beam and draught.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     card: ManoeuvringCard
@@ -126,7 +127,7 @@ class Bridge:
     hard_over_s: float | None
     neutral_deg: float | None
     squat: tuple[Squat, ...] = ()
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def study(self) -> BridgeStudy:
@@ -177,7 +178,7 @@ class BridgeStudy:
     hard_over_to_hard_over_s: float | None
     rudder_neutral_deg: float | None
     squat: tuple[Squat, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     ballast: BridgeStudy | None = None
 
 

@@ -33,7 +33,8 @@ from tank2sim.cards.examination import doubts
 from tank2sim.cards.writing import TestedRange
 from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
-from tank2sim.marks import ASSUMED, ASSUMED_TANK, CHECK, LINEARISED
+from tank2sim.marks import ASSUMED, ASSUMED_TANK, LINEARISED
+from tank2sim.notices import Notice, caution
 from tank2sim.units import from_si, to_si
 
 _LISTED = 6
@@ -79,7 +80,7 @@ def planned_campaign(
     return _campaign_study(card.ship.name, design, tuple(notices)), design
 
 
-def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[str, ...]) -> CampaignStudy:
+def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[Notice, ...]) -> CampaignStudy:
     runs = design.tank_runs
     return CampaignStudy(
         ship=name,
@@ -166,17 +167,21 @@ def planned_trial(
     if sensors is None:
         notices.insert(
             0,
-            f"{ASSUMED} of the sensors, for none are stated: "
-            + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items()),
+            Notice(
+                f"{ASSUMED} of the sensors, for none are stated: "
+                + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items())
+            ),
         )
     assumed = _assumed_of_card(polynomial)
     if assumed:
-        notices.insert(0, assumed)
+        notices.insert(0, Notice(assumed))
     if design.unstable:
         notices.insert(
             0,
-            f"{LINEARISED} of {card.ship.name}, which is unstable on a straight course: its manoeuvres are not "
-            "linear in the coefficients, and errors after a fit may be many times those predicted here",
+            Notice(
+                f"{LINEARISED} of {card.ship.name}, which is unstable on a straight course: its manoeuvres are not "
+                "linear in the coefficients, and errors after a fit may be many times those predicted here"
+            ),
         )
     manoeuvres = tuple(
         PlannedManoeuvre(
@@ -285,15 +290,17 @@ def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[str, ...]
     return manoeuvring_card(made.card), (words, *notices)
 
 
-def _notices(design: CaptiveDesign, draws: int) -> tuple[str, ...]:
+def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:
     notices = list(design.slopes.notices)
     if design.not_excited:
         notices.append(
-            f"no run of this tank shows {', '.join(design.not_excited)}: their errors are not in the standard errors"
+            Notice(
+                f"no run of this tank shows {', '.join(design.not_excited)}: their errors are not in the standard errors"
+            )
         )
     if design.too_strong:
         left_out = counted(design.too_strong, "candidate run")
-        notices.append(f"left out: {left_out} with a force that exceeds the range of its gauge")
+        notices.append(Notice(f"left out: {left_out} with a force that exceeds the range of its gauge"))
     asked, runs = design.tank_runs.largest, design.tank_runs
     for word, size, most in (
         ("drift", asked.drift_rad, runs.drift_rad),
@@ -301,22 +308,26 @@ def _notices(design: CaptiveDesign, draws: int) -> tuple[str, ...]:
     ):
         if size > most + 1e-12:
             notices.append(
-                f"{word} goes to {math.degrees(most):.3g} deg, not {math.degrees(size):.3g}, by [mechanism] of the tank"
+                Notice(
+                    f"{word} goes to {math.degrees(most):.3g} deg, not {math.degrees(size):.3g}, by [mechanism] of the tank"
+                )
             )
     body = design.tank_runs.tank.mechanism.model_dump()
     missing = [key for key in ("sway_amplitude_m", "heading_amplitude_rad", "drift_rad") if body[key] is None]
     if missing:
-        notices.append(f"not limited, for the tank does not state it: {', '.join(missing)} of [mechanism]")
+        notices.append(Notice(f"not limited, for the tank does not state it: {', '.join(missing)} of [mechanism]"))
     return tuple(dict.fromkeys([*_checks(design), *_assumptions(design, draws), *notices]))
 
 
-def _checks(design: CaptiveDesign) -> list[str]:
+def _checks(design: CaptiveDesign) -> list[Notice]:
     """What needs a second look: too few hours, figures that are hardly certain, gauges far beyond their forces."""
     found = []
     if design.hours < design.usual_hours * (1 - 1e-9):
         found.append(
-            f"{CHECK} the hours, {design.hours:.3g} h, are too few for one usual matrix: the plan is compared with it "
-            f"in its own {design.usual_hours:.3g} h"
+            caution(
+                f"the hours, {design.hours:.3g} h, are too few for one usual matrix: the plan is compared with it "
+                f"in its own {design.usual_hours:.3g} h"
+            )
         )
     for row, figure in enumerate(design.slopes.figures):
         error, value = float(design.standard_errors[row]), abs(float(design.slopes.values[row]))
@@ -324,19 +335,21 @@ def _checks(design: CaptiveDesign) -> list[str]:
             force = max(design.gauge_shares, key=lambda each: float(design.gauge_shares[each][row]))
             part = 100 * float(design.gauge_shares[force][row])
             found.append(
-                f"{CHECK} the standard error of {figure.text} by the plan, {error:.3g}, is more than "
-                f"{100 * _HARDLY_CERTAIN:g} % of its value, {value:.4g}; "
-                f"{part:.0f} % of the variance is by gauge {force}"
+                caution(
+                    f"the standard error of {figure.text} by the plan, {error:.3g}, is more than "
+                    f"{100 * _HARDLY_CERTAIN:g} % of its value, {value:.4g}; "
+                    f"{part:.0f} % of the variance is by gauge {force}"
+                )
             )
     found += [
-        f"{CHECK} the range of gauge {force} is {times:.3g} times the largest force of the usual matrix"
+        caution(f"the range of gauge {force} is {times:.3g} times the largest force of the usual matrix")
         for force, times in design.beyond_use.items()
         if times > _FAR_BEYOND_USE
     ]
     return found
 
 
-def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
+def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
     """What neither the tank's file, nor an option, nor the card states."""
     tank, runs = design.tank_runs.tank, design.tank_runs
     gauges, stated = tank.gauges, tank.gauges.model_fields_set
@@ -351,12 +364,12 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
         lacking.append(f"gain {100 * gauges.gain_relative:g} %")
     if "rate_hz" not in stated:
         lacking.append(f"{gauges.rate_hz:g} independent readings a second")
-    found = [f"{ASSUMED} of the gauges, as [gauges] of the tank does not state them: {', '.join(lacking)}"]
+    found = [Notice(f"{ASSUMED} of the gauges, as [gauges] of the tank does not state them: {', '.join(lacking)}")]
     if not lacking:
         found = []
     card = _assumed_of_card(design.card) if draws else None
     if card:
-        found.append(card)
+        found.append(Notice(card))
     carriage, model = tank.carriage.model_fields_set, tank.model.model_fields_set
     body = tank.carriage
     lengths = {
@@ -367,7 +380,7 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
     }
     missing = [text for text in lengths.values() if text]
     if missing:
-        found.append(f"{ASSUMED_TANK}, for it is not stated: {', '.join(missing)}")
+        found.append(Notice(f"{ASSUMED_TANK}, for it is not stated: {', '.join(missing)}"))
     return found
 
 

@@ -20,6 +20,7 @@ from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, joined_
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.marks import UNCONFIRMED
+from tank2sim.notices import Notice
 from tank2sim.records.signals.sampling import GAP_STEPS
 
 _GAP_LEAST_S = 3.0
@@ -75,9 +76,9 @@ class Voyage:
         return all(log.dated for log in self.logs)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """What the reader must know, faults first and marked."""
-        faults = [f"{UNCONFIRMED}: {finding.text}" for finding in self.findings if finding.kind == "fault"]
+        faults = [Notice(f"{UNCONFIRMED}: {finding.text}") for finding in self.findings if finding.kind == "fault"]
         return (*faults, *(finding.text for finding in self.findings if finding.kind != "fault"))
 
 

@@ -11,6 +11,7 @@ from typing import ClassVar
 from tank2sim.answer.parts import Cell, KeyFigure, Section, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card
+from tank2sim.notices import Notice
 
 SURE_READING = 0.9
 """Probability from which the first reading is taken without a mark. Project choice; ``benchmarks/convention.py`` prints
@@ -95,7 +96,7 @@ class ConventionStudy:
     left_out: tuple[str, ...]
     scaled_with_nominal_speed: bool | None
     speed_scale: str | None
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,27 +141,33 @@ class ConventionResult(Result[ConventionStudy]):
         return tuple(lines)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Assumed sizes, doubts about the first reading, and what was not read."""
         study, first, found = self.study, self.readings[0], []
         if study.assumed:
             sizes = ", ".join(f"{key} = {value:.4g}" for key, value in study.assumed.items())
-            found.append(f"ASSUMED, because the table lacks them: {sizes}")
+            found.append(Notice(f"ASSUMED, because the table lacks them: {sizes}"))
         if first.against:
-            found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
+            found.append(
+                Notice(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
+            )
         if study.left_out:
-            found.append(f"not read, and not on the card of a reading: {', '.join(study.left_out)}")
+            found.append(Notice(f"not read, and not on the card of a reading: {', '.join(study.left_out)}"))
         if study.scaled_with_nominal_speed:
             found.append(
-                "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
-                'speed_scale = "nominal", by which speed counts once'
+                Notice(
+                    "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
+                    'speed_scale = "nominal", by which speed counts once'
+                )
             )
             if study.speed_scale == "instantaneous":
-                found.append('the file states speed_scale = "instantaneous", by which speed counts twice')
+                found.append(Notice('the file states speed_scale = "instantaneous", by which speed counts twice'))
         if len(self.readings) > 1 and same_in_practice(first, self.readings[1]) and first.probability < SURE_READING:
-            found.append("the first two readings are one ship in practice: their figures differ by less than 5 %")
+            found.append(
+                Notice("the first two readings are one ship in practice: their figures differ by less than 5 %")
+            )
         if first.vanished:
-            found.append(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits")
+            found.append(Notice(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits"))
         return tuple(found)
 
     @property

@@ -31,6 +31,7 @@ from tank2sim.cards.card import MmgCard, manoeuvring_card
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError
+from tank2sim.notices import Notice
 
 _OF_CRAFT = ("small_craft", "gazebo", "vrx")
 _OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
@@ -76,7 +77,7 @@ def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -
     if to == "mmg" and not isinstance(given, MmgCard):
         problem = f"is {given.model.kind}: without thrust and rudder force its terms cannot be split into MMG's"
         raise given.fault("model.kind", problem, "convert an MMG card to abkowitz, not the other way")
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     if wanted.origin_m:
         notices = (
             "U of the new origin scales the numbers now: a difference of second order in the distance and r'",
@@ -87,7 +88,7 @@ def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -
     if to == "abkowitz" and given.model.kind == "linear":
         changed = parse_card(changed_text(given.text, given.source, {"model.kind": "abkowitz"}), given.source)
         assert isinstance(changed, ManoeuvringCard)
-        given, notices = changed, (*notices, "third-order terms that the card does not have are zero")
+        given, notices = changed, (*notices, Notice("third-order terms that the card does not have are zero"))
     made = in_conventions(given, wanted)
     build(made)
     return ConvertedText(made.text, made), notices
@@ -131,7 +132,7 @@ def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedT
 
 
 def _fitted(
-    card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[str, ...]
+    card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[Notice, ...]
 ) -> tuple[ConvertedText, tuple[str, ...]]:
     bare = build(card)
     model = build(replace(card, effects=())) if card.effects else bare
@@ -141,7 +142,7 @@ def _fitted(
     made = in_conventions(polynomial, wanted)
     if fit.covariance is not None:
         carried = "standard errors are those of the MMG card's numbers, carried through the fit with their covariance"
-        notices = (*notices, f"{carried}; what the fit itself misses is in the table alone")
+        notices = (*notices, Notice(f"{carried}; what the fit itself misses is in the table alone"))
     return ConvertedText(made.text, made, fit, changes), notices
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tank2sim.api.verbs import Progress, verb
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,7 +105,7 @@ def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, library: str, **
 
 
 def _result(
-    ship: PageShip, ghost: Ghost | None, notices: Sequence[str], scenario: Scenario | None, view_3d: bool
+    ship: PageShip, ghost: Ghost | None, notices: Sequence[Notice], scenario: Scenario | None, view_3d: bool
 ) -> SteeringPageResult:
     from tank2sim.apps.steering.page import steering_page
     from tank2sim.apps.steering.result import SteeringPageResult, SteeringStudy

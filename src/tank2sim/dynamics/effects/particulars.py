@@ -9,6 +9,7 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model
+from tank2sim.notices import Notice
 
 BEAMS_IN_LENGTH = 7.0
 BEAMS_IN_DRAUGHT = 0.4
@@ -128,7 +129,7 @@ def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[M
         if getattr(card.ship, key) is not None:
             continue
         missing = f"the card states no {key}: the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
-        notice = f"{missing} ({estimated_from(key)})"
+        notice = Notice(f"{missing} ({estimated_from(key)})")
         if notice not in model.notices:
             model = model.extend(notices=[notice])
     return model, tuple(_at_draught(model, card, key) for key in keys)

@@ -15,6 +15,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.sensors import correct_reading as without_fault
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.outcome.improve_card import Found, in_short
+from tank2sim.notices import Notice
 from tank2sim.records.audit import repair_trial
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.reading import read_trial_file, reader_of
@@ -49,9 +50,9 @@ def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
         try:
             signals = without_fault(trial.time_s, signals, EFFECTS[name], values)
         except ValueError as error:
-            messages.append(f"{REMAINING_FAULTS}: {error}")
+            messages.append(Notice(f"{REMAINING_FAULTS}: {error}"))
         else:
-            messages.append(f"corrected for {name}")
+            messages.append(Notice(f"corrected for {name}"))
     return replace(trial, signals=signals, notices=(*trial.notices, *messages))
 
 

@@ -16,6 +16,7 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY, misfit_of
 from tank2sim.gap.search.model_choice import Strange
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.structures import structure_that_adds
+from tank2sim.notices import Notice
 
 SHOWN = 5
 """Names of effects in a notice at most (project choice)."""
@@ -30,7 +31,7 @@ def gap_notices(
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
     waves: WaveBand | None,
-) -> tuple[str, ...]:
+) -> tuple[Notice, ...]:
     """What a user should know besides the verdict, one sentence each.
 
     Parameters
@@ -53,40 +54,51 @@ def gap_notices(
     notices += [judged.by_simulation] if judged.by_simulation else []
     notices += [_in_words(strange) for strange in decision.strange]
     notices += [
-        f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
+        Notice(
+            f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
+        )
         for names in withheld
     ]
     if fitted_to_held:
         notices.append(
-            f"{' and '.join(fitted_to_held)} of the trials held out: fitted to each of them, two numbers to a "
-            "record; all else is as the fitting trials have it"
+            Notice(
+                f"{' and '.join(fitted_to_held)} of the trials held out: fitted to each of them, two numbers to a "
+                "record; all else is as the fitting trials have it"
+            )
         )
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
-        notices.append(f"{have}: kept as on the card, and not sought")
+        notices.append(Notice(f"{have}: kept as on the card, and not sought"))
     remaining = misfit_of(proof.results, "after")
     if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
         notices.append(
-            f"all trials together are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
-            "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+            Notice(
+                f"all trials together are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
+                "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+            )
         )
         if structure := structure_that_adds(card, decision.best.hypothesis.effects):
             notices.append(
-                f"identify with structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
-                "trials together with the hull's derivatives, from the card as it was given"
+                Notice(
+                    f"identify with structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
+                    "trials together with the hull's derivatives, from the card as it was given"
+                )
             )
     notices += [
-        f"{name}: the same to these trials as {coefficient.name}, which was refitted by {coefficient.moved:.2g} of its "
-        "standard errors"
+        Notice(
+            f"{name}: the same to these trials as {coefficient.name}, which was refitted by {coefficient.moved:.2g} of its "
+            "standard errors"
+        )
         for name, coefficient in effects_like(proof.coefficients, named).items()
     ]
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [
-            f"{name}: the improved card follows it worse than the given one" for name in worse_trials(proof.results)
+            Notice(f"{name}: the improved card follows it worse than the given one")
+            for name in worse_trials(proof.results)
         ]
     for variable, values in agreement.items():
         if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
-            notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
+            notices.append(Notice(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})"))
     return tuple(dict.fromkeys(notices))
 
 

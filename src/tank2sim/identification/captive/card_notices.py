@@ -6,6 +6,7 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.captive.reduction import Reduction
 from tank2sim.identification.captive.result_card import FILLS, Contents, reynolds_ratio
 from tank2sim.identification.captive.study import terms_of_heel
+from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign
 
 
@@ -26,18 +27,20 @@ def length_ratio(campaign: Campaign, given: float | str | None) -> float | None:
     return ratio
 
 
-def heel_notices(reduction: Reduction) -> list[str]:
+def heel_notices(reduction: Reduction) -> list[Notice]:
     """Notices on terms of heel that the card does not take."""
     names = terms_of_heel(reduction)
     if not names:
         return []
     return [
-        f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with [roll], "
-        "a metacentric height and terms of K takes them."
+        Notice(
+            f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with [roll], "
+            "a metacentric height and terms of K takes them."
+        )
     ]
 
 
-def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[str]:
+def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[Notice]:
     """Notices on what the card has from estimates, lacks, and takes from another size.
 
     Parameters
@@ -52,21 +55,27 @@ def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign
     notices = []
     if card.estimated:
         notices.append(
-            f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
+            Notice(
+                f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
+            )
         )
     if card.missing:
         remedy = "" if fill else f" --fill {next(iter(FILLS))} takes some of them from a published estimate."
         notices.append(
-            f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
-            f"wrong as that.{remedy}"
+            Notice(
+                f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
+                f"wrong as that.{remedy}"
+            )
         )
     if {"Yr", "Nr"} & set(card.estimated) and not {"Nvvr", "Nrrr"} & set(card.entries):
         notices.append(
-            "No term of third order in the yaw rate was measured or estimated: hard turns come out too tight."
+            Notice("No term of third order in the yaw rate was measured or estimated: hard turns come out too tight.")
         )
     if ratio:
         notices.append(
-            f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
-            f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
+            Notice(
+                f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
+                f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
+            )
         )
     return notices

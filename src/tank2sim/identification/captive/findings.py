@@ -17,7 +17,7 @@ from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
 from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
-from tank2sim.marks import CHECK
+from tank2sim.notices import caution
 from tank2sim.records.campaigns import FORCE_COLUMNS
 
 _SHEET = 0.05
@@ -63,7 +63,7 @@ def implausible(reduction: Reduction) -> tuple[str, ...]:
     if reduction.systematic and resonant:
         found.append(f"standing waves of the tank would do the same to {_listed(resonant)}: compare without them.")
     found += [caution.message for caution in tank_size(Tank(campaign.tank.breadth_m, campaign.tank.depth_m))]
-    return tuple(f"{CHECK} {message}" for message in found)
+    return tuple(caution(f"{message}") for message in found)
 
 
 def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
@@ -133,8 +133,8 @@ def _resonances(reduction: Reduction) -> Iterator[Caution]:
 
 
 def _physics(reduction: Reduction) -> Iterator[str]:
-    for caution in cautions_of_test(reduction.campaign, _oscillating(reduction)):
-        yield f"{caution.message}{f' Runs: {_listed(caution.runs)}.' if caution.runs else ''}"
+    for doubt in cautions_of_test(reduction.campaign, _oscillating(reduction)):
+        yield f"{doubt.message}{f' Runs: {_listed(doubt.runs)}.' if doubt.runs else ''}"
 
 
 def _conventions(reduction: Reduction) -> Iterator[str]:

@@ -79,7 +79,7 @@ from tank2sim.identification.trials.problem.water_current import (
     with_current,
     without_current,
 )
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -136,7 +136,7 @@ class Identification:
         On request; values and covariance of the estimate are then its means and covariance.
     bootstrap : array (members, k) or None
         Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
-    notices : tuple of str
+    notices : tuple of Notice
     current : WaterCurrent or None
         Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have it.
     choice : MethodChoice or None
@@ -161,7 +161,7 @@ class Identification:
     bootstrap: Array | None
     manoeuvres: Mapping[str, str]
     forced: tuple[str, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     current: WaterCurrent | None = None
     choice: MethodChoice | None = None
 
@@ -506,15 +506,15 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 
 
-def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Sequence[str]:
+def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Sequence[Notice]:
     if captive is None:
         return ()
     times = card.ship.length_m / captive.campaign.model.length_m
     words = f"{captive.campaign.path}: {len(captive.runs)} captive tests are fitted together with the trials"
-    return (f"{words}, scaled by Froude's law to a ship {times:.4g} times as long",)
+    return (Notice(f"{words}, scaled by Froude's law to a ship {times:.4g} times as long"),)
 
 
-def _current_notice(current: WaterCurrent | None) -> Sequence[str]:
+def _current_notice(current: WaterCurrent | None) -> Sequence[Notice]:
     if current is None:
         return ()
     speed_error, direction_error = current.errors
@@ -528,22 +528,22 @@ def _current_notice(current: WaterCurrent | None) -> Sequence[str]:
 
 def undetermined_notice(current: WaterCurrent) -> str:
     """That the trials do not determine the current, as a marked sentence."""
-    return (
-        f"{CHECK} the trials do not determine the current (to {current.standard_error_mps:.2g} m/s in one direction): "
+    return caution(
+        f"the trials do not determine the current (to {current.standard_error_mps:.2g} m/s in one direction): "
         "coefficients and figures may hold a part of it; add speed through the water or a full turn, or give the card "
         "its effect current"
     )
 
 
-def _choice_notice(choice: MethodChoice | None) -> Sequence[str]:
+def _choice_notice(choice: MethodChoice | None) -> Sequence[Notice]:
     if choice is None:
         return ()
     name, other = METHOD_WORDS[choice.method]
-    return (f"method: {name}, because {choice.reason}; method {other} takes the other",)
+    return (Notice(f"method: {name}, because {choice.reason}; method {other} takes the other"),)
 
 
-def _unseen_notice(names: Sequence[str]) -> Sequence[str]:
+def _unseen_notice(names: Sequence[str]) -> Sequence[Notice]:
     if not names:
         return ()
     text = ", ".join(name.removeprefix("derivatives.") for name in names)
-    return (f"the trials show nothing of {text}: held as the card has them",)
+    return (Notice(f"the trials show nothing of {text}: held as the card has them"),)

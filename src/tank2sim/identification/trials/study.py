@@ -29,6 +29,7 @@ from tank2sim.identification.trials.problem.problem_from_card import problem_fro
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.identification.trials.problem.water_current import WaterCurrent, card_in
 from tank2sim.marks import FORCED
+from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.units import from_si
@@ -251,7 +252,7 @@ class IdentifiabilityStudy:
         The closest first.
     unseen : tuple of tuple of str
         Combinations of parameters that the trials do not determine.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     parameters: tuple[str, ...]
@@ -260,7 +261,7 @@ class IdentifiabilityStudy:
     correlation: Array
     correlated_pairs: tuple[tuple[str, str, float], ...]
     unseen: tuple[tuple[str, ...], ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -323,7 +324,7 @@ class IdentificationStudy:
         Factor on the standard errors of the card by group of parameters.
     cost : tuple of float
     identifiability : IdentifiabilityStudy
-    notices, warnings : tuple of str
+    notices, warnings : tuple of Notice
         Changes to the data and marks; all that limits the result.
     replays : tuple of CardReplay
     """
@@ -351,8 +352,8 @@ class IdentificationStudy:
     prior_scale: dict[str, Number]
     cost: tuple[Number, ...]
     identifiability: IdentifiabilityStudy
-    notices: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notices: tuple[Notice, ...]
+    warnings: tuple[Notice, ...]
     replays: tuple[CardReplay, ...]
 
     @property
@@ -377,7 +378,7 @@ def study_identification(
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
-    forced = [f"{FORCED}: {'; '.join(result.forced)}"] if result.forced else []
+    forced = [Notice(f"{FORCED}: {'; '.join(result.forced)}")] if result.forced else []
     unfinished = [] if result.posterior is None or result.posterior.converged else result.posterior.notices
     comparisons = {SET_KEYS[word]: (given, found) for word, given, found in result.comparisons}
     return IdentificationStudy(

@@ -23,6 +23,7 @@ from tank2sim.dynamics.glider_forces import (
     momentum,
 )
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+from tank2sim.notices import Notice
 from tank2sim.units import rounded_down
 
 SMALL_INCIDENCE = math.radians(10.0)
@@ -41,7 +42,7 @@ _PITCH = 0.5
 """Pitch of the dive in which an FMU starts, 28.6 deg: the paper's sample dives at 30 deg have 27.8 deg."""
 
 
-def glider_warnings(card: GliderCard) -> tuple[str, ...]:
+def glider_warnings(card: GliderCard) -> tuple[Notice, ...]:
     """Messages about a card: a displaced volume that does not carry its mass, and an area that is V^(2/3).
 
     Both are so in the paper's own data.
@@ -51,16 +52,20 @@ def glider_warnings(card: GliderCard) -> tuple[str, ...]:
     light = density * glider.volume_m3 - glider.mass_kg
     if abs(light) > 0.02 * glider.mass_kg:
         messages.append(
-            f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and "
-            f"the mass is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has "
-            f"{glider.buoyancy_kg:g} kg ({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and "
-            "net buoyancy are used as they are, the volume in the ballast (1) alone"
+            Notice(
+                f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and "
+                f"the mass is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has "
+                f"{glider.buoyancy_kg:g} kg ({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and "
+                "net buoyancy are used as they are, the volume in the ballast (1) alone"
+            )
         )
     if math.isclose(glider.reference_area_m2, glider.volume_m3 ** (2 / 3), rel_tol=1e-3):
         messages.append(
-            f"the coefficients are referred to V^(2/3) = {glider.reference_area_m2:.4g} m2; those of gliders are by "
-            "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
-            "area that belongs to them in glider.reference_area_m2"
+            Notice(
+                f"the coefficients are referred to V^(2/3) = {glider.reference_area_m2:.4g} m2; those of gliders are by "
+                "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
+                "area that belongs to them in glider.reference_area_m2"
+            )
         )
     return tuple(messages)
 
@@ -95,7 +100,7 @@ def glider_model(card: GliderCard) -> Model:
         step_s=_step(card),
         notices=(
             *glider_warnings(card),
-            "the attitude is prescribed, the glider does not slip sideways, and its added masses are estimates",
+            Notice("the attitude is prescribed, the glider does not slip sideways, and its added masses are estimates"),
         ),
     )
 

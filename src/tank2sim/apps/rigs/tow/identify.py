@@ -29,6 +29,7 @@ from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
 from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import SINGULAR_CONDITION, scaled_condition
+from tank2sim.notices import Notice
 
 TOW_METHODS = ("paper", "qr", "output_error")
 
@@ -61,7 +62,7 @@ class TowIdentification:
         Coefficients of v*(t) in rising powers of t, m/s over s (eq. 2.1).
     methods : dict
         Method to its estimates.
-    warnings : tuple of str
+    warnings : tuple of Notice
         Messages for the user, in sentences.
     """
 
@@ -76,7 +77,7 @@ class TowIdentification:
     top_speed_mps: float
     speed_polynomial: tuple[float, ...]
     methods: dict[str, TowFit]
-    warnings: tuple[str, ...]
+    warnings: tuple[Notice, ...]
 
     @property
     def force(self) -> Polynomial:

@@ -31,6 +31,7 @@ from tank2sim.apps.rigs.tow.study import TowStudy
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,7 +158,7 @@ class TowResult(Result[TowStudy]):
         )
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """The warnings."""
         return self.study.warnings
 

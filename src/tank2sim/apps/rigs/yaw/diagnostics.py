@@ -11,7 +11,7 @@ from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawEstimate
 from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import caution
 
 _NOT_QUITE_MIRRORED = 0.03
 _FULL = 0.995
@@ -142,13 +142,17 @@ def check_added_inertia(
         raise InputError(record.path, "", problem, remedy)
     if value < doubt:
         return [
-            f"{CHECK} the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
-            "kg m2; run a faster programme, more humps, or a body that carries more water."
+            caution(
+                f"the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
+                "kg m2; run a faster programme, more humps, or a body that carries more water."
+            )
         ]
     if not _LEAST_ADDED - doubt / inertia_kgm2 <= ratio <= _MOST_ADDED + doubt / inertia_kgm2:
         return [
-            f"{CHECK} the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
-            "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+            caution(
+                f"the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
+                "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+            )
         ]
     return []
 

@@ -13,7 +13,7 @@ import numpy as np
 from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import caution
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 from tank2sim.units import to_si
@@ -138,7 +138,7 @@ def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[str, ...]:
                 raise InputError(record.path, "", f"is the record of {name} again", remedy)
             if alike is Likeness.MIRROR and has_noise(seen[number]):
                 said = f"is the mirror image of {name}, noise included, not a second run"
-                notices.append(f"{CHECK} {record.path.name} {said}.")
+                notices.append(caution(f"{record.path.name} {said}."))
     return tuple(notices)
 
 

@@ -32,6 +32,7 @@ from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
 from tank2sim.apps.rigs.yaw.study import YawMethodEstimate, YawStudy
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -184,7 +185,7 @@ class YawResult(Result[YawStudy]):
         return f"{names}: in {study.medium}, k_t = {study.torque_constant_NmpA:.4g} N m/A{body}"
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """The notes."""
         return self.study.notes
 

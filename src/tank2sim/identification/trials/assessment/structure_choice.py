@@ -34,7 +34,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_correlations,
 )
 from tank2sim.identification.trials.problem.structures import STRUCTURES
-from tank2sim.marks import CHECK
+from tank2sim.notices import caution
 from tank2sim.records.trials import RUDDERS, Trial
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
@@ -128,9 +128,11 @@ def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str)
     texts = [f"{size:.2f} L" if np.isfinite(size) else "none" for size in sizes]
     mine, other = (", taken", "") if taken == "card" else ("", ", taken")
     return (
-        f"{CHECK} the trials hardly distinguish two structures of the hull, whose turns with "
-        f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag{other}) and "
-        f"{texts[0]} (the card's own terms{mine}): fit or hold out a turn with as much rudder",
+        caution(
+            f"the trials hardly distinguish two structures of the hull, whose turns with "
+            f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag{other}) and "
+            f"{texts[0]} (the card's own terms{mine}): fit or hold out a turn with as much rudder"
+        ),
     )
 
 

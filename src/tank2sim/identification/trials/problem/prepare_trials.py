@@ -13,7 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies
@@ -43,7 +43,7 @@ class Measured:
     trials : tuple of Trial
     driven_by : str
         ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
-    notices : tuple of str
+    notices : tuple of Notice
         Repairs and scalings.
     captive : CaptiveRuns, optional
         Captive tests, at the size of their model.
@@ -51,7 +51,7 @@ class Measured:
 
     trials: tuple[Trial, ...]
     driven_by: str
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     captive: CaptiveRuns | None = None
 
 
@@ -89,7 +89,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         scaled, factor = at_size_of(trial, card)
         _refuse_other_revolutions(scaled, card)
         if factor != 1:
-            notices.append(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long")
+            notices.append(Notice(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
         trials.append(scaled)
     names = [trial.name for trial in trials]
     for trial in trials:
@@ -111,7 +111,7 @@ def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[str]:
     for name, findings in audited.items():
         for finding in findings:
             done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
-            mark = f"{CHECK} " if finding.kind == "fault" else ""
+            mark = caution("") if finding.kind == "fault" else ""
             key = mark, finding.column, finding.what, done
             groups.setdefault(key, []).append((name, finding.likely_truth))
     notices = []

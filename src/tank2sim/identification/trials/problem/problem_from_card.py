@@ -31,6 +31,7 @@ from tank2sim.identification.trials.problem.estimation_problem import Estimate, 
 from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
 
@@ -80,7 +81,7 @@ def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> Ma
     return revised(card, {}, {"model.low_speed_below_mps": bound}, comment="slowest speed of the trials")
 
 
-def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[str, ...]:
+def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[Notice, ...]:
     """What :func:`polynomial_over_trials` changed of a card, as a notice; empty if nothing.
 
     Parameters
@@ -93,7 +94,7 @@ def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple
     text = (
         f"{given.source} states no range of speeds; its polynomial is used down to {card.model.low_speed_bound_mps:g}"
     )
-    return (f"{text} m/s, near the slowest of the trials (model.low_speed_below_mps)",)
+    return (Notice(f"{text} m/s, near the slowest of the trials (model.low_speed_below_mps)"),)
 
 
 def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
@@ -120,8 +121,10 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
         if len(below) and time[below[0]] - trial.time_s[0] >= SHORTEST_AHEAD * ship_time:
             end = float(time[below[0]])
             notices.append(
-                f"{trial.name}: compared up to {end:.0f} s; from then on the ship is slower than "
-                f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends (model.low_speed_below_mps)"
+                Notice(
+                    f"{trial.name}: compared up to {end:.0f} s; from then on the ship is slower than "
+                    f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends (model.low_speed_below_mps)"
+                )
             )
             trials.append(window(trial, trial.time_s[0], end))
         else:
