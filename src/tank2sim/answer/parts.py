@@ -342,4 +342,5 @@ class Section:
 
 def notices_section(notices: Sequence[Notice]) -> list[Section]:
     """Return the section with the notices of a result, empty without any."""
-    return [Section(heading="Notices", notes=[without_exponents(text) for text in notices])] if notices else []
+    notes = [Notice(without_exponents(notice), notice.level) for notice in notices]
+    return [Section(heading="Notices", notes=notes)] if notes else []

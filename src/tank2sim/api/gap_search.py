@@ -283,7 +283,7 @@ def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | N
     writable_folder(folder)
     tidied = put(files, folder, ship.folder.inputs)
     course.done[folder.name] = "computed" if why == NEW else f"computed: {why}"
-    course.notices += [Notice(f"{folder.name}: {notice}") for notice in (*notices, *tidied)]
+    course.notices += [notice.of(folder.name) for notice in (*notices, *tidied)]
     return None
 
 
@@ -303,11 +303,11 @@ def _written(folder: Path) -> GapStudy:
         raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None
 
 
-def _without_ship(study: FleetStudy, output: Path) -> list[str]:
+def _without_ship(study: FleetStudy, output: Path) -> list[Notice]:
     """Notices of results whose ships are no longer in the fleet."""
     ships = {ship.folder for ship in study.ships}
     return [
-        f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept"
+        Notice(f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept")
         for path in sorted(output.glob(f"*/{RUN}"))
         if path.parent.name not in ships
     ]

@@ -169,7 +169,7 @@ def tune_ship(
     after = dict(zip((figure.text for figure in study.figures), study.figures_at(tuned.values).tolist(), strict=True))
     changed, notices = derived_card(card, tuned_text(card, tuned), "the tuned card") if tuned.reached else (None, ())
     if found.errors.together:
-        notices = (_INDEPENDENT, *notices)
+        notices = (Notice(_INDEPENDENT), *notices)
     reported = replace(_reported(found, notices), tuned=tuned.reported(after), ensemble=_bands(ship, study, ensemble))
     return TuningResult(reported, ship, changed)
 

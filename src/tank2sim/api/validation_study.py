@@ -77,7 +77,7 @@ def _study(ready: TrialShip, given: Measured, found: Validation) -> ValidationSt
     )
 
 
-def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[TrialReplay, ...], list[str]]:
+def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[TrialReplay, ...], list[Notice]]:
     """Replay each trial by itself, so that a trial that cannot be replayed spoils no other; and notices on these."""
     found: list[TrialReplay] = []
     notices: list[Notice] = []

@@ -140,15 +140,15 @@ def refuse_impossible(card: Card) -> None:
 
 
 def doubts(card: Card) -> tuple[Notice, ...]:
-    """Sizes and signs of a card that no known ship has, as one notice with the mark CHECK; empty if there are none.
+    """Sizes and signs of a card that no known ship has, as one caution; empty if there are none.
 
     Examples
     --------
     >>> from tank2sim.cards import read_card
     >>> doubts(read_card("mariner"))
     ()
-    >>> doubts(read_card("mariner", {"model.rudder_sign": "starboard"}))[0][:57]
-    'CHECK: Mariner class: the rudder turns the ship the wrong'
+    >>> doubts(read_card("mariner", {"model.rudder_sign": "starboard"}))[0][:50]
+    'Mariner class: the rudder turns the ship the wrong'
     """
     if isinstance(card, ManoeuvringCard):
         facts = [*_of_ship(card), *(_of_mmg(card) if isinstance(card, MmgCard) else ())]

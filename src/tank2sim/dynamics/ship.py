@@ -129,7 +129,7 @@ def _description(card: ManoeuvringCard) -> str:
     return f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in {motions} with steering gear"
 
 
-def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
+def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[Notice]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
     mmg = card.model.kind == "mmg"
     every, equations = (MMG_TERMS, "the MMG hull") if mmg else (ALL_TERMS, "(3.8)")
@@ -150,7 +150,7 @@ def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
         return [*ALL_TERMS, *rolling], []
     names = [*roll_terms(card), *LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
     unused = [name for name in card.derivatives if name not in names]
-    return names, [f"the linear model leaves out {len(unused)} derivatives of the card"] if unused else []
+    return names, [Notice(f"the linear model leaves out {len(unused)} derivatives of the card")] if unused else []
 
 
 def _refuse_singular_mass(card: ManoeuvringCard) -> None:

@@ -105,7 +105,10 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
         ),
         notices=model.notices,
         figures={name: run.figures for name, run in manoeuvres.items()},
-        card_range={name: run.reading.as_json() | {"message": run.reading.message} for name, run in manoeuvres.items()},
+        card_range={
+            name: run.reading.as_json() | {"message": "; ".join(run.reading.notices)}
+            for name, run in manoeuvres.items()
+        },
         replay=replay,
         rules=simulator_rules(
             model,

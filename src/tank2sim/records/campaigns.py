@@ -226,14 +226,14 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     )
 
 
-def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[str]]:
+def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[Notice]]:
     """Runs whose forces are those of a run before, as :func:`tank2sim.records.same_record.likeness` finds: name to
     fault; and remarks on mirror images.
 
     Noise never repeats itself; records without noise, of a computed campaign or a dead gauge, are not evidence.
     """
     faults: dict[str, InputError] = {}
-    remarks = []
+    remarks: list[Notice] = []
     seen: list[tuple[CaptiveRun, Recording]] = []
     for run in runs:
         record = Recording(run.time_s, {column: run.force(force) for force, column in _FORCE_COLUMNS.items()})

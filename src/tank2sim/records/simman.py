@@ -80,8 +80,8 @@ def read_simman(path: Path | str) -> Trial:
     signals["psi_rad"] = unwrapped(signals["psi_rad"])
     signals["delta_rad"] = 0.0 - signals["delta_rad"]
     notices = [
-        laboratory.omission,
-        laboratory.values,
+        Notice(laboratory.omission),
+        Notice(laboratory.values),
         Notice("the rudder is positive to port in the file, to starboard here"),
     ]
     time = named["t_s"]
@@ -128,7 +128,7 @@ def _begins_rows(cells: list[str]) -> bool:
         return False
 
 
-def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
+def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, Notice]:
     """Times of equal step that agree with every time printed, and messages about them.
 
     A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
@@ -149,7 +149,7 @@ def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
         "times are printed with so few digits that some repeat: replaced by a uniform step of "
         f"{step:.6g} s, which agrees with all of them"
     )
-    return time, text
+    return time, Notice(text)
 
 
 def _half_a_digit(cell: str) -> float:

@@ -92,9 +92,7 @@ class AuditResult(Result[AuditStudy]):
     @property
     def notices(self) -> tuple[Notice, ...]:
         """Changes made on reading."""
-        return tuple(
-            Notice(f"{PurePath(trial.file).stem}: {notice}") for trial in self.study.trials for notice in trial.notices
-        )
+        return tuple(notice.of(PurePath(trial.file).stem) for trial in self.study.trials for notice in trial.notices)
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

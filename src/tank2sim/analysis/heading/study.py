@@ -331,20 +331,22 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 
 def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
-) -> tuple[tuple[LoopMargins, ...], list[str]]:
+) -> tuple[tuple[LoopMargins, ...], list[Notice]]:
     """Margins at the speed of the design and at five across the card's range, and notices of speeds without any."""
     values = {parameter.name: parameter.start for parameter in ship.parameters}
     design_speed = values["ship.speed"] if speed is None else speed
     found, notices = [loop_margins(ship, design.autopilot, design_speed)], []
     if design_speed_only:
-        return tuple(found), [f"margins at {design_speed:.4g} m/s alone: a linear card does not hold at other speeds"]
+        return tuple(found), [
+            Notice(f"margins at {design_speed:.4g} m/s alone: a linear card does not hold at other speeds")
+        ]
     for card_speed in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
         if abs(card_speed / design_speed - 1) < 1e-6:
             continue
         try:
             found.append(loop_margins(ship, design.autopilot, card_speed))
         except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
-            notices.append(f"no margins at {card_speed:.4g} m/s: {error.problem}")
+            notices.append(Notice(f"no margins at {card_speed:.4g} m/s: {error.problem}"))
     return tuple(found), notices
 
 

@@ -122,6 +122,7 @@ class CardInfluence:
         return InfluenceStudy(
             ship=self.ship,
             standard_errors=self.of_errors,
+            assumed_errors=self.errors.assumed,
             figures={
                 text: FigureErrors(value, error, dict(zip(keys, share, strict=True)))
                 for text, value, error, share in zip(
@@ -222,6 +223,8 @@ class InfluenceStudy:
     tuned : TunedStudy, optional
         The card tuned to targets.
     ensemble : FigureBands, optional
+    assumed_errors : bool
+        Whether all standard errors are assumed.
     """
 
     ship: str
@@ -233,6 +236,7 @@ class InfluenceStudy:
     agreed: AgreedVariation | None = None
     tuned: TunedStudy | None = None
     ensemble: FigureBands | None = None
+    assumed_errors: bool = False
 
 
 def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardInfluence:
@@ -292,14 +296,14 @@ def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) ->
     return Agreed(percent, predicted(found.exact), predicted(found.difference), tuple(direct))
 
 
-def _differing(study: Study, sloped: Array) -> Iterable[str]:
+def _differing(study: Study, sloped: Array) -> Iterable[Notice]:
     """Notices on figures whose slopes belong to a different event, with another value than the figure's."""
     for figure, value, sloped_value in zip(study.figures, study.base, sloped, strict=True):
         if not abs(value - sloped_value) <= 1e-4 * max(abs(value), 1e-3):
-            yield f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there"
+            yield Notice(f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there")
 
 
-def _not_smooth(found: CardInfluence) -> list[str]:
+def _not_smooth(found: CardInfluence) -> list[Notice]:
     notices = []
     exact = found.exact
     for row, figure in enumerate(found.figures):
@@ -313,9 +317,11 @@ def _not_smooth(found: CardInfluence) -> list[str]:
             elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
                 bent.append(parameter.short)
         if gone:
-            notices.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
+            notices.append(
+                Notice(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
+            )
         if bent:
             notices.append(
-                f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
+                Notice(f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree")
             )
     return notices

@@ -67,7 +67,7 @@ class Study:
         self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
         self._equilibria: dict[float, Array] = {}
         self._long_enough: dict[FigureManoeuvre, float] = {}
-        self._notices: dict[str, None] = dict.fromkeys(self.model.notices)
+        self._notices: dict[Notice, None] = dict.fromkeys(self.model.notices)
         self._known = False  # whether the figures of the card itself have been found: others say nothing of it
         self.base: Array = self.figures_at(self.values)
         self._known = True
@@ -199,9 +199,8 @@ class Study:
         model, integrator = self.model, self._integrator
         run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)
         if not self._known:
-            words = manoeuvre.words
-            marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
-            self._notices |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
+            beyond = [notice.of(manoeuvre.words) for notice in run.reading.notices]
+            self._notices |= dict.fromkeys((*beyond, *run.notices[len(beyond) :]))
         return run
 
 

@@ -20,7 +20,7 @@ from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, rever
 from tank2sim.dynamics.effects import EFFECTS, undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 
 _FAR = 0.05
 """Distance from the diagram, as a share of the largest yaw rate, from which a steady point of a spiral is reported."""
@@ -128,85 +128,99 @@ def _reason(error: InputError) -> str:
     return f"{error.place}: {error.problem}" if error.place else error.problem
 
 
-def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]:
+def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Notice]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages = []
     if not by_speed:
         messages.append(
-            f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
-            "C' and the prime numbers are made with that speed, and there is no curve over speed"
+            Notice(
+                f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
+                "C' and the prime numbers are made with that speed, and there is no curve over speed"
+            )
         )
     if not slowest <= found.speed_mps <= fastest:
-        messages.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
+        messages.append(
+            Notice(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
+        )
     if abs(found.speed_mps / card_speed - 1) > _SAME_SPEED:
         messages.append(
-            f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
+            Notice(f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s")
         )
     return messages
 
 
-def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[str]:
+def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[Notice]:
     stable = [f"{speed.speed_mps:.4g}" for speed in held if speed.stable]
     if not held:
         return [
-            "no steady speed straight ahead: the surge force at the revolutions of the start does not vanish below "
-            f"{FASTEST:g} times the speed of expansion, and such a run leaves the card's range"
+            Notice(
+                "no steady speed straight ahead: the surge force at the revolutions of the start does not vanish below "
+                f"{FASTEST:g} times the speed of expansion, and such a run leaves the card's range"
+            )
         ]
     if len(stable) < 2:
         return []
     return [
-        f"CHECK: {len(stable)} stable speeds straight ahead at the same revolutions ({', '.join(stable)} m/s): the "
-        "ship goes at one or another as it comes from below or above, which no ship does; check the terms of X in u "
-        "and low_speed_below_mps"
+        caution(
+            f"{len(stable)} stable speeds straight ahead at the same revolutions ({', '.join(stable)} m/s): the ship "
+            "keeps one or the other, depending on the speed before, which no ship does; check the terms of X in u and "
+            "low_speed_below_mps"
+        )
     ]
 
 
-def _about_effects(found: Stability) -> list[str]:
+def _about_effects(found: Stability) -> list[Notice]:
     """Notices on effects that C' and Nomoto's models neglect, and on modes that contradict them."""
     messages = []
     if found.effect_states:
         messages.append(
-            f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
-            "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
-            "or unstable, and the response to the rudder are with these states"
+            Notice(
+                f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
+                "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
+                "or unstable, and the response to the rudder are with these states"
+            )
         )
     if not found.criterion_decides and found.criterion > 0:
         messages.append(
-            f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
-            "nothing of that"
+            Notice(
+                f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
+                "nothing of that"
+            )
         )
     return messages
 
 
-def _about_weather(model: Model) -> list[str]:
+def _about_weather(model: Model) -> list[Notice]:
     values = dict(zip(model.input_names, model.input_values().tolist(), strict=True))
     blowing = [name.partition(".")[0] for name, absent in undisturbed_inputs(model).items() if values[name] != absent]
     if not blowing:
         return []
     return [
-        f"the straight course is that in the card's {' and '.join(blowing)}, and so are its eigenvalues, C' and "
-        "Nomoto's numbers; steady turns, spirals and the IMO criteria are those of calm water"
+        Notice(
+            f"the straight course is that in the card's {' and '.join(blowing)}, and so are its eigenvalues, C' and "
+            "Nomoto's numbers; steady turns, spirals and the IMO criteria are those of calm water"
+        )
     ]
 
 
-def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[str]]:
+def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice]]:
     """The two spirals, with notices."""
-    messages: list[str] = []
+    messages: list[Notice] = []
     direct = reverse = None
     try:
         if turning.stable.any():
             direct = direct_spiral(model, turning)
         else:
-            messages.append("no spiral: no steady turn is stable with the rudder held")
+            messages.append(Notice("no spiral: no steady turn is stable with the rudder held"))
     except InputError as error:
-        messages.append(f"no spiral: {_reason(error)}")
+        messages.append(Notice(f"no spiral: {_reason(error)}"))
     try:
         reverse = reverse_spiral(model, turning, stability(model).nomoto)
         if reverse is None:
-            messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
+            messages.append(Notice("no reverse spiral: the rudder turns the ship the wrong way, or not at all"))
     except InputError as error:
-        messages.append(f"no reverse spiral: {_reason(error)}")
+        messages.append(Notice(f"no reverse spiral: {_reason(error)}"))
     most = math.degrees(np.max(np.abs(turning.yaw_rate_radps)))
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:
@@ -214,8 +228,10 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[str]]:
         off = int(np.sum(np.array(points.steady) & ~(points.distance_to_diagram_degps < _FAR * most)))
         if off:
             messages.append(
-                f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
-                "joined to its straight course, or the diagram ends before them"
+                Notice(
+                    f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
+                    "joined to its straight course, or the diagram ends before them"
+                )
             )
     return Spirals(direct, reverse), messages
 

@@ -29,8 +29,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.marks import EXTRAPOLATED
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import exceeded_range
 
 _LARGEST_RUDDER = math.radians(35.0)
@@ -426,4 +425,4 @@ def _out_of_range(model: Model, found: SteadyTurning) -> list[Notice]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
     outside = exceeded_range(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
-    return [Notice(f"{EXTRAPOLATED} what the card was measured in: steady turns have {outside}")] if outside else []
+    return [caution(f"EXTRAPOLATED beyond the card's measurements: steady turns have {outside}")] if outside else []

@@ -167,7 +167,8 @@ def _circles_title(bridge: Bridge) -> str:
 
 def _notices(*bridges: Bridge | None) -> list[Notice]:
     """As many notices as a sheet has room for; the command prints all."""
-    texts = list(dict.fromkeys(_cut(text, _NOTICE) for bridge in bridges if bridge for text in bridge.notices))
+    cut = (Notice(_cut(each.line, _NOTICE), each.level) for bridge in bridges if bridge for each in bridge.notices)
+    texts = list(dict.fromkeys(cut))
     omitted = len(texts) - _NOTICES
     return texts if omitted <= 0 else [*texts[:_NOTICES], Notice(f"and {omitted} more, which the command prints")]
 

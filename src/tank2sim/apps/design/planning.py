@@ -33,7 +33,6 @@ from tank2sim.cards.examination import doubts
 from tank2sim.cards.writing import TestedRange
 from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
-from tank2sim.marks import ASSUMED, ASSUMED_TANK, LINEARISED
 from tank2sim.notices import Notice, caution
 from tank2sim.units import from_si, to_si
 
@@ -167,20 +166,18 @@ def planned_trial(
     if sensors is None:
         notices.insert(
             0,
-            Notice(
-                f"{ASSUMED} of the sensors, for none are stated: "
+            caution(
+                "ASSUMED standard errors of the sensors, because none are stated: "
                 + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items())
             ),
         )
-    assumed = _assumed_of_card(polynomial)
-    if assumed:
-        notices.insert(0, Notice(assumed))
+    notices = [*_assumed_of_card(polynomial), *notices]
     if design.unstable:
         notices.insert(
             0,
-            Notice(
-                f"{LINEARISED} of {card.ship.name}, which is unstable on a straight course: its manoeuvres are not "
-                "linear in the coefficients, and errors after a fit may be many times those predicted here"
+            caution(
+                f"LINEARISED standard errors: {card.ship.name} is unstable on a straight course, so its manoeuvres are "
+                "not linear in the coefficients, and errors after a fit may be many times those predicted here"
             ),
         )
     manoeuvres = tuple(
@@ -281,13 +278,13 @@ def _tested_range(largest: tuple[float, float, float]) -> TestedRange:
     return TestedRange(math.radians(drift), math.radians(rudder), rate)
 
 
-def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[str, ...]]:
+def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[Notice, ...]]:
     if not isinstance(card, MmgCard):
         return card, ()
     made, notices = converted_card(card, "abkowitz", Conventions(None, None, 0.0), None)
     assert made.card is not None
     words = "the card is of the MMG method: the plan is for the polynomial that is fitted to it"
-    return manoeuvring_card(made.card), (words, *notices)
+    return manoeuvring_card(made.card), (Notice(words), *notices)
 
 
 def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:
@@ -364,12 +361,12 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
         lacking.append(f"gain {100 * gauges.gain_relative:g} %")
     if "rate_hz" not in stated:
         lacking.append(f"{gauges.rate_hz:g} independent readings a second")
-    found = [Notice(f"{ASSUMED} of the gauges, as [gauges] of the tank does not state them: {', '.join(lacking)}")]
-    if not lacking:
-        found = []
-    card = _assumed_of_card(design.card) if draws else None
-    if card:
-        found.append(Notice(card))
+    found = []
+    if lacking:
+        found.append(
+            caution(f"ASSUMED standard errors of the gauges ([gauges] of the tank states none): {', '.join(lacking)}")
+        )
+    found += _assumed_of_card(design.card) if draws else ()
     carriage, model = tank.carriage.model_fields_set, tank.model.model_fields_set
     body = tank.carriage
     lengths = {
@@ -380,14 +377,13 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
     }
     missing = [text for text in lengths.values() if text]
     if missing:
-        found.append(Notice(f"{ASSUMED_TANK}, for it is not stated: {', '.join(missing)}"))
+        found.append(caution(f"ASSUMED of the tank, because it is not stated: {', '.join(missing)}"))
     return found
 
 
-def _assumed_of_card(card: ManoeuvringCard) -> str | None:
-    """The derivatives without a stated standard error, which are taken to be known to a share of their values."""
+def _assumed_of_card(card: ManoeuvringCard) -> list[Notice]:
+    """A caution on derivatives without a stated standard error: a share of the value is assumed."""
     names = [name for name, value in card.derivatives.items() if value and name not in card.uncertainty]
-    if not names:
-        return None
     which = ", ".join(names) if len(names) <= _LISTED else f"{len(names)} derivatives"
-    return f"{ASSUMED} of the card, which states none for {which}: {100 * RELATIVE_ERROR:g} % of each"
+    text = f"ASSUMED standard errors: the card states none of {which}, and {100 * RELATIVE_ERROR:g} % of each is taken"
+    return [caution(text)] if names else []

@@ -18,7 +18,7 @@ from tank2sim.apps.logs.trial_files import TrialCut
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Columns, Number
 from tank2sim.identification.craft.study import CraftIdentificationStudy
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 from tank2sim.records.thinning import thin_line
 
 VOYAGE_SAMPLES = 1500
@@ -179,7 +179,7 @@ def _notices(
 ) -> tuple[Notice, ...]:
     notices = list(voyage.notices)
     if not cuts:
-        notices.append(Notice(_why_no_trial(voyage, stretches)))
+        notices.append(_why_no_trial(voyage, stretches))
     elif not all(cut.steered for cut in cuts):
         notices.append(Notice(NO_RUDDER_NOTICE))
     if current:
@@ -192,16 +192,16 @@ def _notices(
     return tuple(notices)
 
 
-def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> str:
+def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> Notice:
     series = voyage.series
     if not any(name in series for name in ("rudder_angle", "rudder_order", "thrust_order_port", "rpm_port")):
         unused = [channel for channel in voyage.channels.channels if "rudder" in channel.quantity]
         candidates = ", ".join(f"{channel.stream} ({QUANTITIES[channel.quantity].words})" for channel in unused)
         hint = f"; it may be {candidates}" if candidates else ""
-        return f"UNCONFIRMED: no rudder or thruster is known{hint}: name it in {CHANNELS_FILE}; no trial is cut"
+        return caution(f"no rudder or thruster is known{hint}: name it in {CHANNELS_FILE}; no trial is cut")
     if not any(stretch.kind.excites for stretch in stretches):
-        return "no stretch excites the vessel: no trial is cut"
-    return "the stretches are too short, or lack a heading and a position: no trial is cut"
+        return Notice("no stretch excites the vessel: no trial is cut")
+    return Notice("the stretches are too short, or lack a heading and a position: no trial is cut")
 
 
 def _channel(channel: LogChannel) -> ChannelStudy:

@@ -18,7 +18,6 @@ from tank2sim.apps.logs.reference import held, interpolated, thinned_series
 from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch
 from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
 from tank2sim.arrays import Array
-from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import file_columns
 from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
@@ -158,19 +157,17 @@ def _name(number: int, stretch: Stretch, steered: bool) -> str:
 
 def _remarks(voyage: Voyage, stretch: Stretch, first: float) -> list[str]:
     logs = ", ".join(log.path.name for log in voyage.logs)
-    remarks = [notice for notice in voyage.notices if notice.startswith("UNCONFIRMED")]
-    remarks.append(Notice(f"{stretch.kind}, {CUT_BY} from {logs}"))
+    remarks: list[str] = [*voyage.faults]
+    remarks.append(f"{stretch.kind}, {CUT_BY} from {logs}")
     if voyage.dated:
-        remarks.append(Notice(f"begins: {utc_text(first)}"))
-    remarks.append(Notice(f"execute: {stretch.begin_s - first:.2f}"))
+        remarks.append(f"begins: {utc_text(first)}")
+    remarks.append(f"execute: {stretch.begin_s - first:.2f}")
     if voyage.origin_deg:
-        remarks.append(Notice(f"origin: {voyage.origin_deg[0]:g} {voyage.origin_deg[1]:g}"))
+        remarks.append(f"origin: {voyage.origin_deg[0]:g} {voyage.origin_deg[1]:g}")
     if current := drift_current(voyage, stretch.begin_s, stretch.end_s):
-        remarks.append(
-            Notice(f"current {current.speed_mps:.2f} m/s towards {current.direction_deg:.0f} deg, by {current.by}")
-        )
+        remarks.append(f"current {current.speed_mps:.2f} m/s towards {current.direction_deg:.0f} deg, by {current.by}")
     if "rpm" in voyage.series and "rpm_order" not in voyage.series:
-        remarks.append(Notice("n_rpm are measured revolutions, not ordered"))
+        remarks.append("n_rpm are measured revolutions, not ordered")
     return remarks
 
 

@@ -47,7 +47,9 @@ class ConvertedText:
     changes: tuple[FigureChange, ...] = ()
 
 
-def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -> tuple[ConvertedText, tuple[str, ...]]:
+def converted(
+    card: Card, to: str, wanted: Conventions, scatter: float | None
+) -> tuple[ConvertedText, tuple[Notice, ...]]:
     """A card in another language, and notices.
 
     Parameters
@@ -80,8 +82,8 @@ def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -
     notices: tuple[Notice, ...] = ()
     if wanted.origin_m:
         notices = (
-            "U of the new origin scales the numbers now: a difference of second order in the distance and r'",
-            "figures, positions and speeds of the new card are those of its own origin",
+            Notice("U of the new origin scales the numbers now: a difference of second order in the distance and r'"),
+            Notice("figures, positions and speeds of the new card are those of its own origin"),
         )
     if to == "abkowitz" and isinstance(given, MmgCard):
         return _fitted(given, wanted, SCATTER if scatter is None else scatter, notices)
@@ -101,7 +103,7 @@ def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     return manoeuvring_card(card)
 
 
-def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[str, ...]]:
+def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
         raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")
@@ -117,23 +119,25 @@ def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedT
     text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
     notices = []
     if card.effects:
-        notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+        notices.append(Notice(f"effects are left out: {', '.join(entry.name for entry in card.effects)}"))
     if to == "gazebo":
         notices.append(
-            "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
-            "dead band, nor the lag of the card"
+            Notice(
+                "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
+                "dead band, nor the lag of the card"
+            )
         )
     else:
         lost = [name for name, value in card.derivatives.items() if value and name not in (*VRX_TERMS, *VRX_MASSES)]
         also = f", and {', '.join(lost)}" if lost else ""
-        notices.append(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}")
+        notices.append(Notice(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}"))
     changes = craft_changes(card, model(card))
     return ConvertedText(text(card), changes=changes), tuple(notices)
 
 
 def _fitted(
     card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[Notice, ...]
-) -> tuple[ConvertedText, tuple[str, ...]]:
+) -> tuple[ConvertedText, tuple[Notice, ...]]:
     bare = build(card)
     model = build(replace(card, effects=())) if card.effects else bare
     fit = fit_polynomial(card, model, scattered_motions(model, manoeuvre_motions(model), scatter))
@@ -146,18 +150,20 @@ def _fitted(
     return ConvertedText(made.text, made, fit, changes), notices
 
 
-def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[str, ...]]:
+def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to in _OF_MMG:
         if not isinstance(card, MmgCard):
             raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
         notices = [
-            f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
-            "more tightly than the card"
+            Notice(
+                f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
+                "more tightly than the card"
+            )
         ]
         if card.effects:
-            notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+            notices.append(Notice(f"effects are left out: {', '.join(entry.name for entry in card.effects)}"))
         if card.ship.beam_m is None:
-            notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
+            notices.append(Notice("the card states no beam_m: B is nan (shipmmg does not use it)"))
         return ConvertedText(_OF_MMG[to](card)), tuple(notices)
     write = mss_function if to == "mss" else pvs_class
     return ConvertedText(write(card, build(card))), ()

@@ -50,9 +50,9 @@ def gap_notices(
     named = {name for name, *_ in proof.named.estimated}
     fitted_to_held = tuple(proof.named.by_trial) if trials[1].trials else ()
     notices = [*trials[0].notices, *trials[1].notices, *_partly_measured(trials[0])]
-    notices += [_of_waves(waves)] if waves else []
-    notices += [judged.by_simulation] if judged.by_simulation else []
-    notices += [_in_words(strange) for strange in decision.strange]
+    notices += [Notice(_of_waves(waves))] if waves else []
+    notices += [Notice(judged.by_simulation)] if judged.by_simulation else []
+    notices += [Notice(_in_words(strange)) for strange in decision.strange]
     notices += [
         Notice(
             f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
@@ -102,15 +102,15 @@ def gap_notices(
     return tuple(dict.fromkeys(notices))
 
 
-def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[str, ...]:
+def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[Notice, ...]:
     """That not all effects were tried which the card and the trials allow; empty if all were."""
     if set(possible) <= set(tried):
         return ()
     shown = ", ".join(tried) if len(tried) <= SHOWN else f"{len(tried)}"
-    return (f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing",)
+    return (Notice(f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing"),)
 
 
-def _partly_measured(fitted: Measured) -> list[str]:
+def _partly_measured(fitted: Measured) -> list[Notice]:
     """Notices of winds and currents that some of the fitted trials recorded, and not all."""
     notices = []
     for name, effect in EFFECTS.items():
@@ -118,9 +118,11 @@ def _partly_measured(fitted: Measured) -> list[str]:
         having = [trial.name for trial in fitted.trials if signals and signals <= set(trial.signals)]
         if 0 < len(having) < len(fitted.trials):
             notices.append(
-                f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}), and is "
-                "not used: it is estimated in each trial where it is tried; give its columns in all trials, or give "
-                "those alone that have them"
+                Notice(
+                    f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}), and is "
+                    "not used: it is estimated in each trial where it is tried; give its columns in all trials, or give "
+                    "those alone that have them"
+                )
             )
     return notices
 

@@ -286,7 +286,6 @@ class GapStudy:
     missing_force, missing_signal : Lacking or None
     replays : tuple of GapReplay
         In the order of `trials`.
-    cautions : tuple of Notice
         Objections to the verdict.
     notices : tuple of Notice
         The cautions, then messages about the trials.
@@ -313,7 +312,6 @@ class GapStudy:
     missing_force: Lacking | None
     missing_signal: Lacking | None
     replays: tuple[GapReplay, ...]
-    cautions: tuple[Notice, ...]
     notices: tuple[Notice, ...]
     files: tuple[str, ...] = ()
 

@@ -16,7 +16,7 @@ from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slope
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 
 _LINEAR = ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd", "Xu")
 """Terms of the linear black box: sway velocity, yaw rate and rudder in Y and N, speed in X."""
@@ -248,7 +248,7 @@ def _impossible_coefficients(gap: Gap) -> tuple[Notice, ...]:
     if farthest is None or farthest.moved < IMPOSSIBLE:
         return ()
     return (
-        Notice(
+        caution(
             f"{farthest.name} is {farthest.moved:.0f} of its standard errors from the given card: the card may be of "
             "another ship or loading, have a number or sign in another unit or convention, or state errors that are too "
             "small; what is named may be due to that"
@@ -267,7 +267,7 @@ def _impossible_sizes(gap: Gap) -> tuple[Notice, ...]:
                 continue
             if min(abs(value - bound) for bound in bounds) < NEAR_A_BOUND * (bounds[1] - bounds[0]):
                 found.append(
-                    Notice(
+                    caution(
                         f"{parameter.name} of {effect.name} lies at the bound of what is possible: the card may be of "
                         "another ship or have numbers in other units"
                     )
@@ -282,12 +282,11 @@ def _cautions_of_name(gap: Gap) -> tuple[Notice, ...]:
         return ()
     group, notices = f"the {'held-out' if held else 'fitting'} trials", []
     if round(after, 6) > REMAINS:
-        notices.append(
-            _what_remains(before, after, group, "named, but" if gap.verdict == MISSING else "with the best of them")
-        )
+        begin = "named, but" if gap.verdict == MISSING else "with the best of them"
+        notices.append(caution(_what_remains(before, after, group, begin)))
     if box is not None and box < (1 - _BETTER) * after:
         notices.append(
-            Notice(
+            caution(
                 f"a linear black box with as many coefficients follows {group} better (misfit {box:.3g} against "
                 f"{after:.3g}): the name explains less than a mere refit does"
             )

@@ -219,7 +219,7 @@ def study_runs(
     single, reduced = zip(*(single_run(run, campaign) for run in runs), strict=True)
     alike = len(runs) > 1 and same_test(single)
     repeats = repeated_coefficients(single) if alike else ()
-    notices = [*remarks, *(caution(f"{fault}") for run in single for fault in run.faults)]
+    notices = [*remarks, *(caution(fault) for run in single for fault in run.faults)]
     if campaign is None:
         notices.append(
             Notice(

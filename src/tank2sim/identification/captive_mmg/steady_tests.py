@@ -189,7 +189,7 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
     }
 
 
-def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[str]]:
+def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[Notice]]:
     """Means of the steady runs; oscillating ones are left out and named, all runs with faults are refused together."""
     campaign = read_campaign(path)
     steady = [run for run in campaign.runs if not run.oscillates]
@@ -203,7 +203,9 @@ def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], lis
     remarks = []
     if oscillating:
         remarks = [
-            f"Left out, because MMG takes steady tests: {len(oscillating)} oscillating runs, {oscillating[0]} first."
+            Notice(
+                f"Left out, because MMG takes steady tests: {len(oscillating)} oscillating runs, {oscillating[0]} first."
+            )
         ]
     return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
 

@@ -186,10 +186,9 @@ def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], 
         least = from_si("n_rpm", response.turning_radps)
         text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
         if thruster.dead_band_radps >= response.turning_radps:
-            text = caution(f"{text}, and one of {least:.3g} rpm, within it, turned it")
+            notices.append(caution(f"{text}, and one of {least:.3g} rpm, within it, turned it"))
         else:
-            text += f"; one of {least:.3g} rpm turned it"
-        notices.append(text)
+            notices.append(Notice(f"{text}; one of {least:.3g} rpm turned it"))
     return notices
 
 
@@ -274,7 +273,7 @@ class CraftValidationStudy:
 
 
 def study_predictions(
-    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[str]
+    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[Notice]
 ) -> CraftValidationStudy:
     """Study of predictions of trials by a card.
 
@@ -285,7 +284,7 @@ def study_predictions(
         Files of all trials.
     predictions : sequence of FreePrediction
         Those of trials that are long enough.
-    alike : sequence of str
+    alike : sequence of Notice
         Notices of trials that are alike.
     """
     known = {entry.run.file for entry in predictions}

@@ -242,7 +242,7 @@ def _identified(
         card = card_in(card, _first_current(card, trials))
     structures: Mapping[str, CrossValidation] = {}
     weights: dict[str, float] = {}
-    chosen: tuple[str, ...] = ()
+    chosen: tuple[Notice, ...] = ()
     structure = options.structure
     if structure in (AUTO, AVERAGE):
         structures = cross_validate_structures(card, trials, options, executor)
@@ -252,7 +252,7 @@ def _identified(
     if options.structure == AVERAGE:
         weights = _kept_weights(card, trials, options, structures)
         structure = max(weights, key=weights.__getitem__)
-        chosen = (_average_in_words(weights),)
+        chosen = (Notice(_average_in_words(weights)),)
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
         raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
@@ -523,11 +523,12 @@ def _current_notice(current: WaterCurrent | None) -> Sequence[Notice]:
         f"{math.degrees(current.direction_rad):.0f} ± {math.degrees(direction_error):.2g} deg was estimated with the "
     )
     words += "coefficients: the card has it as its effect current; leave that out for still water"
-    return (words,) if current.determined else (undetermined_notice(current), words)
+    notice = Notice(words)
+    return (notice,) if current.determined else (undetermined_notice(current), notice)
 
 
-def undetermined_notice(current: WaterCurrent) -> str:
-    """That the trials do not determine the current, as a marked sentence."""
+def undetermined_notice(current: WaterCurrent) -> Notice:
+    """A caution that the trials do not determine the current."""
     return caution(
         f"the trials do not determine the current (to {current.standard_error_mps:.2g} m/s in one direction): "
         "coefficients and figures may hold a part of it; add speed through the water or a full turn, or give the card "

@@ -28,8 +28,7 @@ from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.identification.trials.problem.water_current import WaterCurrent, card_in
-from tank2sim.marks import FORCED
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.units import from_si
@@ -378,7 +377,7 @@ def study_identification(
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
-    forced = [Notice(f"{FORCED}: {'; '.join(result.forced)}")] if result.forced else []
+    forced = [caution(f"FORCED: {'; '.join(result.forced)}")] if result.forced else []
     unfinished = [] if result.posterior is None or result.posterior.converged else result.posterior.notices
     comparisons = {SET_KEYS[word]: (given, found) for word, given, found in result.comparisons}
     return IdentificationStudy(
@@ -606,7 +605,7 @@ def identified_card_text(result: Identification, trials: list[str]) -> str:
     card = result.card
     origin = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
     if result.forced:
-        origin = f"{FORCED}, although not of this ship by the rudder's moment: {origin}"
+        origin = f"FORCED, although not of this ship by the rudder's moment: {origin}"
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {origin}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {origin}: {card.ship.notes}"

@@ -163,7 +163,9 @@ def _added_mass(fit: TowFit) -> Iterator[Notice]:
     low, high = ADDED_SHARES
     if low - error <= share <= high + error:
         if share < 0:
-            yield f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
+            yield Notice(
+                f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
+            )
         return
     units = [
         f"{name} (then {(1 + share) * factor - 1:.2g})"

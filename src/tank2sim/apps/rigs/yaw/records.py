@@ -13,7 +13,7 @@ import numpy as np
 from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.notices import caution
+from tank2sim.notices import Notice, caution
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 from tank2sim.units import to_si
@@ -57,7 +57,7 @@ class YawRecord:
         What else the comments state: ``torque_constant_NmpA``, ``inertia_kgm2`` (J_zz of the body with the rotor),
         its standard error ``inertia_error_kgm2``, ``max_current_A``, ``current_lag_s``, ``length_m``,
         ``water_density_kgpm3``.
-    notes : tuple of str
+    notes : tuple of Notice
         What the user should know of the file.
     """
 
@@ -69,7 +69,7 @@ class YawRecord:
     programme: YawProgramme
     stated: bool
     constants: dict[str, float]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Notice, ...] = ()
 
 
 def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
@@ -96,14 +96,18 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
     notes = (
-        [f"the file does not state {' and '.join(missing)} of the programme; that of the published rig is taken."]
+        [
+            Notice(
+                f"the file does not state {' and '.join(missing)} of the programme; that of the published rig is taken."
+            )
+        ]
         if missing
         else []
     )
     whole = np.unwrap(angle)
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
     if turns:
-        notes.append(f"the angle jumps by a whole turn {turns} times and is put together again.")
+        notes.append(Notice(f"the angle jumps by a whole turn {turns} times and is put together again."))
     constants = {key: value for key in _PLAIN if (value := _positive(table, key)) is not None}
     return YawRecord(
         path=table.path,
@@ -118,7 +122,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     )
 
 
-def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[str, ...]:
+def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[Notice, ...]:
     """Refuse a record that is another one again, also turned, cut, thinned or rounded; notices of mirror images.
 
     Raises

@@ -9,7 +9,7 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.evaluation import pooled
 from tank2sim.identification.trials.identify import Identification
-from tank2sim.notices import Notice, caution
+from tank2sim.notices import Level, Notice, caution
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
 
@@ -70,12 +70,9 @@ def _widened(result: Identification) -> list[Notice]:
     if not wide:
         return []
     far = max(scale.values()) > LACKING
-    mark = caution("") if far and result.started.uncertainty else ""  # assumed errors may be too small
-    found = [
-        Notice(
-            f"{mark}the card's standard errors were widened as the trials demand: {', '.join(wide)}; trust_card keeps them"
-        )
-    ]
+    doubtful = far and result.started.uncertainty  # assumed errors may be too small
+    text = f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; trust_card keeps them"
+    found = [Notice(text, Level.CAUTION if doubtful else Level.INFO)]
     if far:
         found.append(
             Notice(

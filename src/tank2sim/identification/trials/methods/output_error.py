@@ -30,7 +30,7 @@ from tank2sim.notices import Notice
 LONGEST_SEARCH = 25
 """Steps after which a search ends; it needs 3 to 10."""
 
-INTERRUPTED = "interrupted: the estimates are the best found so far"
+INTERRUPTED = Notice("interrupted: the estimates are the best found so far")
 
 
 @dataclass(frozen=True)
