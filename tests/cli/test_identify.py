@@ -336,7 +336,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()
     forced = tank2sim(*asked, "--force", cwd=folder)
     assert forced.returncode == 0, forced.stderr
-    assert forced.stdout.startswith("FORCED")
+    assert forced.stdout.startswith("CHECK: FORCED")
     card = read_card(str(folder / "o.toml"))
     assert "FORCED" in card.text.splitlines()[0] and "FORCED" in card.ship.source
     assert json.loads((folder / "o.json").read_text())["forced"]

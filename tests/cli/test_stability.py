@@ -49,7 +49,7 @@ def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -
 def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) -> None:
     result = tank2sim("stability", "kvlcc2-captive", "--no-spirals", cwd=tmp_path)
     reported = " ".join(result.stdout.split())
-    assert re.search(r"advance; [^:]*: EXTRAPOLATED beyond what the card was measured in", reported)
+    assert re.search(r"advance; [^:]*: EXTRAPOLATED beyond the card", reported)
     assert "track reach: the card has no [propulsion]" in reported
 
 

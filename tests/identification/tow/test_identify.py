@@ -15,7 +15,7 @@ from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK, marked
+from tank2sim.notices import foremost
 
 # what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
 PRINTED = np.array([2550.0, 92418.0, -26096.0, 2015.0])
@@ -125,15 +125,13 @@ def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
 )
 def test_an_added_mass_that_no_body_has_is_marked_with_the_likely_unit(table_1, force, mass, unit, named):
     tows = replace(table_1, speed_mps=unit * table_1.speed_mps)
-    found = marked(identify_tow(tows, force, mass, terms=("B3",)).warnings)
-    assert found and all(
-        message.startswith(CHECK) and "added mass" in message and named in message for message in found
-    )
+    found = foremost(identify_tow(tows, force, mass, terms=("B3",)).warnings)
+    assert found and all(message.leads and "added mass" in message and named in message for message in found)
 
 
 def test_the_added_mass_of_the_paper_is_not_marked(table_1):
     for terms in (("B3",), ("B3", "B2", "B1")):
-        assert not marked(identify_tow(table_1, terms=terms).warnings)
+        assert not foremost(identify_tow(table_1, terms=terms).warnings)
 
 
 def test_what_is_given_comes_before_the_file_and_is_reported(table_1):

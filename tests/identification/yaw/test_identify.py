@@ -24,7 +24,7 @@ from tank2sim.apps.rigs.yaw.records import read_yaw_record, yaw_record_text
 from tank2sim.apps.rigs.yaw.simulation import Measuring, run_yaw_rig, yaw_record
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
-from tank2sim.marks import marked
+from tank2sim.notices import foremost
 from tests.marks import first_fast
 from tests.yaw_truth import Truth, mirrored, record, written
 
@@ -360,11 +360,11 @@ def test_an_added_inertia_that_no_body_has_is_refused_or_marked(folder, columns,
     with pytest.raises(InputError, match="added inertia"):
         found(0.0204, torque_constant_NmpA=0.0051)
     for unit in ({"inertia": 0.0204e-3}, {"inertia": 0.0204, "torque_constant_NmpA": 51.0}):
-        (mark,) = marked(found(**unit).notes)
+        (mark,) = foremost(found(**unit).notes)
         assert "added inertia" in mark and "J_zz" in mark
-    (mark,) = marked(found(0.0500, inertia_error_kgm2=9e-4).notes)
+    (mark,) = foremost(found(0.0500, inertia_error_kgm2=9e-4).notes)
     assert "added inertia" in mark and "zero" in mark
-    assert not marked(found(0.0204, inertia_error_kgm2=2e-4).notes)
+    assert not foremost(found(0.0204, inertia_error_kgm2=2e-4).notes)
 
 
 def test_a_wrapped_angle_is_put_together_and_reported(folder, columns, result):
@@ -428,7 +428,7 @@ def test_a_copy_of_a_record_is_refused_a_mirror_image_marked_and_a_repeat_taken(
     for name, copy in copies.items():
         with pytest.raises(InputError, match=rf"{name}\.csv.*first\.csv"):
             identify_yaw([read("first", first), read(name, copy)])
-    assert not marked(identify_yaw([read("first", first), read("repeat", noisy(2))]).notes)
+    assert not foremost(identify_yaw([read("first", first), read("repeat", noisy(2))]).notes)
     image = read("image", mirrored(first), replace(TRUTH, top=-TRUTH.top))
-    (mark,) = marked(identify_yaw([read("first", first), image]).notes)
+    (mark,) = foremost(identify_yaw([read("first", first), image]).notes)
     assert "image.csv" in mark and "mirror" in mark
