@@ -18,7 +18,7 @@ from tank2sim.gap.outcome.export import (
     signal_display_name,
 )
 from tank2sim.gap.result import Acting, Gap, Named, Refitted
-from tank2sim.results.gap_text import place_of_cause, found_in_words
+from tank2sim.results.gap_text import found_in_words, place_of_cause
 from tank2sim.units import to_si
 from tests.gap import made_up
 

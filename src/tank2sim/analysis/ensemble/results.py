@@ -317,12 +317,10 @@ def _counted(chances: Sequence[Chance], usable: int) -> list[Notice]:
     """Notices on members without a figure, and on those beyond the card's range."""
     lost = ", ".join(f"{one.name} {one.not_shown} of {usable}" for one in chances if one.not_shown)
     left = ", ".join(f"{one.name} {one.beyond_card} of {usable}" for one in chances if one.beyond_card)
-    lines = [Notice(f"members that do not show a figure count as not meeting its criterion: {lost}")] if lost else []
+    lines = [f"members that do not show a figure count as not meeting its criterion: {lost}"] if lost else []
     if left:
-        lines.append(
-            Notice(f"members that left the card's range before a figure was known count by the value found: {left}")
-        )
-    return lines
+        lines.append(f"members that left the card's range before a figure was known count by the value found: {left}")
+    return [Notice(text) for text in lines]
 
 
 def all_chances(limits: Mapping[str, float], found: Ensemble) -> ChanceOfAll | None:

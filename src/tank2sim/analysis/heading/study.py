@@ -401,20 +401,16 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
         remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
         filtered = "wave_filter_radps" in design.gains
         notices.append(
-            Notice(
-                f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
-                + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
-            )
+            f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
+            + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
         )
     limit = {parameter.name: parameter.start for parameter in ship.parameters}.get("steering.max_angle", 0.0)
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
         notices.append(
-            Notice(
-                f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
-                f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
-            )
+            f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
+            f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
         )
-    return notices
+    return [Notice(text) for text in notices]
 
 
 def _begun_at(speed: float | None) -> list[Notice]:

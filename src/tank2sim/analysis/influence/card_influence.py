@@ -317,11 +317,9 @@ def _not_smooth(found: CardInfluence) -> list[Notice]:
             elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
                 bent.append(parameter.short)
         if gone:
-            notices.append(
-                Notice(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
-            )
+            notices.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
         if bent:
             notices.append(
-                Notice(f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree")
+                f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
             )
-    return notices
+    return [Notice(text) for text in notices]

@@ -134,20 +134,16 @@ def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Noti
     messages = []
     if not by_speed:
         messages.append(
-            Notice(
-                f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
-                "C' and the prime numbers are made with that speed, and there is no curve over speed"
-            )
+            f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
+            "C' and the prime numbers are made with that speed, and there is no curve over speed"
         )
     if not slowest <= found.speed_mps <= fastest:
-        messages.append(
-            Notice(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
-        )
+        messages.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
     if abs(found.speed_mps / card_speed - 1) > _SAME_SPEED:
         messages.append(
-            Notice(f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s")
+            f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
         )
-    return messages
+    return [Notice(text) for text in messages]
 
 
 def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[Notice]:
@@ -175,20 +171,16 @@ def _about_effects(found: Stability) -> list[Notice]:
     messages = []
     if found.effect_states:
         messages.append(
-            Notice(
-                f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
-                "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
-                "or unstable, and the response to the rudder are with these states"
-            )
+            f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
+            "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
+            "or unstable, and the response to the rudder are with these states"
         )
     if not found.criterion_decides and found.criterion > 0:
         messages.append(
-            Notice(
-                f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
-                "nothing of that"
-            )
+            f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
+            "nothing of that"
         )
-    return messages
+    return [Notice(text) for text in messages]
 
 
 def _about_weather(model: Model) -> list[Notice]:
@@ -206,21 +198,21 @@ def _about_weather(model: Model) -> list[Notice]:
 
 def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice]]:
     """The two spirals, with notices."""
-    messages: list[Notice] = []
+    messages: list[str] = []
     direct = reverse = None
     try:
         if turning.stable.any():
             direct = direct_spiral(model, turning)
         else:
-            messages.append(Notice("no spiral: no steady turn is stable with the rudder held"))
+            messages.append("no spiral: no steady turn is stable with the rudder held")
     except InputError as error:
-        messages.append(Notice(f"no spiral: {_reason(error)}"))
+        messages.append(f"no spiral: {_reason(error)}")
     try:
         reverse = reverse_spiral(model, turning, stability(model).nomoto)
         if reverse is None:
-            messages.append(Notice("no reverse spiral: the rudder turns the ship the wrong way, or not at all"))
+            messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
     except InputError as error:
-        messages.append(Notice(f"no reverse spiral: {_reason(error)}"))
+        messages.append(f"no reverse spiral: {_reason(error)}")
     most = math.degrees(np.max(np.abs(turning.yaw_rate_radps)))
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:
@@ -228,12 +220,10 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice
         off = int(np.sum(np.array(points.steady) & ~(points.distance_to_diagram_degps < _FAR * most)))
         if off:
             messages.append(
-                Notice(
-                    f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
-                    "joined to its straight course, or the diagram ends before them"
-                )
+                f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
+                "joined to its straight course, or the diagram ends before them"
             )
-    return Spirals(direct, reverse), messages
+    return Spirals(direct, reverse), [Notice(text) for text in messages]
 
 
 def steady_speeds(model: Model) -> tuple[SteadySpeed, ...]:

@@ -146,29 +146,23 @@ class ConventionResult(Result[ConventionStudy]):
         study, first, found = self.study, self.readings[0], []
         if study.assumed:
             sizes = ", ".join(f"{key} = {value:.4g}" for key, value in study.assumed.items())
-            found.append(Notice(f"ASSUMED, because the table lacks them: {sizes}"))
+            found.append(f"ASSUMED, because the table lacks them: {sizes}")
         if first.against:
-            found.append(
-                Notice(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
-            )
+            found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
         if study.left_out:
-            found.append(Notice(f"not read, and not on the card of a reading: {', '.join(study.left_out)}"))
+            found.append(f"not read, and not on the card of a reading: {', '.join(study.left_out)}")
         if study.scaled_with_nominal_speed:
             found.append(
-                Notice(
-                    "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
-                    'speed_scale = "nominal", by which speed counts once'
-                )
+                "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
+                'speed_scale = "nominal", by which speed counts once'
             )
             if study.speed_scale == "instantaneous":
-                found.append(Notice('the file states speed_scale = "instantaneous", by which speed counts twice'))
+                found.append('the file states speed_scale = "instantaneous", by which speed counts twice')
         if len(self.readings) > 1 and same_in_practice(first, self.readings[1]) and first.probability < SURE_READING:
-            found.append(
-                Notice("the first two readings are one ship in practice: their figures differ by less than 5 %")
-            )
+            found.append("the first two readings are one ship in practice: their figures differ by less than 5 %")
         if first.vanished:
-            found.append(Notice(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits"))
-        return tuple(found)
+            found.append(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits")
+        return tuple(map(Notice, found))
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

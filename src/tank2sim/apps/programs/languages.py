@@ -119,20 +119,18 @@ def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedT
     text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
     notices = []
     if card.effects:
-        notices.append(Notice(f"effects are left out: {', '.join(entry.name for entry in card.effects)}"))
+        notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
     if to == "gazebo":
         notices.append(
-            Notice(
-                "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
-                "dead band, nor the lag of the card"
-            )
+            "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
+            "dead band, nor the lag of the card"
         )
     else:
         lost = [name for name, value in card.derivatives.items() if value and name not in (*VRX_TERMS, *VRX_MASSES)]
         also = f", and {', '.join(lost)}" if lost else ""
-        notices.append(Notice(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}"))
+        notices.append(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}")
     changes = craft_changes(card, model(card))
-    return ConvertedText(text(card), changes=changes), tuple(notices)
+    return ConvertedText(text(card), changes=changes), tuple(map(Notice, notices))
 
 
 def _fitted(
@@ -155,15 +153,15 @@ def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[Notic
         if not isinstance(card, MmgCard):
             raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
         notices = [
-            Notice(
+            (
                 f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
                 "more tightly than the card"
             )
         ]
         if card.effects:
-            notices.append(Notice(f"effects are left out: {', '.join(entry.name for entry in card.effects)}"))
+            notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
         if card.ship.beam_m is None:
-            notices.append(Notice("the card states no beam_m: B is nan (shipmmg does not use it)"))
-        return ConvertedText(_OF_MMG[to](card)), tuple(notices)
+            notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
+        return ConvertedText(_OF_MMG[to](card)), tuple(map(Notice, notices))
     write = mss_function if to == "mss" else pvs_class
     return ConvertedText(write(card, build(card))), ()

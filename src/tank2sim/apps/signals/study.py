@@ -255,13 +255,9 @@ def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tu
     lag = correlation.lag_of_largest_s
     if abs(lag) > 0.1 * segment:
         messages.append(
-            Notice(
-                f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "
-                f"{segment:.3g} s: gain and coherence come out low; a longer --segment helps"
-            )
+            f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "
+            f"{segment:.3g} s: gain and coherence come out low; a longer --segment helps"
         )
     if not np.any(transfer.sure):
-        messages.append(
-            Notice("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
-        )
-    return tuple(messages)
+        messages.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
+    return tuple(map(Notice, messages))

@@ -55,27 +55,21 @@ def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign
     notices = []
     if card.estimated:
         notices.append(
-            Notice(
-                f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
-            )
+            f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
         )
     if card.missing:
         remedy = "" if fill else f" --fill {next(iter(FILLS))} takes some of them from a published estimate."
         notices.append(
-            Notice(
-                f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
-                f"wrong as that.{remedy}"
-            )
+            f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
+            f"wrong as that.{remedy}"
         )
     if {"Yr", "Nr"} & set(card.estimated) and not {"Nvvr", "Nrrr"} & set(card.entries):
         notices.append(
-            Notice("No term of third order in the yaw rate was measured or estimated: hard turns come out too tight.")
+            "No term of third order in the yaw rate was measured or estimated: hard turns come out too tight."
         )
     if ratio:
         notices.append(
-            Notice(
-                f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
-                f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
-            )
+            f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
+            f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
         )
-    return notices
+    return [Notice(text) for text in notices]

@@ -52,22 +52,18 @@ def glider_warnings(card: GliderCard) -> tuple[Notice, ...]:
     light = density * glider.volume_m3 - glider.mass_kg
     if abs(light) > 0.02 * glider.mass_kg:
         messages.append(
-            Notice(
-                f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and "
-                f"the mass is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has "
-                f"{glider.buoyancy_kg:g} kg ({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and "
-                "net buoyancy are used as they are, the volume in the ballast (1) alone"
-            )
+            f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and "
+            f"the mass is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has "
+            f"{glider.buoyancy_kg:g} kg ({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and "
+            "net buoyancy are used as they are, the volume in the ballast (1) alone"
         )
     if math.isclose(glider.reference_area_m2, glider.volume_m3 ** (2 / 3), rel_tol=1e-3):
         messages.append(
-            Notice(
-                f"the coefficients are referred to V^(2/3) = {glider.reference_area_m2:.4g} m2; those of gliders are by "
-                "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
-                "area that belongs to them in glider.reference_area_m2"
-            )
+            f"the coefficients are referred to V^(2/3) = {glider.reference_area_m2:.4g} m2; those of gliders are by "
+            "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
+            "area that belongs to them in glider.reference_area_m2"
         )
-    return tuple(messages)
+    return tuple(map(Notice, messages))
 
 
 def glider_model(card: GliderCard) -> Model:

@@ -190,18 +190,14 @@ def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed:
     used = force if isinstance(force, float | int) else tows.force_N
     for name, used_value, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
         if written is not None and written != used_value:
-            notes.append(Notice(f"The file of the tows states {name} {written:g}; {used_value:g} was given and used."))
+            notes.append(f"The file of the tows states {name} {written:g}; {used_value:g} was given and used.")
     if isinstance(force, Polynomial) and tows.force_N is not None:
-        notes.append(
-            Notice(f"The file of the tows states force_N {tows.force_N:g}; {force_words(force)} was given and used.")
-        )
+        notes.append(f"The file of the tows states force_N {tows.force_N:g}; {force_words(force)} was given and used.")
     if tows.time_s[0] == 0 and np.nanmax(np.abs(tows.speed_mps[0])) > 0:
-        notes.append(
-            Notice("The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed.")
-        )
+        notes.append("The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed.")
     for method in failed:
-        notes.append(Notice(f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3)."))
-    return notes
+        notes.append(f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3).")
+    return [Notice(text) for text in notes]
 
 
 def _force(tows: Tows, given: float | Polynomial | None) -> Polynomial:

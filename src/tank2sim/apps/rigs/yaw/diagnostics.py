@@ -168,20 +168,16 @@ def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) ->
     notes = []
     if misfit_rad is not None and misfit_rad > _PULSE_RAD:
         notes.append(
-            Notice(
-                f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
-                "another effect is missing in the terms, and no standard error includes it."
-            )
+            f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
+            "another effect is missing in the terms, and no standard error includes it."
         )
     (first, *further) = records
     if not further and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
         notes.append(
-            Notice(
-                "One hump of part of a turn does not distinguish a moment of gravity from inertia: give two humps or more "
-                "that begin at other angles."
-            )
+            "One hump of part of a turn does not distinguish a moment of gravity from inertia: give two humps or more "
+            "that begin at other angles."
         )
-    return notes
+    return [Notice(text) for text in notes]
 
 
 def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[Notice]:
@@ -192,27 +188,21 @@ def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[No
         share = 100 * two.bias_kgm2 / best.total_inertia_kgm2
         parts = two.bias_from
         notes.append(
-            Notice(
-                f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
-                f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals differ in dissipation, "
-                f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
-                "include this bias."
-            )
+            f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
+            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals differ in dissipation, "
+            f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
+            "include this bias."
         )
     if len(two.by_hump_kgm2) > 1:
         humps = ", ".join(f"{1e4 * value:.4g}" for value in two.by_hump_kgm2)
         notes.append(
-            Notice(
-                f"It is the mean of {humps} e-4 kg m2 (total), hump by hump; while the controller's gains are still being "
-                "tuned, a hump differs."
-            )
+            f"It is the mean of {humps} e-4 kg m2 (total), hump by hump; while the controller's gains are still being "
+            "tuned, a hump differs."
         )
     for term, (value, error) in best.friction.items():
         if error is not None and abs(value) < 2 * error:
-            notes.append(
-                Notice(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
-            )
-    return [*notes, *_comparison_notes(best, estimates.get("output_error"))]
+            notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
+    return [*map(Notice, notes), *_comparison_notes(best, estimates.get("output_error"))]
 
 
 def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[Notice]:

@@ -96,18 +96,14 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
     notes = (
-        [
-            Notice(
-                f"the file does not state {' and '.join(missing)} of the programme; that of the published rig is taken."
-            )
-        ]
+        [f"the file does not state {' and '.join(missing)} of the programme; that of the published rig is taken."]
         if missing
         else []
     )
     whole = np.unwrap(angle)
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
     if turns:
-        notes.append(Notice(f"the angle jumps by a whole turn {turns} times and is put together again."))
+        notes.append(f"the angle jumps by a whole turn {turns} times and is put together again.")
     constants = {key: value for key in _PLAIN if (value := _positive(table, key)) is not None}
     return YawRecord(
         path=table.path,
@@ -118,7 +114,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         programme=programme,
         stated=not missing,
         constants=constants,
-        notes=tuple(notes),
+        notes=tuple(map(Notice, notes)),
     )
 
 

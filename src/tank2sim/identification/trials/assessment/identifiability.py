@@ -231,12 +231,10 @@ def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[Notice]:
     messages = []
     if drifting:
         cause = "sway and yaw are nearly proportional in these trials"
-        messages.append(Notice(f"the estimates of {_listed(drifting)} are correlated, and drift together: {cause}"))
+        messages.append(f"the estimates of {_listed(drifting)} are correlated, and drift together: {cause}")
     if remaining:
-        messages.append(
-            Notice(f"the estimates of {_listed(remaining)} are correlated: the trials hardly distinguish them")
-        )
-    return messages
+        messages.append(f"the estimates of {_listed(remaining)} are correlated: the trials hardly distinguish them")
+    return [Notice(text) for text in messages]
 
 
 def _drift(first: Term, second: Term) -> bool:
@@ -248,10 +246,10 @@ def _drift(first: Term, second: Term) -> bool:
 def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> list[Notice]:
     single = [direction[0] for direction in unseen if len(direction) == 1]
     several = [_listed(list(direction)) for direction in unseen if len(direction) > 1]
-    messages = [Notice(f"the trials show next to nothing of {_listed(single)}: the prior remains")] if single else []
+    messages = [f"the trials show next to nothing of {_listed(single)}: the prior remains"] if single else []
     if several:
-        messages.append(Notice(f"the trials determine only a combination of {'; of '.join(several)}"))
-    return messages
+        messages.append(f"the trials determine only a combination of {'; of '.join(several)}")
+    return [Notice(text) for text in messages]
 
 
 def _listed(words: list[str]) -> str:

@@ -118,12 +118,10 @@ def _stops(card: ManoeuvringCard) -> list[Notice]:
         try:
             speed = simulate(build(card), Turn(side * largest)).trajectory["motion.speed"]
         except InputError:
-            messages.append(Notice(f"{words} leaves all bounds: it holds only near the trials"))
+            messages.append(f"{words} leaves all bounds: it holds only near the trials")
             continue
         if speed[-1] < STOPPED * speed[0]:
             messages.append(
-                Notice(
-                    f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: it holds only near the trials"
-                )
+                f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: it holds only near the trials"
             )
-    return messages
+    return [Notice(text) for text in messages]

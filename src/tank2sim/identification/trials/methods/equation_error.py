@@ -244,11 +244,9 @@ def _form_notices(form: WeakForm) -> list[Notice]:
         share = (error / size) ** 2 if size > 0 else 0.0
         if share > REPORTED_NOISE:
             messages.append(
-                Notice(f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small")
+                f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small"
             )
     blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
     if blind:
-        messages.append(
-            Notice(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")
-        )
-    return messages
+        messages.append(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")
+    return [Notice(text) for text in messages]
