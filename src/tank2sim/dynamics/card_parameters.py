@@ -291,7 +291,8 @@ class JointErrors:
         messages = []
         if assumed:
             subject = "any number" if self.assumed else ", ".join(assumed)
-            text = f"the card states no standard error of {subject}: {100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
+            share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
+            text = f"the card states no standard error of {subject}: {share}"
             messages.append(caution(f"standard errors are ASSUMED: {text}") if self.assumed else Notice(text))
         if exact:
             messages.append(

@@ -103,8 +103,8 @@ def _without_yaw(card: ManoeuvringCard) -> list[Notice]:
         return []
     return [
         Notice(
-            "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r, and with them course "
-            "stability and every turn, are estimates"
+            "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r are estimates, "
+            "and so are course stability and every turn"
         )
     ]
 

@@ -92,8 +92,8 @@ def osp_notices(model: Model) -> tuple[Notice, ...]:
         return ()
     return (
         Notice(
-            f"the ship's name is not a file name: the model description is called {name}_OspModelDescription.xml, and the "
-            "engine of OSP, which looks for the ship's name, does not find the groups of variables; rename the ship"
+            f"the ship's name is not a file name: the model description is called {name}_OspModelDescription.xml, and "
+            "the engine of OSP, which looks for the ship's name, does not find the groups of variables; rename the ship"
         ),
     )
 

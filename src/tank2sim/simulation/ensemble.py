@@ -264,8 +264,8 @@ class Redrawn:
         share = 100 * self.members / members
         return [
             Notice(
-                f"{self.members} of {members} members ({share:.2g} %) were drawn again, being beyond what numbers can be "
-                f"({counts}): their distribution is normal, cut off there"
+                f"{self.members} of {members} members ({share:.2g} %) were drawn again, because numbers were beyond "
+                f"their bounds ({counts}): the distribution is normal, cut off there"
             )
         ]
 

@@ -127,8 +127,5 @@ def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[Noti
     ordered = float(np.max(np.abs(trajectory["rudder.command"])))
     if ordered <= largest * (1 + 1e-9):
         return []
-    return [
-        Notice(
-            f"the rudder was ordered to {np.degrees(ordered):.4g} deg, but its gear stops at {np.degrees(largest):.4g} deg"
-        )
-    ]
+    angles = np.degrees([ordered, largest])
+    return [Notice("the rudder was ordered to {:.4g} deg, but its gear stops at {:.4g} deg".format(*angles))]

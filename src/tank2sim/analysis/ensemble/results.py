@@ -174,8 +174,8 @@ def manoeuvre_bands(
         single = " in single precision" if question.pace.single else ""
         notices.append(
             Notice(
-                f"integration steps are {steps[0]:.3g} s for the first {KEPT} members and {steps[1]:.3g} s{single} for the "
-                f"others: no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
+                f"integration steps are {steps[0]:.3g} s for the first {KEPT} members, {steps[1]:.3g} s{single} for "
+                f"the others: no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
             )
         )
     found = _ensemble(card, question, draws, request.members, executor)

@@ -281,8 +281,8 @@ def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[No
         found.append(
             caution(
                 f"the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
-                f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg "
-                "of rudder in the mean; the figures of course keeping mean nothing."
+                f"{weather.current_mps:.3g} m/s: its mean heading error is {kept.heading_error_mean_deg:.3g} deg, with "
+                f"{rudder:.3g} deg of rudder; the figures of course keeping mean nothing."
             )
         )
     speed = float(np.mean(run["motion.u"][len(run.t) // 2 :]))

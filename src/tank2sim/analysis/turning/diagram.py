@@ -413,11 +413,8 @@ def _end_notices(found: SteadyTurning) -> list[Notice]:
     for side, row, ended in (("port", 0, found.ended[0]), ("starboard", -1, found.ended[1])):
         if ended in words:
             rudder, rate = np.degrees([found.rudder_rad[row], found.yaw_rate_radps[row]])
-            messages.append(
-                Notice(
-                    f"the steady-turning diagram {words[ended]} {rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"
-                )
-            )
+            place = f"{rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"
+            messages.append(Notice(f"the steady-turning diagram {words[ended]} {place}"))
     return messages
 
 

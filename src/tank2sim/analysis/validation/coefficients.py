@@ -129,8 +129,8 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
     if mixed:
         notes.append(
             Notice(
-                "of MMG cards the linear terms on a straight course are compared, with propeller and rudder, the mean of "
-                "both sides of gamma_R; their standard errors are not known"
+                "MMG cards are compared by their linear terms on a straight course, with propeller and rudder and the "
+                "mean of both sides of gamma_R; their standard errors are not known"
             )
         )
     return tuple(rows), tuple(notes)

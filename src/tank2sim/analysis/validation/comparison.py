@@ -376,7 +376,8 @@ def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[Notice
             )
         present = [name for name, value in card.derivatives.items() if value]
         if assumed := [name for name in present if name not in card.uncertainty]:
-            text = f"{len(assumed)} derivatives state no standard error: {100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
+            share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
+            text = f"{len(assumed)} derivatives state no standard error: {share}"
             every = caution(f"standard errors are ASSUMED: {text}") if assumed == present else Notice(text)
             messages.append(every.of(label))
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):

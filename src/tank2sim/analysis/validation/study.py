@@ -249,8 +249,8 @@ def validate_card(
     if whats and not between:
         messages.append(
             Notice(
-                "no manoeuvre was run twice alike: u_D is of the record's noise and the errors of its point, heading and "
-                "orders, without weather and helmsman, and so a lower bound"
+                "no manoeuvre was repeated: u_D holds the record's noise and the errors of its point, heading and "
+                "orders, but neither weather nor helmsman, and is a lower bound"
             )
         )
     if not count:
@@ -311,8 +311,8 @@ def _validated(
     if what.rudder_rate_radps is None and what.begin_s <= what.trial.time_s[0]:
         messages.append(
             Notice(
-                f"{what.trial.name}: the record begins with the order given, which is taken to be given in its first row: "
-                "if it was given before, advance and times are too small by that time, and the figures are wrong"
+                f"{what.trial.name}: the record begins with the order already given, and its first row is taken as the "
+                "execute: if the order was earlier, advance and times are too small by that time"
             )
         )
     if beyond := [name for name in measured if read.outside(name) and name in coarse]:

@@ -290,11 +290,8 @@ def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[Notice, .
 def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:
     notices = list(design.slopes.notices)
     if design.not_excited:
-        notices.append(
-            Notice(
-                f"no run of this tank shows {', '.join(design.not_excited)}: their errors are not in the standard errors"
-            )
-        )
+        unseen = ", ".join(design.not_excited)
+        notices.append(Notice(f"no run of this tank shows {unseen}: the standard errors leave out their errors"))
     if design.too_strong:
         left_out = counted(design.too_strong, "candidate run")
         notices.append(Notice(f"left out: {left_out} with a force that exceeds the range of its gauge"))
@@ -304,11 +301,8 @@ def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:
         ("rudder", asked.rudder_rad, runs.rudder_rad),
     ):
         if size > most + 1e-12:
-            notices.append(
-                Notice(
-                    f"{word} goes to {math.degrees(most):.3g} deg, not {math.degrees(size):.3g}, by [mechanism] of the tank"
-                )
-            )
+            reached = f"{math.degrees(most):.3g} deg, not {math.degrees(size):.3g}"
+            notices.append(Notice(f"{word} goes to {reached}, by [mechanism] of the tank"))
     body = design.tank_runs.tank.mechanism.model_dump()
     missing = [key for key in ("sway_amplitude_m", "heading_amplitude_rad", "drift_rad") if body[key] is None]
     if missing:

@@ -89,8 +89,8 @@ def _of_names(first: Gap, further: Gap) -> list[Notice]:
     before, after = names
     return [
         Notice(
-            f"{after}: found on the card improved by {before}, which left more than noise; explanations were compared next "
-            f"to {before}, whose probability is that of the first search"
+            f"{after}: found on the card improved by {before}, which left more than noise; explanations were compared "
+            f"next to {before}, whose probability is from the first search"
         )
     ]
 

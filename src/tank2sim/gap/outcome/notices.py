@@ -55,7 +55,7 @@ def gap_notices(
     notices += [Notice(_in_words(strange)) for strange in decision.strange]
     notices += [
         Notice(
-            f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
+            f"{names}: fits best from instant to instant, but simulations with it are no closer than without: not named"
         )
         for names in withheld
     ]
@@ -73,7 +73,7 @@ def gap_notices(
     if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
         notices.append(
             Notice(
-                f"all trials together are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
+                f"all trials together are still missed by {remaining:.3g} times the noise: gusts, waves, "
                 "coefficients that are off, or something more that is missing; the standard errors do not cover it"
             )
         )
@@ -86,8 +86,8 @@ def gap_notices(
             )
     notices += [
         Notice(
-            f"{name}: the same to these trials as {coefficient.name}, which was refitted by {coefficient.moved:.2g} of its "
-            "standard errors"
+            f"{name}: these trials cannot tell it from an error of {coefficient.name}, now {coefficient.moved:.2g} "
+            "standard errors off"
         )
         for name, coefficient in effects_like(proof.coefficients, named).items()
     ]
@@ -119,9 +119,8 @@ def _partly_measured(fitted: Measured) -> list[Notice]:
         if 0 < len(having) < len(fitted.trials):
             notices.append(
                 Notice(
-                    f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}), and is "
-                    "not used: it is estimated in each trial where it is tried; give its columns in all trials, or give "
-                    "those alone that have them"
+                    f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}). It is "
+                    "not used, but estimated in each trial: give its columns in all trials, or only trials with them"
                 )
             )
     return notices

@@ -250,8 +250,8 @@ def _impossible_coefficients(gap: Gap) -> tuple[Notice, ...]:
     return (
         caution(
             f"{farthest.name} is {farthest.moved:.0f} of its standard errors from the given card: the card may be of "
-            "another ship or loading, have a number or sign in another unit or convention, or state errors that are too "
-            "small; what is named may be due to that"
+            "another ship or loading, have a number or sign in another unit or convention, or state too small errors; "
+            "what is named may be due to that"
         ),
     )
 

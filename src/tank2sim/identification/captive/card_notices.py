@@ -34,8 +34,8 @@ def heel_notices(reduction: Reduction) -> list[Notice]:
         return []
     return [
         Notice(
-            f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with [roll], "
-            "a metacentric height and terms of K takes them."
+            f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with "
+            "[roll], a metacentric height and terms of K takes them."
         )
     ]
 

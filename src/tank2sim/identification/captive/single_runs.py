@@ -232,7 +232,7 @@ def study_runs(
     notices += [
         Notice(
             f"Repeats differ in {row.signal} {row.part} {row.order or ''}".rstrip()
-            + f" by {row.deviation:.3g} {row.unit}, and their noise explains {row.expected:.2g} (chance {row.chance:.1g})."
+            + f" by {row.deviation:.3g} {row.unit}; their noise explains {row.expected:.2g} (chance {row.chance:.1g})."
         )
         for row in repeats
         if row.differs

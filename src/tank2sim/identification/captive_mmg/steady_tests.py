@@ -202,11 +202,8 @@ def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], lis
     oscillating = [run.name for run in campaign.runs if run.oscillates]
     remarks = []
     if oscillating:
-        remarks = [
-            Notice(
-                f"Left out, because MMG takes steady tests: {len(oscillating)} oscillating runs, {oscillating[0]} first."
-            )
-        ]
+        runs = f"{len(oscillating)} oscillating runs, {oscillating[0]} first"
+        remarks = [Notice(f"Left out, because MMG takes steady tests: {runs}.")]
     return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
 
 

@@ -42,11 +42,8 @@ def check_current(records: tuple[YawRecord, ...]) -> list[Notice]:
             problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
             raise InputError(record.path, "column current_A", problem, remedy)
         if largest > _STRONG_A:
-            notes.append(
-                Notice(
-                    f"{record.path.name}: the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
-                )
-            )
+            text = f"the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
+            notes.append(Notice(text).of(record.path.name))
         limit = record.constants.get("max_current_A")
         if limit is None:
             continue
@@ -117,8 +114,8 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
     if worst > _NOT_QUITE_MIRRORED:
         return [
             Notice(
-                f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
-                "two-interval formulas are biased by the difference in dissipation."
+                f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: "
+                "the two-interval formulas are biased by the difference in dissipation."
             )
         ]
     return []

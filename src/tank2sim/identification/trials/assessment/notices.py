@@ -76,8 +76,8 @@ def _widened(result: Identification) -> list[Notice]:
     if far:
         found.append(
             Notice(
-                "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these trials "
-                "and the card as it was given, finds which"
+                "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these "
+                "trials and the given card, finds which"
             )
         )
     return found

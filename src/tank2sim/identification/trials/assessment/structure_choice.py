@@ -129,9 +129,9 @@ def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str)
     mine, other = (", taken", "") if taken == "card" else ("", ", taken")
     return (
         caution(
-            f"the trials hardly distinguish two structures of the hull, whose turns with "
-            f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag{other}) and "
-            f"{texts[0]} (the card's own terms{mine}): fit or hold out a turn with as much rudder"
+            "the trials hardly distinguish two structures of the hull, whose tactical diameters with "
+            f"{math.degrees(rudder):.0f} deg of rudder are {texts[1]} (cross-flow drag{other}) and {texts[0]} (the "
+            f"card's own terms{mine}): fit or hold out a turn with as much rudder"
         ),
     )
 

@@ -122,8 +122,9 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
             end = float(time[below[0]])
             notices.append(
                 Notice(
-                    f"{trial.name}: compared up to {end:.0f} s; from then on the ship is slower than "
-                    f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends (model.low_speed_below_mps)"
+                    f"{trial.name}: compared up to {end:.0f} s, when the ship falls below "
+                    f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends "
+                    "(model.low_speed_below_mps)"
                 )
             )
             trials.append(window(trial, trial.time_s[0], end))
