@@ -19,7 +19,6 @@ from tank2sim.identification.captive.plot_data import ForcePlot, HarmonicsPlot, 
 from tank2sim.identification.captive.reduction import Reduction, reduction_covariance
 from tank2sim.identification.captive.result_card import Contents, reduced_card_text
 from tank2sim.identification.captive.study import ReductionStudy
-from tank2sim.notices import Notice
 from tank2sim.results.captive_charts import (
     Residual,
     derivative_certainty_chart,
@@ -119,11 +118,6 @@ class ReductionResult(Result[ReductionStudy]):
     def subtitle(self) -> str:
         """What was done."""
         return "Captive model tests, reduced"
-
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """The warnings."""
-        return self.study.warnings
 
     @property
     def headline(self) -> tuple[str, ...]:

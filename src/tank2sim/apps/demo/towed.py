@@ -97,7 +97,7 @@ def _section(
             _miss_table(misses),
         ],
         charts=[Illustration(chart=chart, caption="Points were measured; the line is the exported FMU, run by FMPy.")],
-        notes=[*paper.warnings[:1], *chosen.warnings],
+        notes=[*paper.notices[:1], *chosen.notices],
     )
 
 

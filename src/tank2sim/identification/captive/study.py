@@ -246,7 +246,7 @@ class ReductionStudy:
     uncertainty_budget : UncertaintyBudget
     missing : tuple of str
         Essential derivatives that are neither measured nor estimated.
-    warnings : tuple of Notice
+    notices : tuple of Notice
     methods, selection, spread, symmetry, leave_one_out : dict
         By force: methods, choice of terms, scatter of the runs, test of the symmetry (on request), predicted runs.
     systematic_errors : tuple of SystematicError
@@ -281,7 +281,7 @@ class ReductionStudy:
     heel_derivatives: dict[str, ReducedDerivative]
     uncertainty_budget: UncertaintyBudget
     missing: tuple[str, ...]
-    warnings: tuple[Notice, ...]
+    notices: tuple[Notice, ...]
     methods: dict[str, ForceMethods]
     selection: dict[str, tuple[Choice, ...]]
     spread: dict[str, RunSpread]
@@ -308,7 +308,7 @@ class ReductionStudy:
 
 
 def study_reduction(
-    reduction: Reduction, card: Contents, warnings: tuple[Notice, ...] = (), card_scale: float | None = None
+    reduction: Reduction, card: Contents, notices: tuple[Notice, ...] = (), card_scale: float | None = None
 ) -> ReductionStudy:
     """The study of a reduction.
 
@@ -317,7 +317,7 @@ def study_reduction(
     reduction : Reduction
     card : Contents
         Contents of its card.
-    warnings : tuple of Notice
+    notices : tuple of Notice
         Messages for the user, in sentences.
     card_scale : float, optional
         As of :class:`ReductionStudy`.
@@ -339,7 +339,7 @@ def study_reduction(
         },
         uncertainty_budget=_budget(reduction),
         missing=card.missing,
-        warnings=warnings,
+        notices=notices,
         methods={force: _methods(result) for force, result in forces.items()},
         selection={force: result.selection.choices for force, result in forces.items()},
         spread={force: _spread(result) for force, result in forces.items()},

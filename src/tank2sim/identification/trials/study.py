@@ -323,7 +323,7 @@ class IdentificationStudy:
         Factor on the standard errors of the card by group of parameters.
     cost : tuple of float
     identifiability : IdentifiabilityStudy
-    notices, warnings : tuple of Notice
+    notices : tuple of Notice
         Changes to the data and marks; all that limits the result.
     replays : tuple of CardReplay
     """
@@ -352,7 +352,6 @@ class IdentificationStudy:
     cost: tuple[Number, ...]
     identifiability: IdentifiabilityStudy
     notices: tuple[Notice, ...]
-    warnings: tuple[Notice, ...]
     replays: tuple[CardReplay, ...]
 
     @property
@@ -419,8 +418,7 @@ def study_identification(
             unseen=tuple(map(tuple, known.unseen)),
             notices=tuple(known.notices),
         ),
-        notices=(*unfinished, *forced, *result.notices),
-        warnings=(*unfinished, *result.notices, *known.notices, *remarks(result)),
+        notices=tuple(dict.fromkeys((*unfinished, *forced, *result.notices, *known.notices, *remarks(result)))),
         replays=_replays(before, result, fitted, held),
     )
 

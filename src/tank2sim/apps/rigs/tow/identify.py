@@ -62,7 +62,7 @@ class TowIdentification:
         Coefficients of v*(t) in rising powers of t, m/s over s (eq. 2.1).
     methods : dict
         Method to its estimates.
-    warnings : tuple of Notice
+    notices : tuple of Notice
         Messages for the user, in sentences.
     """
 
@@ -77,7 +77,7 @@ class TowIdentification:
     top_speed_mps: float
     speed_polynomial: tuple[float, ...]
     methods: dict[str, TowFit]
-    warnings: tuple[Notice, ...]
+    notices: tuple[Notice, ...]
 
     @property
     def force(self) -> Polynomial:
@@ -149,7 +149,7 @@ def identify_tow(
         top_speed_mps=tows.top_speed_mps,
         speed_polynomial=tuple(speed.polynomial.coef.tolist()),
         methods=fits,
-        warnings=(*notes, *tow_findings(tows, pull, speed.polynomial, fits, designs)),
+        notices=(*notes, *tow_findings(tows, pull, speed.polynomial, fits, designs)),
     )
 
 
@@ -251,7 +251,7 @@ def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
 def tow_card_text(
     result: TowIdentification, fit: TowFit, *, name: str, source: str, length_m: float | None = None
 ) -> str:
-    """TOML text of the card with the numbers of one method; its notes are the warnings of the result.
+    """TOML text of the card with the numbers of one method; its notes are the notices of the result.
 
     Parameters
     ----------
@@ -271,6 +271,6 @@ def tow_card_text(
             standard_errors={key: value for key, value in fit.standard_errors.items() if key in values},
             top_speed_mps=result.top_speed_mps,
             length_m=length_m,
-            notes=" ".join(result.warnings),
+            notes=" ".join(result.notices),
         )
     )

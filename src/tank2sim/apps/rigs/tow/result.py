@@ -31,7 +31,6 @@ from tank2sim.apps.rigs.tow.study import TowStudy
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR
-from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -156,11 +155,6 @@ class TowResult(Result[TowStudy]):
             f"The body moves as {mass:.0f} ± {half:.0f} kg (95 %), and {mass - self.study.mass_kg:.0f} kg of it is "
             f"water. These tows determine {best.label}, and no more.",
         )
-
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """The warnings."""
-        return self.study.warnings
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

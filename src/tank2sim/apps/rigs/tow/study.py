@@ -175,7 +175,7 @@ def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = N
         body=body,
         drag_coefficients=_drag_coefficients(result, body) if body else {},
     )
-    return replace(study, warnings=(*result.warnings, *_notes(study), *_continued(study, tows)))
+    return replace(study, notices=(*result.notices, *_notes(study), *_continued(study, tows)))
 
 
 def _drag_coefficients(result: TowIdentification, body: TowedBody) -> dict[str, DragCoefficients]:

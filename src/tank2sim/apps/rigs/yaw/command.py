@@ -312,7 +312,7 @@ def _similarity(record: YawRecord, text: str) -> str:
 
 
 def _with_notice(result: YawResult, text: str) -> YawResult:
-    return replace(result, study=replace(result.study, notes=(*result.study.notes, Notice(text))))
+    return replace(result, study=replace(result.study, notices=(*result.study.notices, Notice(text))))
 
 
 def _floating_body(text: str) -> FloatingBody:

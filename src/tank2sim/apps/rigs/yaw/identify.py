@@ -115,7 +115,7 @@ class YawIdentification:
         The nonlinear least squares, where they converged.
     mirror : tuple of float
         Difference of the rates of each pair, over the largest.
-    notes : tuple of Notice
+    notices : tuple of Notice
         Messages for the user, in sentences.
     """
 
@@ -129,7 +129,7 @@ class YawIdentification:
     ideal: Interval
     angle: AngleFit | None
     mirror: tuple[float, ...]
-    notes: tuple[Notice, ...]
+    notices: tuple[Notice, ...]
     air: YawIdentification | None = field(default=None)
 
     def added_inertia(self, method: str) -> tuple[float, float | None] | None:
@@ -167,10 +167,10 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     alike = refuse_copied_records(records)
     if not wet:
         found = _result(dry, "air", options, None)
-        return replace(found, notes=(*alike, *found.notes))
+        return replace(found, notices=(*alike, *found.notices))
     air = _result(dry, "air", replace(options, terms=None), None) if dry else None
     found = _result(wet, "water", options, air)
-    return replace(found, notes=(*alike, *found.notes))
+    return replace(found, notices=(*alike, *found.notices))
 
 
 def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
@@ -257,12 +257,12 @@ def _result(
         ideal=ideal,
         angle=angle,
         mirror=mirror,
-        notes=(*notes, *remarks, *estimate_notes(fit, estimates)),
+        notices=(*notes, *remarks, *estimate_notes(fit, estimates)),
         air=air,
     )
     added = {name: value for name in estimates if (value := identified.added_inertia(name)) is not None}
     first = check_added_inertia(records[0], body.value_kgm2 if body else 0.0, added)
-    return replace(identified, notes=(*first, *identified.notes))
+    return replace(identified, notices=(*first, *identified.notices))
 
 
 Fits = tuple[EnergyFit, EnergyFit]

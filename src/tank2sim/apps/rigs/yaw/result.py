@@ -32,7 +32,6 @@ from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
 from tank2sim.apps.rigs.yaw.study import YawMethodEstimate, YawStudy
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -183,11 +182,6 @@ class YawResult(Result[YawStudy]):
         if study.body_inertia_kgm2 is not None:
             body = f"; J_zz = {1e4 * study.body_inertia_kgm2:.5g}e-4 kg m2 ({study.body_inertia_source})"
         return f"{names}: in {study.medium}, k_t = {study.torque_constant_NmpA:.4g} N m/A{body}"
-
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """The notes."""
-        return self.study.notes
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -118,7 +118,7 @@ class YawEstimates:
     energy_residuals : tuple of EnergyResidual
     angle_residual : dict, optional
         ``t_s`` and ``residual_rad`` of the nonlinear least squares, where they converged.
-    notes : tuple of Notice
+    notices : tuple of Notice
     """
 
     records: tuple[str, ...]
@@ -135,7 +135,7 @@ class YawEstimates:
     energy_balance: EnergyBalance
     energy_residuals: tuple[EnergyResidual, ...]
     angle_residual: Columns | None
-    notes: tuple[Notice, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -179,7 +179,7 @@ def _estimates(identified: YawIdentification) -> dict[str, Any]:
         "energy_balance": energy_balance_means(identified.fit),
         "energy_residuals": _residuals(identified.fit),
         "angle_residual": _angle_residual(identified.angle),
-        "notes": identified.notes,
+        "notices": identified.notices,
     }
 
 

@@ -29,7 +29,7 @@ from tank2sim.identification.trials.methods.shooting import Shooting, cut, white
 from tank2sim.identification.trials.options import DRAWS_OF_CHAIN, Sampler
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.rows import Chain
 from tank2sim.simulation.scheme import runge_kutta_step
 
@@ -57,10 +57,6 @@ LEAST_CURVATURE = 0.1
 
 LEAST_LIKELY = 1e8
 """Sum of squares in place of one that is infinite, which ends a Hamiltonian trajectory (project choice)."""
-
-
-NOT_CONVERGED = "NOT CONVERGED"
-"""Mark of chains that disagree or are too short."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +116,7 @@ class PosteriorSamples:
         if self.converged:
             return [words]
         wanted = f"below {LARGEST_R_HAT} and {FEWEST_EFFECTIVE} or more are wanted: give more draws"
-        return [Notice(f"{NOT_CONVERGED}: {words}; {wanted}")]
+        return [caution(f"NOT CONVERGED: {words}; {wanted}")]
 
 
 def check_sampler(name: Sampler) -> None:
