@@ -37,7 +37,7 @@ def test_a_ship_without_a_steady_speed_gets_all_the_rest_and_a_note(tmp_path) ->
     assert "no steady-turning diagram: keeps no steady speed" in " ".join(result.stdout.split())
     found = json.loads((tmp_path / "s.json").read_text())
     assert found["steady_turning"] is None and found["characteristic"] is None and found["nomoto"]
-    assert any("steady speed" in notice for notice in found["notices"])
+    assert any("steady speed" in notice["text"] for notice in found["notices"])
 
 
 def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -> None:
@@ -61,5 +61,5 @@ def test_a_linear_card_has_no_curve_over_speed_and_weather_is_reported(tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "s.json").read_text())
     assert found["margins"]["speed"] is None and "Over the card" not in (tmp_path / "s.html").read_text()
-    reported = " ".join(found["notices"])
+    reported = " ".join(notice["text"] for notice in found["notices"])
     assert "do not change with speed" in reported and "in the card's current" in reported

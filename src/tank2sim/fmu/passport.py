@@ -13,7 +13,6 @@ from typing import Any
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.fmu.provenance import ABSENT, STATED_ERROR, Documents, ValueOrigin
 from tank2sim.fmu.reference_run import EXTRA
-from tank2sim.notices import Notice
 from tank2sim.simulation.run import Run
 
 PASSPORT_FILE = f"{EXTRA}/passport.json"
@@ -76,7 +75,7 @@ class Passport:
     validity: str
     speed_range_mps: tuple[float, float] | None
     coefficients: tuple[PassportCoefficient, ...]
-    notices: tuple[Notice, ...]
+    notices: tuple[str, ...]
     figures: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     card_range: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     replay: Replay = field(default_factory=Replay)
@@ -103,7 +102,7 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
             for variable in variables
             if not variable.name.startswith(_NOT_OF_THE_SHIP)
         ),
-        notices=model.notices,
+        notices=tuple(notice.line for notice in model.notices),
         figures={name: run.figures for name, run in manoeuvres.items()},
         card_range={
             name: run.reading.as_json() | {"message": "; ".join(run.reading.notices)}
