@@ -108,7 +108,8 @@ def _bridges(
         light = as_vessel(ballast).manoeuvring()
         notices = _check_ballast(loaded, light)
         second = bridge_of(light, orders)
-    missing = () if loaded.propulsion else ("the card has no [propulsion]: stops and speeds by revolutions are blank",)
+    text = "the card has no [propulsion]: stops and speeds by revolutions are blank"
+    missing = () if loaded.propulsion else (Notice(text),)
     said = dict.fromkeys((*notices, *first.notices, *(second.notices if second else ()), *missing))
     study = replace(first.study, notices=tuple(said), ballast=second.study if second else None)
     return study, first, second

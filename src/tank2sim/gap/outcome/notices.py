@@ -86,8 +86,8 @@ def gap_notices(
             )
     notices += [
         Notice(
-            f"{name}: these trials cannot tell it from an error of {coefficient.name}, now {coefficient.moved:.2g} "
-            "standard errors off"
+            f"{name}: these trials cannot distinguish it from an error of {coefficient.name}, now "
+            f"{coefficient.moved:.2g} standard errors off"
         )
         for name, coefficient in effects_like(proof.coefficients, named).items()
     ]

@@ -92,7 +92,9 @@ LEAST_WEIGHT = 0.02
 WHOLE_RUN_MISFIT = 3.0
 """Largest error, over the noise of every signal, of a model that is fitted to whole runs, too (project choice)."""
 
-_NO_UNCERTAINTY = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
+_NO_UNCERTAINTY = Notice(
+    "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
+)
 
 METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error": ("output error", "kalman")}
 """Method that a choice takes, to its name in words and the other method."""
