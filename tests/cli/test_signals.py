@@ -12,7 +12,7 @@ from tank2sim.cli.derived import command_of
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
 
-COMMAND = command_of("signals", signals.verb)
+COMMAND = command_of(signals.verb)
 
 
 @pytest.fixture(scope="module")
