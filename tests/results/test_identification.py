@@ -26,6 +26,7 @@ from tank2sim.identification.trials.study import (
     card_replay,
     study_identification,
 )
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.results import identification as identification_module
 from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
@@ -64,7 +65,7 @@ def trials():
 def found(trials):
     """The identification, its result and its charts."""
     known = parse_card(text_of(OFF), "off.toml")
-    fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
+    fitted = Measured((trials["by_the_clock"],), "angle", (Notice("mended"),))
     held = Measured((trials["turn"],), "angle", ())
     result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error", members=20))
     found = IdentificationResult(study_identification(known, result, fitted, held), None, result)
