@@ -252,7 +252,7 @@ def main() -> int:
     study = study_tows(result, tows, towed_body(tows, result.mass_kg, {}))
     algorithm(tows, study)
     reanalysis(study)
-    for note in study.warnings:
+    for note in study.notices:
         print(f"note: {note}")
     return beside.end()
 

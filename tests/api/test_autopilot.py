@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
-from tank2sim.marks import CHECK
 from tests.cli.command_line import refused, tank2sim
 
 
@@ -96,8 +95,8 @@ def test_a_negative_seed_is_refused_on_the_command_line(tmp_path: Path) -> None:
 )
 def test_a_course_that_is_not_held_is_said_first(weather, word) -> None:
     result = t2s.load("mariner").autopilot(**weather)
-    marks = [mark for mark in result.marks if mark.startswith(CHECK)]
-    assert bool(marks) == bool(word)
+    cautions = result.cautions
+    assert bool(cautions) == bool(word)
     if word:
-        assert word in marks[0] and repr(result).startswith(marks[0])
+        assert word in cautions[0] and repr(result).startswith(cautions[0].line)
     assert ("deg/s on the move" in result.headline[3]) == ("wind_mps" not in weather or weather["wind_mps"] < 100)

@@ -216,7 +216,7 @@ def test_a_rudder_that_looks_like_radians_is_doubted_in_the_first_line(
 ) -> None:
     result = run()
     assert repr(result).startswith("CHECK: ") is doubted
-    assert any(text.startswith("CHECK: ") for text in result.to_dict()["notices"]) is doubted
+    assert any(notice["level"] == "caution" for notice in result.to_dict()["notices"]) is doubted
 
 
 def test_options_of_the_command_line_have_the_bounds_of_the_api() -> None:

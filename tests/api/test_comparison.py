@@ -42,7 +42,7 @@ def test_the_json_has_the_same_numbers(found):
     content = found.to_dict()
     assert content["schema"] == "tank2sim/compare/1" and content["kind"] == "compare"
     assert [row["name"] for row in content["coefficients"]] == list(found.coefficients["coefficient"])
-    assert content["notices"] == list(found.notices)
+    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
 
 
 @pytest.mark.slow

@@ -47,7 +47,7 @@ def test_the_json_has_the_same_numbers(found):
     content = found.to_dict()
     assert content["schema"] == "tank2sim/tow/1"
     assert content["methods"]["output_error"]["estimates"]["total_mass_kg"] == found.total_mass_kg
-    assert content["warnings"] == list(found.notices)
+    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
 
 
 def test_the_card_has_the_numbers_and_simulates(found, tmp_path):

@@ -44,7 +44,7 @@ def test_the_json_has_the_same_numbers(found):
     assert content["schema"] == "tank2sim/validate/1" and content["kind"] == "validate"
     assert [row["measured"] for row in content["figures"]] == list(found.figures["measured"])
     assert [row["trial"] for row in content["replays"]] == ["zigzag"]
-    assert content["notices"] == list(found.notices)
+    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
 
 
 @pytest.mark.slow

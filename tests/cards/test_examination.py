@@ -13,7 +13,6 @@ from tank2sim.cards import read_card
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
 
 FOOT = 0.3048
 RADIANS_PER_DEGREE = 0.017453292519943295
@@ -186,12 +185,10 @@ def test_what_no_body_can_have_is_refused_at_its_key(ship: str, key: str, value:
 
 
 @pytest.mark.parametrize(("ship", "changes", "word"), IMPLAUSIBLE.values(), ids=IMPLAUSIBLE)
-def test_what_no_known_ship_has_is_a_marked_notice_of_the_model(
-    ship: str, changes: dict[str, object], word: str
-) -> None:
+def test_what_no_known_ship_has_is_a_caution_of_the_model(ship: str, changes: dict[str, object], word: str) -> None:
     card = read_card(ship, changes)
     (doubt,) = doubts(card)
-    assert doubt.startswith(CHECK) and word in doubt
+    assert doubt.leads and word in doubt
     assert build(card).notices[0] == doubt
 
 
@@ -228,7 +225,7 @@ ASKED: dict[str, Callable[[t2s.Ship, Path], Any]] = {
 def test_every_answer_about_an_implausible_card_says_so_first_on_screen_and_page(command: str, tmp_path: Path) -> None:
     ship = t2s.load("mariner").replace({"model.rudder_sign": "starboard"})
     found = ASKED[command](ship, tmp_path)
-    (mark,) = [mark for mark in found.marks if "wrong way" in mark]
-    assert repr(found).startswith(mark)
-    assert mark in json.loads(found.to_json())["notices"]
-    assert CHECK in found.page()
+    (doubt,) = [caution for caution in found.cautions if "wrong way" in caution]
+    assert repr(found).startswith(doubt.line)
+    assert {"level": "caution", "text": doubt} in json.loads(found.to_json())["notices"]
+    assert "CHECK: " in found.page()

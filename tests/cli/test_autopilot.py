@@ -39,7 +39,7 @@ def test_the_json_has_gains_margins_and_the_closed_loop(result: Path) -> None:
     assert reported["closed_loop"]["largest_step_within_rate_limit_deg"] == pytest.approx(5.0 / 1.18, rel=0.01)
     assert set(reported["track"]) == {"line of sight", "with integral"}
     assert reported["weather"]["wind_from_deg"] == 45.0
-    assert any("3.9 m/s" in notice for notice in reported["notices"])
+    assert any("3.9 m/s" in notice["text"] for notice in reported["notices"])
 
 
 @pytest.mark.slow

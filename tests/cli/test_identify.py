@@ -185,7 +185,7 @@ def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None
     assert result.returncode == 0, result.stderr
     found = json.loads((folder / "z.json").read_text())
     assert "Xvv" not in found["derivatives"]
-    assert any("nothing of" in warning and "Xvv" in warning for warning in found["warnings"])
+    assert any("nothing of" in notice["text"] and "Xvv" in notice["text"] for notice in found["notices"])
     assert found["derivatives"]["Nd"]["value"] == pytest.approx(TRUTH["Nd"], rel=0.1)
     before, after = (read_card(str(folder / name)) for name in ("off.toml", "z.toml"))
     assert isinstance(before, ManoeuvringCard) and isinstance(after, ManoeuvringCard)
@@ -336,7 +336,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
     assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()
     forced = tank2sim(*asked, "--force", cwd=folder)
     assert forced.returncode == 0, forced.stderr
-    assert forced.stdout.startswith("FORCED")
+    assert forced.stdout.startswith("CHECK: FORCED")
     card = read_card(str(folder / "o.toml"))
     assert "FORCED" in card.text.splitlines()[0] and "FORCED" in card.ship.source
     assert json.loads((folder / "o.json").read_text())["forced"]
@@ -395,7 +395,7 @@ def test_samples_of_the_posterior_are_with_the_card_and_ensembles_take_them(fold
     found = json.loads((folder / "sampled.json").read_text(encoding="utf-8"))
     posterior = found["posterior"]
     assert posterior["draws"] == 240 and posterior["chains"] == 4
-    assert (result.stdout.startswith("NOT CONVERGED")) == (not posterior["converged"])
+    assert (result.stdout.startswith("CHECK: NOT CONVERGED")) == (not posterior["converged"])
     entries = found["derivatives"]
     assert set(posterior["parameters"]) == set(entries)
     for name, sampled in posterior["parameters"].items():

@@ -156,7 +156,7 @@ def test_a_log_without_a_rudder_gives_its_channels_and_says_so_first(folder) -> 
     table["battery_V"] = 12.6
     table.to_csv(folder / "voyage.csv", index=False)
     found = tank2sim("log", "voyage.csv", "-o", "voyage", cwd=folder)
-    assert found.returncode == 0 and found.stdout.splitlines()[0].startswith("UNCONFIRMED: no rudder")
+    assert found.returncode == 0 and found.stdout.splitlines()[0].startswith("CHECK: no rudder")
     assert [path.name for path in (folder / "voyage").iterdir()] == ["channels.toml"]
 
 
@@ -193,4 +193,4 @@ def test_clocks_of_two_logs_that_differ_are_marked(folder, ahead_s) -> None:
     assert found.kind == "fault" and found.evidence["shift_s"] == pytest.approx(ahead_s, abs=0.6)
     table = table.assign(utc=frame()["utc"])
     table.to_csv(folder / "second.csv", index=False)
-    assert not any("clock" in mark for mark in t2s.log([folder / "bridge.nmea", folder / "second.csv"]).marks)
+    assert not any("clock" in mark for mark in t2s.log([folder / "bridge.nmea", folder / "second.csv"]).cautions)

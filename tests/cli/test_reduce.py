@@ -39,7 +39,7 @@ def test_card_json_and_plots_are_written_and_agree(path, tmp_path):
     found = json.loads(result.read_text())
     assert {name: entry["value"] for name, entry in found["derivatives"].items()} == dict(read_card(card).derivatives)
     assert found["derivatives"]["Yv"]["standard_error"] > 0
-    assert found["warnings"]
+    assert found["notices"]
     pictures = {picture.name for picture in plots.iterdir()}
     assert {
         "static_drift_Y.png",

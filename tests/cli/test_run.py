@@ -11,7 +11,6 @@ import pytest
 from tank2sim.api.captive_run import reduce_runs
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.findings import drifting_zeros
-from tank2sim.marks import CHECK
 from tank2sim.records.campaigns import read_campaign
 from tests.cli.command_line import refused, tank2sim
 from tests.identification.captive.generator import Campaign, write
@@ -81,9 +80,9 @@ def test_a_mirror_image_is_marked_and_a_repeat_is_not(tmp_path):
     file, repeat = oscillation(tmp_path), oscillation(tmp_path, "repeat.csv")
     sides = np.array([1, -1, -1, 1, 1, -1, -1])  # t_s, psi, r, speed, X, Y, N
     image = disguised(file, "image.csv", lambda table: table * sides)
-    assert reduce_runs([file, repeat], type="pure_yaw").marks == ()
-    (mark,) = reduce_runs([file, tmp_path / image], type="pure_yaw").marks
-    assert mark.startswith(CHECK) and "image.csv" in mark and "mirror" in mark
+    assert reduce_runs([file, repeat], type="pure_yaw").cautions == ()
+    (mark,) = reduce_runs([file, tmp_path / image], type="pure_yaw").cautions
+    assert mark.leads and "image.csv" in mark and "mirror" in mark
 
 
 def test_a_run_of_a_campaign_is_given_once_however_it_was_changed(tmp_path):
@@ -114,7 +113,7 @@ def test_a_motion_that_no_carriage_makes_is_refused(tmp_path, columns, factor, p
         np.savetxt(tmp_path / name, rows, delimiter=",", header=",".join(table), comments="", fmt="%.9g")
         return tmp_path / name
 
-    assert not reduce_runs(write_run("right.csv", made), type="pure_sway").marks
+    assert not reduce_runs(write_run("right.csv", made), type="pure_sway").cautions
     with pytest.raises(InputError, match=rf"wrong\.csv.*{place}"):
         reduce_runs(write_run("wrong.csv", {**made, columns: factor * made[columns]}), type="pure_sway")
 

@@ -37,7 +37,7 @@ def test_a_ship_without_a_steady_speed_gets_all_the_rest_and_a_note(tmp_path) ->
     assert "no steady-turning diagram: keeps no steady speed" in " ".join(result.stdout.split())
     found = json.loads((tmp_path / "s.json").read_text())
     assert found["steady_turning"] is None and found["characteristic"] is None and found["nomoto"]
-    assert any("steady speed" in notice for notice in found["notices"])
+    assert any("steady speed" in notice["text"] for notice in found["notices"])
 
 
 def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -> None:
@@ -49,7 +49,7 @@ def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -
 def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) -> None:
     result = tank2sim("stability", "kvlcc2-captive", "--no-spirals", cwd=tmp_path)
     reported = " ".join(result.stdout.split())
-    assert re.search(r"advance; [^:]*: EXTRAPOLATED beyond what the card was measured in", reported)
+    assert re.search(r"advance; [^:]*: EXTRAPOLATED beyond the card", reported)
     assert "track reach: the card has no [propulsion]" in reported
 
 
@@ -61,5 +61,5 @@ def test_a_linear_card_has_no_curve_over_speed_and_weather_is_reported(tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "s.json").read_text())
     assert found["margins"]["speed"] is None and "Over the card" not in (tmp_path / "s.html").read_text()
-    reported = " ".join(found["notices"])
+    reported = " ".join(notice["text"] for notice in found["notices"])
     assert "do not change with speed" in reported and "in the card's current" in reported

@@ -19,7 +19,7 @@ def test_tow_by_tow_models_and_page(tmp_path) -> None:
     assert "M, B3, delay" in result.stdout and "2547 to 3399 kg" in result.stdout
     found = json.loads((tmp_path / "t.json").read_text())
     assert found["methods"]["output_error"]["estimates"]["start_delay_s"] == pytest.approx(2.13, abs=0.01)
-    assert len(found["models"]) == 8 and found["warnings"]
+    assert len(found["models"]) == 8 and found["notices"]
     page = (tmp_path / "t.html").read_text()
     assert "What these tows determine" in page and "Drag coefficient" in page
     assert "length_m = 3.8" in (tmp_path / "late.toml").read_text()

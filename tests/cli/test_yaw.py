@@ -87,7 +87,7 @@ def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
     assert found["body_inertia_standard_error_kgm2"] == pytest.approx(9.2e-4)  # the card's
     assert found["added_inertia_kgm2"]["energy_least_squares"] == pytest.approx(302.0e-4, rel=0.01)
     assert found["added_inertia_kgm2"]["two_intervals_reference"] < 275e-4  # biased, and reported
-    assert any("two-interval" in note for note in found["notes"])
+    assert any("two-interval" in notice["text"] for notice in found["notices"])
     refused(tank2sim("yaw", "rig.csv", "--simulate", "alyshev", cwd=folder), "rig.csv", "exists")
     refused(tank2sim("yaw", "a.csv", "b.csv", "--simulate", "alyshev", cwd=folder), "--simulate", "2 records")
     refused(tank2sim("yaw", "a.csv", "--simulate", "mariner", cwd=folder), "model.kind", "yaw rig")

@@ -19,7 +19,7 @@ from tank2sim.apps.design.planning import _assumptions
 from tank2sim.apps.design.tank_form import TankFile
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK, marked
+from tank2sim.notices import foremost
 from tank2sim.records.campaigns import read_campaign_form
 
 FIGURES = "steady_radius_m@20,K_prime"
@@ -178,14 +178,14 @@ def test_drawn_ships_count_as_much_as_the_one_of_the_card():
 
 
 @pytest.mark.slow
-def test_few_hours_are_compared_with_one_whole_usual_matrix_and_marked():
+def test_few_hours_are_compared_with_one_whole_usual_matrix_with_a_caution():
     few = plan(hours=1.0)
     once = plan(hours=None)  # the time of the usual matrix
     assert few.design.usual_hours == once.design.usual_hours
     assert few.figures["usual"].to_numpy() == pytest.approx(once.figures["usual"].to_numpy(), rel=1e-9)
     assert few.content()["usual_matrix"]["repeats"] == 1.0
     assert few.design.curve.usual_time_s == (3600 * few.design.usual_hours,)
-    assert any(text.startswith(CHECK) and "hours" in text for text in marked(few.notices))
+    assert any("hours" in text for text in foremost(few.notices))
     assert not any("too few" in text for text in once.notices)
 
 
@@ -195,21 +195,21 @@ def test_a_hardly_certain_figure_is_marked_with_the_gauge_at_fault():
     found = plan(tank=wide)
     shares = found.design.gauge_shares
     assert sum(share[0] for share in shares.values()) == pytest.approx(1.0) and shares["N"][0] > 0.5
-    checks = [text for text in marked(found.notices) if text.startswith(CHECK)]
+    checks = foremost(found.notices)
     assert any("steady_radius_m@20" in text and "gauge N" in text for text in checks)
     assert any("range of gauge N" in text for text in checks) and not any("gauge X" in text for text in checks)
     certain = plan(hours=None)
     assert certain.design.hours_used > 3 * found.design.hours_used
-    assert not any(text.startswith(CHECK) for text in certain.notices)
+    assert not any("range of gauge" in text or "of its value" in text for text in certain.notices)
 
 
 @pytest.mark.slow
-def test_what_is_assumed_is_marked_item_by_item():
+def test_what_is_assumed_is_a_caution_item_by_item():
     def texts(gauges, **more):
         tank = TankFile.model_validate({"gauges": gauges, **more})
         design = plan().design
         changed = replace(design, tank_runs=replace(design.tank_runs, tank=tank))
-        return " ".join(marked(_assumptions(changed, 0)))
+        return " ".join(foremost(_assumptions(changed, 0)))
 
     only_zero = texts({"zero_share": 0.0})
     assert "noise of X, Y, N" in only_zero and "gain" in only_zero and "zero" not in only_zero
@@ -221,11 +221,11 @@ def test_what_is_assumed_is_marked_item_by_item():
 
 
 @pytest.mark.slow
-def test_derivatives_without_a_stated_error_are_marked_where_ships_are_drawn():
+def test_derivatives_without_a_stated_error_are_a_caution_where_ships_are_drawn():
     card = plan().design.card
     bare = replace(card, uncertainty={})
     count = sum(1 for value in card.derivatives.values() if value)
-    assert f"{count} derivatives: 30 %" in " ".join(marked(_assumptions(replace(plan().design, card=bare), 2)))
+    assert f"{count} derivatives: 30 %" in " ".join(foremost(_assumptions(replace(plan().design, card=bare), 2)))
     assert not any("of the card" in text for text in _assumptions(replace(plan().design, card=bare), 0))
 
 

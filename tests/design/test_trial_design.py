@@ -73,7 +73,7 @@ def test_the_information_of_a_manoeuvre_is_that_of_the_differences_of_its_readin
 def test_a_ship_that_is_unstable_on_a_straight_course_is_marked():
     """The KVLCC2 is (C' < 0), the Mariner is not."""
     unstable = design_trial("kvlcc2-captive", figures="steady_radius_m@20", sensors=SENSORS)
-    assert any("LINEARISED" in notice for notice in unstable.marks) and unstable.design.unstable
+    assert any("LINEARISED" in notice for notice in unstable.cautions) and unstable.design.unstable
     assert not design_trial("mariner", figures="steady_radius_m@20", minutes=8.0, sensors=SENSORS).design.unstable
 
 

@@ -27,6 +27,7 @@ from tank2sim.fmu.interface import interface
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu, embedded_card
 from tank2sim.native.compiler import require_compiler
+from tank2sim.notices import Notice
 from tests.marks import first_fast
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -197,7 +198,7 @@ def test_any_name_gives_a_c_identifier(name: str) -> None:
 def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, models: dict[str, Model], tmp_path: Path) -> None:
     # All of them at once: an export of each would only take longer.
     everything = " | ".join(NASTY)
-    model = replace(models["body"], name=everything, description=everything, notices=(everything,))
+    model = replace(models["body"], name=everything, description=everything, notices=(Notice(everything),))
     exported = write_fmu(
         model,
         tmp_path / "x.fmu",

@@ -27,6 +27,7 @@ from tank2sim.fmu.passport import PASSPORT_PAGE, Replay
 from tank2sim.fmu.provenance import Documents, ValueOrigin
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu
+from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.run import Run
 from tests.fmu.descriptions import model_of, whole_description
@@ -226,7 +227,7 @@ TEXT = st.one_of(
 @given(text=TEXT)
 def test_no_name_breaks_the_description(fmi: int, text: str, models: dict[str, Model]) -> None:
     plain = description_text(models["gain"], fmi=fmi)
-    strange = replace(models["gain"], name=text, description=text, notices=(text,))
+    strange = replace(models["gain"], name=text, description=text, notices=(Notice(text),))
     root = etree.fromstring(description_text(strange, fmi=fmi).encode())
     whole = etree.fromstring(plain.encode())
     assert [one.tag for one in root.iter()] == [one.tag for one in whole.iter()]
@@ -238,13 +239,13 @@ def test_no_name_breaks_the_description(fmi: int, text: str, models: dict[str, M
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=TEXT)
 def test_no_name_breaks_the_passport(text: str, models: dict[str, Model]) -> None:
-    strange = replace(models["gain"], name=text, description=text, notices=(text,))
+    strange = replace(models["gain"], name=text, description=text, notices=(Notice(text),))
     zigzag = Run(mock.Mock(), {"overshoots_deg": [1.0]}, (text,), CardRangeReading({}, {"x": 0.0}, 0.0, text))
     documents = Documents(source=text, validity=text, origins={"command": ValueOrigin(text, text)})
     files = passport_files(strange, documents, {"zigzag": zigzag}, Replay(problem=text))
     tags = [one.tag for one in page_of(files).iter()]
     quiet = passport_files(
-        replace(strange, name="x", description="x", notices=("x",)),
+        replace(strange, name="x", description="x", notices=(Notice("x"),)),
         Documents(source="x", validity="x", origins={"command": ValueOrigin("x", "x")}),
         {"zigzag": zigzag},
         Replay(problem="x"),
@@ -266,7 +267,7 @@ def test_names_of_a_card_stay_out_of_the_c_sources_and_of_paths(
 ) -> None:
     mark = "Zorgon"
     strange = replace(
-        models["gain"], name=f"*/ ../{mark}\\ \x00 ]]> 船", description=f"{mark} */", notices=(f"{mark}*/",)
+        models["gain"], name=f"*/ ../{mark}\\ \x00 ]]> 船", description=f"{mark} */", notices=(Notice(f"{mark}*/"),)
     )
     write_fmu(
         strange, tmp_path / "x.fmu", fmi=fmi, documents=Documents(source=f"{mark} */ \x07", validity=f"{mark}\ud800")

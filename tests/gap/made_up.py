@@ -21,6 +21,7 @@ from tank2sim.gap.result import (
     Rival,
 )
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
+from tank2sim.notices import Notice
 
 NOISE = {"motion.x": 0.5, "motion.psi": np.deg2rad(0.2), "motion.r": np.deg2rad(0.05), "motion.u": 0.02}
 TIME = np.linspace(0.0, 99.0, 100)
@@ -108,7 +109,7 @@ def missing() -> Gap:
             why="A turn tells most.",
             expected={"turn:35": 40.0},
         ),
-        notices=("zigzag: y_m stood still for 1 s",),
+        notices=(Notice("zigzag: y_m stood still for 1 s"),),
     )
 
 

@@ -115,7 +115,7 @@ def test_what_straight_runs_do_not_show_is_said_and_a_manoeuvre_that_would_is_na
     verdicts = dict(zip(found.fit.problem.free, found.fit.verdicts, strict=True))
     for name in ("derivatives.Nr", "derivatives.Nrabsr", "derivatives.Yvabsv", "thrusters.port.astern"):
         assert verdicts[name] is CoefficientVerdict.PRIOR, name
-    assert found.marks and "astern" in found.marks[0]
+    assert found.cautions and "astern" in found.cautions[0]
     best = found.next_trials[0]
     assert {"Nr", "Nrabsr"} <= set(best.determines)
     assert max(best.t_s) < 300

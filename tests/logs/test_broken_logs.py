@@ -49,14 +49,14 @@ def signals_of(result: LogResult) -> set[str]:
 
 def test_a_good_log_has_no_mark(written) -> None:
     result = log(written(frame()))
-    assert result.marks == () and {"heading", "rudder_angle", "yaw_rate", "sog", "latitude"} <= set(used(result))
+    assert result.cautions == () and {"heading", "rudder_angle", "yaw_rate", "sog", "latitude"} <= set(used(result))
 
 
 def test_a_heading_that_is_off_by_90_deg_is_marked_and_left_out(written) -> None:
     table = frame()
     table["heading_deg"] = (table["heading_deg"] + 90) % 360
     result = log(written(table))
-    assert "off by 9" in result.marks[0] and result.marks[0].startswith("UNCONFIRMED")
+    assert "off by 9" in result.cautions[0] and result.cautions[0].startswith("UNCONFIRMED")
     assert "heading" not in used(result) and "psi_rad" not in signals_of(result)
     assert all(cut.text.startswith("# UNCONFIRMED") for cut in result.cuts)
 
@@ -65,14 +65,14 @@ def test_a_mirrored_heading_is_left_out(written) -> None:
     table = frame()
     table["heading_deg"] = -table["heading_deg"] % 360
     result = log(written(table))
-    assert result.marks and "heading" not in used(result)
+    assert result.cautions and "heading" not in used(result)
 
 
 def test_exchanged_latitude_and_longitude_are_marked_and_left_out(written) -> None:
     table = frame()
     table[["latitude", "longitude"]] = table[["longitude", "latitude"]].to_numpy()
     result = log(written(table))
-    assert result.marks and not {"latitude", "longitude"} & set(used(result)) and "x_m" not in signals_of(result)
+    assert result.cautions and not {"latitude", "longitude"} & set(used(result)) and "x_m" not in signals_of(result)
     assert "heading" in used(result)
 
 
@@ -80,14 +80,14 @@ def test_a_rate_of_turn_in_another_unit_than_it_states_is_left_out(written) -> N
     table = frame()
     table["rot_deg_min"] /= 60
     result = log(written(table))
-    assert any("deg/s" in mark for mark in result.marks) and "yaw_rate" not in used(result)
+    assert any("deg/s" in mark for mark in result.cautions) and "yaw_rate" not in used(result)
 
 
 def test_a_speed_in_another_unit_than_it_states_is_left_out(written) -> None:
     table = frame()
     table["sog_kn"] *= 1852 / 3600
     result = log(written(table))
-    assert any("m/s" in mark for mark in result.marks) and "sog" not in used(result)
+    assert any("m/s" in mark for mark in result.cautions) and "sog" not in used(result)
 
 
 def test_a_rudder_that_is_positive_to_port_is_turned(written) -> None:
@@ -104,7 +104,7 @@ def test_a_rudder_that_is_positive_to_port_is_turned(written) -> None:
 def test_a_name_with_a_sign_that_the_turn_contradicts_is_left_out(written) -> None:
     table = frame().rename(columns={"rudder_deg": "rudder (port +) [deg]"})
     result = log(written(table))
-    assert any("contradicts the sign" in mark for mark in result.marks) and "rudder_angle" not in used(result)
+    assert any("contradicts the sign" in mark for mark in result.cautions) and "rudder_angle" not in used(result)
 
 
 @pytest.mark.parametrize("back_s", [30.0, 3600.0])
@@ -114,7 +114,7 @@ def test_a_clock_set_back_is_marked_and_runs_on(written, back_s) -> None:
     moments[1000:] -= pd.Timedelta(seconds=back_s)
     table["utc"] = moments.dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
     result = log(written(table))
-    assert any("clock falls" in mark for mark in result.marks)
+    assert any("clock falls" in mark for mark in result.cautions)
     assert result.voyage.end_s - result.voyage.begin_s == pytest.approx(voyage().time[-1], abs=1.0)
     assert [stretch.kind.value for stretch in result.found if stretch.kind.excites] == ["zigzag", "turn"]
 
@@ -132,7 +132,7 @@ def test_a_receiver_whose_clock_is_set_back_is_marked(nmea) -> None:
         else:
             kept.append(line)
     result = log(nmea(kept))
-    assert any("clock falls by 59" in mark for mark in result.marks)
+    assert any("clock falls by 59" in mark for mark in result.cautions)
     assert result.voyage.end_s - result.voyage.begin_s == pytest.approx(made.time[-1], abs=2.0)
 
 
@@ -156,7 +156,7 @@ def test_two_receivers_are_two_and_the_result_is_marked(nmea) -> None:
             row = 2 * second
             lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row], talker="GL"))
     result = log(nmea(lines))
-    assert any("two receivers" in mark for mark in result.marks)
+    assert any("two receivers" in mark for mark in result.cautions)
     x = result.voyage.series["x"].values
     assert np.abs(np.diff(x)).max() < 20  # no leaps between the two, which are 56 m apart
 
@@ -172,7 +172,7 @@ def test_two_receivers_of_one_talker_are_marked(nmea) -> None:
             row = 2 * second
             lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row]))
     result = log(nmea(lines))
-    assert any("two instruments in one" in mark for mark in result.marks)
+    assert any("two instruments in one" in mark for mark in result.cautions)
 
 
 def test_a_pause_of_the_recorder_is_reported_and_nothing_is_bridged(written) -> None:
@@ -196,7 +196,7 @@ def test_repeated_rows_are_counted_and_left_out(written) -> None:
     table = frame()
     doubled = pd.concat([table.iloc[:500], table.iloc[480:]])
     result = log(written(doubled))
-    assert result.voyage.counts["voyage.csv"]["repeated_rows"] == 20 and result.marks == ()
+    assert result.voyage.counts["voyage.csv"]["repeated_rows"] == 20 and result.cautions == ()
 
 
 @pytest.mark.parametrize(
@@ -267,14 +267,14 @@ def test_an_exchanged_heading_and_course_are_left_out(written) -> None:
     table["cog_deg"] += np.random.default_rng(1).normal(0, 1.0, len(table))
     table[["heading_deg", "cog_deg"]] = table[["cog_deg", "heading_deg"]].to_numpy()
     result = log(written(table))
-    assert any("exchanged" in mark for mark in result.marks) and not {"heading", "cog"} & set(used(result))
+    assert any("exchanged" in mark for mark in result.cautions) and not {"heading", "cog"} & set(used(result))
 
 
 def test_a_longitude_with_the_wrong_sign_is_left_out(written) -> None:
     table = frame()
     table["longitude"] = -table["longitude"]
     result = log(written(table))
-    assert any("wrong sign of the second" in mark for mark in result.marks)
+    assert any("wrong sign of the second" in mark for mark in result.cautions)
     assert "longitude" not in used(result) and "heading" in used(result)
 
 
@@ -283,7 +283,7 @@ def test_an_exchanged_order_and_angle_of_the_rudder_are_left_out(written) -> Non
     table["rudder_order_deg"] = table["rudder_deg"]
     table["rudder_deg"] = np.degrees(voyage().rudder).round(0)
     result = log(written(table))
-    assert any("as an order does" in mark for mark in result.marks)
+    assert any("as an order does" in mark for mark in result.cautions)
     assert not {"rudder_angle", "rudder_order"} & set(used(result))
 
 

@@ -235,7 +235,7 @@ def test_a_local_time_of_unknown_zone_is_marked(tmp_path) -> None:
     table["local time"] = table["local time"].str.replace("T", " ").str.rstrip("Z")
     path = tmp_path / "local.csv"
     table.to_csv(path, index=False)
-    assert any("unknown zone" in mark for mark in log(path).marks)
+    assert any("unknown zone" in mark for mark in log(path).cautions)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
@@ -389,7 +389,7 @@ def test_a_telemetry_log_holds_what_was_written(tmp_path) -> None:
     result = log(path)
     order = result.voyage.series["rudder_order"]
     assert np.degrees(np.abs(order.values - np.interp(order.time_s - T0, made.time, made.rudder))).max() < 0.06
-    assert any("35 deg" in mark for mark in result.marks)  # the full rudder is not in the log
+    assert any("35 deg" in mark for mark in result.cautions)  # the full rudder is not in the log
 
 
 def test_streams_without_names_are_found_by_their_content(tmp_path) -> None:

@@ -123,7 +123,7 @@ def test_two_vessels_in_one_table_are_not_spread(tmp_path) -> None:
     other = table().assign(latitude=table()["latitude"] + 0.01)
     pd.concat([table(), other]).sort_values("utc", kind="stable").to_csv(tmp_path / "two.csv", index=False)
     result = log(tmp_path / "two.csv")
-    assert any("two instruments in one" in mark for mark in result.marks)
+    assert any("two instruments in one" in mark for mark in result.cautions)
 
 
 def test_a_clock_that_spans_years_is_refused(written) -> None:
@@ -214,14 +214,14 @@ def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(tmp_path, nam
     found = result.voyage.series[channel.quantity]
     made = np.interp(found.time_s - T0, voyage().time, voyage().rudder)
     assert np.degrees(np.abs(found.values - made)).max() < 1.1
-    assert any(f"{zero:g} on straight legs" in mark for mark in result.marks)
+    assert any(f"{zero:g} on straight legs" in mark for mark in result.cautions)
     assert [cut.stretch.kind.value for cut in result.cuts] == ["zigzag", "turn"]
 
 
 @first_fast("name", ["rudder_raw", "rudder_adc"])
 def test_counts_of_a_converter_have_a_zero_and_no_unit(tmp_path, name) -> None:
     result = steering(tmp_path, **{name: np.round(512 + (2 if name == "rudder_raw" else 8) * rudder())})
-    assert result.cuts == () and any(name in mark for mark in result.marks)
+    assert result.cuts == () and any(name in mark for mark in result.cautions)
 
 
 def test_a_small_helm_stays_and_a_larger_one_is_marked(tmp_path) -> None:
@@ -229,7 +229,7 @@ def test_a_small_helm_stays_and_a_larger_one_is_marked(tmp_path) -> None:
         result = steering(tmp_path, rudder_deg=rudder() + helm)
         series = result.voyage.series["rudder_angle"]
         assert np.degrees(series.values[0]) == pytest.approx(helm, abs=0.1)
-        assert any("straight legs" in mark for mark in result.marks) == marked
+        assert any("straight legs" in mark for mark in result.cautions) == marked
 
 
 def test_an_order_whose_zero_differs_from_that_of_the_angle_follows_the_angle(tmp_path) -> None:
@@ -268,7 +268,7 @@ def test_revolutions_astern_while_the_vessel_goes_ahead_are_not_used(tmp_path) -
     for sign in (1, -1):
         result = steering(tmp_path, rudder_deg=rudder(), shaft_rpm=sign * table()["shaft_rpm"])
         used = {channel.quantity for channel in result.voyage.channels.channels if channel.use}
-        assert ("rpm" in used) == (sign > 0) and any("shaft_rpm" in mark for mark in result.marks) == (sign < 0)
+        assert ("rpm" in used) == (sign > 0) and any("shaft_rpm" in mark for mark in result.cautions) == (sign < 0)
         assert [stretch.kind.value for stretch in result.found] == ["steady", "zigzag", "steady", "turn", "steady"]
 
 
@@ -279,4 +279,4 @@ def test_a_vessel_that_makes_way_with_its_engine_stopped_does_not_rest(tmp_path)
 
 def test_a_speed_that_stays_at_0_while_the_vessel_moves_is_not_used(tmp_path) -> None:
     result = steering(tmp_path, rudder_deg=rudder(), stw_kn=np.zeros(1800))
-    assert any("stw_kn" in mark for mark in result.marks) and "u_water" not in result.voyage.series
+    assert any("stw_kn" in mark for mark in result.cautions) and "u_water" not in result.voyage.series

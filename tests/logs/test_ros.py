@@ -102,13 +102,13 @@ def test_a_fix_without_a_fix_holds_no_position(tmp_path) -> None:
 def test_manoeuvres_of_a_bag_are_found(tmp_path) -> None:
     result = log(write_bag(tmp_path))
     assert [stretch.kind.value for stretch in result.found if stretch.kind.excites] == ["zigzag", "turn"]
-    assert result.marks == ()
+    assert result.cautions == ()
 
 
 def test_a_heading_against_rep_103_is_left_out(tmp_path) -> None:
     result = log(write_bag(tmp_path, heading_is_ned=True))
     used = {channel.quantity for channel in result.voyage.channels.channels if channel.use}
-    assert "heading" not in used and any("/imu.heading" in mark for mark in result.marks)
+    assert "heading" not in used and any("/imu.heading" in mark for mark in result.cautions)
 
 
 def test_stamps_of_an_unset_clock_are_not_taken(tmp_path) -> None:

@@ -19,6 +19,7 @@ from tank2sim.answer.charts.manoeuvre import (
 )
 from tank2sim.answer.charts.picture import SpiralData, chart_specification, spiral_chart
 from tank2sim.answer.parts import Verdict
+from tank2sim.notices import caution
 from tank2sim.results.manoeuvre import ManoeuvreResult
 from tank2sim.simulation.bands import Band
 
@@ -188,8 +189,8 @@ def test_a_figure_outside_the_range_of_the_card_has_no_claim_of_a_limit_met():
     assert figures["range of the card"].to_list()[0] == "outside"
 
 
-def test_the_mark_of_a_stop_beyond_the_card_is_on_its_page():
+def test_the_caution_of_a_stop_beyond_the_card_is_on_its_page():
     found = t2s.load("mariner-nominal").turn(35, duration_s=10)
-    mark = "EXTRAPOLATED beyond what the card was measured in"
-    page = ManoeuvreResult(replace(found.study, notices=(mark,))).page()
-    assert mark in page.partition("<main")[0]
+    beyond = caution("the stop leaves the card")
+    page = ManoeuvreResult(replace(found.study, notices=(beyond,))).page()
+    assert beyond.line in page.partition("<main")[0]

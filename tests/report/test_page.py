@@ -12,6 +12,7 @@ import pytest
 from tank2sim.answer.charts.picture import TrackData, track_chart
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
+from tank2sim.notices import caution
 from tests.report.example import example_page
 
 NASTY = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\" ' & <!-- {{ 7*7 }}"
@@ -59,8 +60,8 @@ def drawings(html):
     return json.loads(re.search(r'<script type="application/json" id="drawings">(.*?)</script>', html, re.DOTALL)[1])
 
 
-def test_notes_of_a_table_are_below_it_and_those_that_mark_the_page_at_its_top() -> None:
-    mark = "advance: EXTRAPOLATED beyond what the card was measured in"
+def test_notes_of_a_table_are_below_it_and_cautions_at_the_top_of_the_page() -> None:
+    mark = caution("beyond the card").of("advance")
     notes = ("advance: the larger side", mark)
     criteria = Table(caption="Criteria", columns=[Column(title="criterion")], rows=[["advance"]], notes=notes)
     found = render_page(Page(title="A ship", sections=[Section(heading="IMO", tables=[criteria])]))
@@ -229,8 +230,8 @@ def test_two_notices_are_seen_and_more_are_folded():
     assert "third" in reader.words("details") and "second" not in reader.words("details")
 
 
-def test_a_notice_that_marks_the_page_is_at_its_top_alone():
-    mark = "EXTRAPOLATED beyond what the card was measured in"
+def test_a_caution_is_at_the_top_of_the_page_alone():
+    mark = caution("beyond the card")
     reader = one_section(text="Text.", notes=[mark])
     assert mark in reader.words("header") and mark not in reader.words("main")
 

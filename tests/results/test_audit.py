@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.notices import Notice
 from tank2sim.records.audit.finding import ColumnFinding
 from tank2sim.records.audit.study import AuditedTrial, AuditStudy, ColumnNoise
 from tank2sim.results.audit import AuditResult
@@ -41,7 +42,7 @@ STUDY = AuditStudy(
             rows=4,
             columns=("psi [deg]", "u_mps"),
             noise={"u_mps": ColumnNoise(column="u_mps", sigma=0.02, stated=False)},
-            notices=("a column is left out",),
+            notices=(Notice("a column is left out"),),
             histories={
                 "t_s": np.arange(4.0),
                 "psi_deg": np.array([0.0, 0.05, 0.2, 0.45]),

@@ -11,6 +11,7 @@ from tank2sim.identification.craft.study import (
     CraftValidationStudy,
     ThrusterResponse,
 )
+from tank2sim.notices import Notice
 from tank2sim.results.craft_identification import CraftIdentificationResult
 from tank2sim.results.craft_validation import CraftValidationResult
 
@@ -51,7 +52,7 @@ IDENTIFIED = CraftIdentificationStudy(
     },
     held_out=("zigzag",),
     next_trials=(CandidateTrial("going astern", (0.0, 20.0), (-0.4, 0.4), (-0.4, 0.4), ("port.astern",)),),
-    notices=("a notice",),
+    notices=(Notice("a notice"),),
 )
 
 VALIDATED = CraftValidationStudy(

@@ -16,7 +16,7 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_L
 from tank2sim.results.gap import NO_TRIALS, GapResult, gap_result
 from tank2sim.results.gap_cause_charts import agreement_chart, rival_chart
 from tank2sim.results.gap_charts import gap_tracks, misfit_chart, shown_places
-from tank2sim.results.gap_text import probabilities_in_words, verdict_in_words, with_error
+from tank2sim.results.gap_text import found_in_words, probabilities_in_words, with_error
 from tests.gap import made_up
 from tests.marks import first_fast
 
@@ -30,7 +30,7 @@ def charts_of(gap):
 
 
 def words_of(gap):
-    return verdict_in_words(gap_study(gap))
+    return found_in_words(gap_study(gap))
 
 
 @pytest.fixture(scope="module")
@@ -318,9 +318,9 @@ def test_what_replaces_something_of_the_card_has_no_up_to() -> None:
 def test_a_name_that_leaves_much_of_the_gap_is_reported_with_caution() -> None:
     gap = made_up.missing()
     poor = replace(gap, passed=tuple(made_up.passed(one.name, 9.0, 5.0, held_out=one.held_out) for one in gap.passed))
-    words = words_of(poor)
+    words = [caution.line for caution in result_of(poor).cautions]
     # sqrt((5^2 - 1)/(9^2 - 1)) = 0.55; a black box of 3 is better
-    assert "Caution: named, but 55 % of the gap of the held-out trials remains" in words
-    assert "a linear black box with as many coefficients follows the held-out trials better" in words
+    assert words[0].startswith("CHECK: named, but 55 % of the gap of the held-out trials remains")
+    assert "a linear black box with as many coefficients follows the held-out trials better" in words[1]
     assert result_of(poor).key_figures[0].verdict is Verdict.CAUTION
-    assert "Caution" not in words_of(gap)
+    assert not result_of(gap).cautions

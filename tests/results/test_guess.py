@@ -6,6 +6,7 @@ import pytest
 
 from tank2sim.apps.guess.result import GuessResult
 from tank2sim.apps.guess.study import GuessedFigure, GuessedNumber, GuessStudy
+from tank2sim.notices import Notice
 from tank2sim.simulation.bands import Band
 
 STUDY = GuessStudy(
@@ -35,7 +36,7 @@ STUDY = GuessStudy(
         )
     },
     next_figures={"overshoot_1@zigzag10": 0.6},
-    notices=("a guess",),
+    notices=(Notice("a guess"),),
 )
 
 

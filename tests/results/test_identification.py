@@ -26,6 +26,7 @@ from tank2sim.identification.trials.study import (
     card_replay,
     study_identification,
 )
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.results import identification as identification_module
 from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
@@ -64,7 +65,7 @@ def trials():
 def found(trials):
     """The identification, its result and its charts."""
     known = parse_card(text_of(OFF), "off.toml")
-    fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
+    fitted = Measured((trials["by_the_clock"],), "angle", (Notice("mended"),))
     held = Measured((trials["turn"],), "angle", ())
     result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error", members=20))
     found = IdentificationResult(study_identification(known, result, fitted, held), None, result)
@@ -240,7 +241,7 @@ def test_the_key_figures_tell_the_errors_of_the_trials_held_out(found) -> None:
     assert f"{100 * before.relative('motion.r'):.3g} %" in error.note and error.verdict is Verdict.NONE
     assert "Advance error, held out" in figures
     assert list(charts)[:2] == ["tracks_held_out", "histories_held_out"] and "singular_values" in charts
-    assert "mended" in shown.notices and shown.study.warnings[-1] in shown.notices
+    assert "mended" in shown.notices and shown.notices == shown.study.notices
 
 
 def test_the_estimates_are_a_table_and_a_data_frame(found) -> None:
@@ -291,7 +292,7 @@ def test_a_forced_result_is_marked_on_its_page(trials, found) -> None:
     forced = replace(found[0], forced=("the rudder's moment differs",))
     held = Measured((trials["by_the_clock"],), "angle", ())
     made = IdentificationResult(study_identification(parse_card(text_of(OFF), "off.toml"), forced, held, none))
-    assert any("FORCED: the rudder's moment differs" in notice for notice in made.study.notices)
+    assert any("the rudder's moment differs" in caution for caution in made.cautions)
     assert "FORCED" in made.page()
 
 

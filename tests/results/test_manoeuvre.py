@@ -11,6 +11,7 @@ import pytest
 from tank2sim.analysis.ensemble.results import ManoeuvreBands
 from tank2sim.analysis.manoeuvre import ManoeuvreStudy
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.results.manoeuvre import ManoeuvreResult
 from tank2sim.simulation.bands import Band, BandOverTime, TrackBand
 from tests.report.drawn import panels, rows_of
@@ -38,7 +39,7 @@ STUDY = ManoeuvreStudy(
     left_card_range_by="",
     outside_card_range=(),
     histories=HISTORIES,
-    notices=("of the run",),
+    notices=(Notice("of the run"),),
 )
 SPEED = BandOverTime(7.0 - 0.1 * TIMES - 0.1, 7.0 - 0.1 * TIMES, 7.0 - 0.1 * TIMES + 0.1)
 ENSEMBLE = ManoeuvreBands(
@@ -46,7 +47,7 @@ ENSEMBLE = ManoeuvreBands(
     seed=0,
     usable=5,
     unusable={},
-    notices=("of the members",),
+    notices=(Notice("of the members"),),
     figures={"advance_m": Band(500.0, 570.0, 600.0, 30.0, 5)},
     t_s=TIMES,
     histories={"u_mps": SPEED, "x_m": SPEED, "y_m": SPEED},

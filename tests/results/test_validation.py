@@ -12,6 +12,7 @@ from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
+from tank2sim.notices import Notice
 from tank2sim.results.validation import CardValue, TrialReplay, ValidationResult, ValidationStudy
 from tests.report.browser import measured_in_browser
 from tests.report.drawn import panels
@@ -49,7 +50,7 @@ def validation(figures: tuple[Validated, ...] = FIGURES, **changes: object) -> V
                 simulated={**HISTORIES, "u_mps": np.array([7.0, 6.95, 6.9, 6.85])},
             ),
         ),
-        notices=("a notice",),
+        notices=(Notice("a notice"),),
     )
     return ValidationResult(replace(study, **changes))
 

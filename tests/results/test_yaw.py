@@ -68,7 +68,7 @@ def test_tables_hold_the_estimates_and_the_friction(found, result):
     assert [row[:2] for row in friction.rows] == [["coulomb", "N m"], ["viscous", "N m s"], ["quadratic", "N m s²"]]
     assert friction.heads[2:5] == ("energy least squares", "as many equations", "output error")
     assert float(friction.rows[1][2].split(" ± ")[0]) == pytest.approx(1e4 * best.friction["viscous"][0], rel=1e-3)
-    assert result.notices == found.notes
+    assert result.notices == found.notices
     assert result.key_figures[0].value == pytest.approx(300, rel=0.01)
 
 

@@ -11,7 +11,7 @@ from tank2sim.analysis.ensemble.results import ManoeuvreBands
 from tank2sim.analysis.stability.imo import limits_of
 from tank2sim.arrays import Columns
 from tank2sim.dynamics.model import Model
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run
@@ -52,7 +52,7 @@ class ManoeuvreStudy:
         Names of the figures outside the card's range; entries of lists as ``overshoot_1_deg``.
     histories : dict
         Columns of a trial file, thinned for charts.
-    notices : tuple of str
+    notices : tuple of Notice
     other_side : OtherSide, optional
         Of a pull-out.
     ensemble : ManoeuvreBands, optional
@@ -68,7 +68,7 @@ class ManoeuvreStudy:
     left_card_range_by: str
     outside_card_range: tuple[str, ...]
     histories: Columns
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     other_side: OtherSide | None = None
     ensemble: ManoeuvreBands | None = None
 
@@ -120,7 +120,7 @@ def study_manoeuvre(
     )
 
 
-def _doubt_of_radians(run: Run) -> list[str]:
+def _doubt_of_radians(run: Run) -> list[Notice]:
     """A notice if all orders of the rudder are so small in deg that they are angles of manoeuvres in rad."""
     model = run.trajectory.model
     if "rudder.command" not in model.input_names:
@@ -131,4 +131,4 @@ def _doubt_of_radians(run: Run) -> list[str]:
     if not _LEAST_DEG <= math.degrees(largest) <= most + 1e-6:
         return []
     rudder = f"the largest rudder angle is {largest:.3g} deg"
-    return [f"{CHECK} {rudder}; if it was meant in rad, give {math.degrees(largest):.3g}: angles are in deg"]
+    return [caution(f"{rudder}; if it was meant in rad, give {math.degrees(largest):.3g}: angles are in deg")]

@@ -22,8 +22,8 @@ from tank2sim.answer.charts.theme import DARK, LIGHT, LOCALE
 from tank2sim.answer.numbers import NO_VALUE, format_column, format_number, is_number_text
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict
 from tank2sim.escaping import json_in_html
-from tank2sim.marks import marked
 from tank2sim.native.library import kept
+from tank2sim.notices import foremost
 from tank2sim.version import __version__
 
 _SHORT = 24
@@ -53,8 +53,8 @@ class Page:
 def render_page(page: Page) -> str:
     """The page as one HTML file, about 1 MB and its data. It opens without a network and can be printed."""
     counter = _Counter()
-    marks = marked(_messages(page))
-    sections = [_section(section, counter, marks) for section in page.sections]
+    cautions = foremost(_messages(page))
+    sections = [_section(section, counter) for section in page.sections]
     sections = [section for section in sections if _has_content(section)]
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
@@ -64,7 +64,7 @@ def render_page(page: Page) -> str:
     environment.filters["paragraphs"] = _paragraphs
     return environment.get_template("page.html.j2").render(
         page=page,
-        marks=marks,
+        cautions=[notice.line for notice in cautions],
         notes_shown=_NOTES_SHOWN,
         cards_across=_cards_across(len(page.figures)),
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
@@ -82,13 +82,13 @@ def _has_content(section: dict[str, Any]) -> bool:
     return bool(section["notes"] or section["tables"] or section["charts"] or section["content"].text)
 
 
-def _messages(page: Page) -> Iterable[str]:
-    """The notes of all sections and tables, and the cells of tables that are text."""
+def _messages(page: Page) -> Iterable[object]:
+    """The notes of all sections and tables, and the cells of tables."""
     for section in page.sections:
         yield from section.notes
         for table in section.tables:
             yield from table.notes
-            yield from (cell for row in table.rows for cell in row if isinstance(cell, str))
+            yield from (cell for row in table.rows for cell in row)
 
 
 def _cards_across(count: int) -> int:
@@ -111,17 +111,21 @@ class _Counter:
         return self.tables
 
 
-def _section(section: Section, counter: _Counter, marks: Sequence[str]) -> dict[str, Any]:
-    """The parts of a section; notices that mark the whole page are at its top, and not repeated."""
+def _section(section: Section, counter: _Counter) -> dict[str, Any]:
+    """The parts of a section; cautions are at the top of the page, and not repeated."""
     return {
         "content": section,
-        "notes": [note for note in section.notes if note not in marks],
-        "tables": [_table(table, counter.next_table(), marks) for table in section.tables],
+        "notes": _without_cautions(section.notes),
+        "tables": [_table(table, counter.next_table()) for table in section.tables],
         "charts": [_chart(illustration, counter.next_chart()) for illustration in section.charts],
     }
 
 
-def _table(table: Table, number: int, marks: Sequence[str]) -> dict[str, Any]:
+def _without_cautions(notes: Sequence[str]) -> list[str]:
+    return [note for note in notes if not foremost([note])]
+
+
+def _table(table: Table, number: int) -> dict[str, Any]:
     columns = [_column(column, [row[place] for row in table.rows]) for place, column in enumerate(table.columns)]
     return {
         "number": number,
@@ -129,7 +133,7 @@ def _table(table: Table, number: int, marks: Sequence[str]) -> dict[str, Any]:
         "folded": len(table.rows) > _LONG if table.folded is None else table.folded,
         "columns": columns,
         "rows": [[column["cells"][place] for column in columns] for place in range(len(table.rows))],
-        "notes": [note for note in table.notes if note not in marks],
+        "notes": _without_cautions(table.notes),
     }
 
 

@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from tank2sim.answer.numbers import format_number, is_number_text, without_exponents
+from tank2sim.notices import Notice
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -339,6 +340,7 @@ class Section:
     folded: bool = False
 
 
-def notices_section(notices: Sequence[str]) -> list[Section]:
+def notices_section(notices: Sequence[Notice]) -> list[Section]:
     """Return the section with the notices of a result, empty without any."""
-    return [Section(heading="Notices", notes=[without_exponents(text) for text in notices])] if notices else []
+    notes = [Notice(without_exponents(notice), notice.level) for notice in notices]
+    return [Section(heading="Notices", notes=notes)] if notes else []

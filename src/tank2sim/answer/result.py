@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 
 from tank2sim.answer.parts import KeyFigure, Section, Table, notices_section
 from tank2sim.files import json_text, schema_name, write_together
-from tank2sim.marks import marked
+from tank2sim.notices import Level, Notice, foremost
 
 if TYPE_CHECKING:
     import altair as alt
@@ -52,10 +52,9 @@ class Result(ABC, Generic[_S]):
         """One or a few sentences with the main findings."""
 
     @property
-    def notices(self) -> tuple[str, ...]:
-        """Limits of the result, one sentence each."""
-        notices: tuple[str, ...] = getattr(self.study, "notices", ())
-        return tuple(notices)
+    def notices(self) -> tuple[Notice, ...]:
+        """Limits of the result, one sentence each, with their levels."""
+        return tuple(getattr(self.study, "notices", ()))
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -208,9 +207,18 @@ class Result(ABC, Generic[_S]):
         write_together({Path(path): self.page()})
 
     @property
-    def marks(self) -> tuple[str, ...]:
-        """Notices that mark the result as one that its data do not carry."""
-        return tuple(marked(self.notices))
+    def cautions(self) -> tuple[Notice, ...]:
+        """Notices that are shown before the result: why it failed, and doubts about it."""
+        return tuple(foremost(self.notices))
+
+    @property
+    def exit_code(self) -> int:
+        """Code with which the command ends: 2 if a part has no answer, 1 if a notice says that it failed, else 0."""
+        return 2 if self.faults else int(any(notice.level is Level.STOP for notice in self.notices))
+
+    @property
+    def _first_lines(self) -> tuple[str, ...]:
+        return (*(notice.line for notice in self.cautions), *self.headline)
 
     @property
     def screen_tables(self) -> tuple[Table, ...]:
@@ -218,10 +226,10 @@ class Result(ABC, Generic[_S]):
         return tuple(table for table in self.tables if table.on_screen)
 
     def __repr__(self) -> str:
-        return "\n".join([*self.marks, *self.headline, *(table.text for table in self.screen_tables[:1])])
+        return "\n".join([*self._first_lines, *(table.text for table in self.screen_tables[:1])])
 
     def _repr_html_(self) -> str:
-        parts = [f"<p>{html.escape(line)}</p>" for line in (*self.marks, *self.headline)]
+        parts = [f"<p>{html.escape(line)}</p>" for line in self._first_lines]
         if self.charts():
             picture = base64.b64encode(self.picture()).decode("ascii")
             parts.append(f'<img alt="{html.escape(" ".join(self.headline))}" src="data:image/png;base64,{picture}">')

@@ -12,6 +12,7 @@ from tank2sim.api.verbs import Output, Progress, verb
 from tank2sim.arguments import ArgumentBounds, NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import FMU
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -167,7 +168,7 @@ def _pilot_craft(
     return CraftAutopilotResult(replace(study, notices=_no_compiler()), piloted)
 
 
-def _no_compiler() -> tuple[str, ...]:
+def _no_compiler() -> tuple[Notice, ...]:
     from tank2sim.native.compiler import find_compiler
     from tank2sim.simulation.integrator import NO_COMPILER
 

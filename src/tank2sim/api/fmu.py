@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tank2sim.api.verbs import Progress, Written, verb
 from tank2sim.errors import ArgumentError
 from tank2sim.files import FMU, SYSTEM
+from tank2sim.notices import Notice, foremost
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
@@ -95,7 +96,6 @@ def make_fmu_file(
 
 @verb(
     "an FMU validated, and compared with its reference",
-    exit_code=lambda result: 0 if result.passed else 1,
     name="check",
     results=("tank2sim.results.fmu:CheckResult",),
 )
@@ -123,7 +123,6 @@ def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> Check
     from tank2sim.dynamics.vessel import as_vessel
     from tank2sim.fmu.check import compare_with_model
     from tank2sim.fmu.unpacking import embedded_card
-    from tank2sim.marks import marked
     from tank2sim.results.fmu import CheckResult
 
     path = Path(fmu)
@@ -131,6 +130,7 @@ def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> Check
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else as_vessel(card).model
     report = compare_with_model(path, model=model and with_simulator_interface(model))
-    lacking = "the FMU carries no card: only its description was validated; give --card to compare"
-    doubts = marked(model.notices) if model else ()
-    return CheckResult(replace(report, notices=(*doubts, *(() if report.compared else (lacking,)))))
+    lacking = Notice("the FMU carries no card: only its description was validated; give a card to compare with")
+    doubts = foremost(model.notices) if model else ()
+    notices = (*report.notices, *doubts, *(() if report.compared else (lacking,)))
+    return CheckResult(replace(report, notices=notices))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from tank2sim.api.verbs import Progress, Written, verb
 from tank2sim.arguments import MOST_EFFECTS, Count, Effects, FalseDiscovery
 from tank2sim.bundled import bundled_cards
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,7 +94,7 @@ def find_gaps(
         workers=workers,
         report=report,
     )
-    return replace(found, remarks=(*found.remarks, f"{fleet} holds a card itself, and was taken for one ship"))
+    return replace(found, remarks=(*found.remarks, Notice(f"{fleet} holds a card itself, and was taken for one ship")))
 
 
 @verb(

@@ -29,6 +29,7 @@ from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import fitted_as
+from tank2sim.notices import Notice
 from tank2sim.results.gap import GapResult, gap_result
 from tank2sim.results.gap_fleet import FleetResult
 
@@ -96,7 +97,7 @@ def search_ship(
         return result.written_to(output)
 
 
-def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
+def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[Notice]:
     """A notice if the card was identified from some of the fitted trials.
 
     Parameters
@@ -109,8 +110,10 @@ def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[str]:
     if not names:
         return []
     return [
-        f"{card.source} was fitted to {', '.join(names)}: its coefficients may hold a part of the missing effect. "
-        "Give gap the card as it was before these trials, and identify on the improved card afterwards"
+        Notice(
+            f"{card.source} was fitted to {', '.join(names)}: its coefficients may hold a part of the missing effect. "
+            "Give gap the card as it was before these trials, and identify on the improved card afterwards"
+        )
     ]
 
 
@@ -161,13 +164,13 @@ class _Course:
         Name of a ship to the origin of its results.
     faults : dict
         Name of a ship to the reason why it has no results.
-    notices : list of str
+    notices : list of Notice
     """
 
     wanted: dict[ShipFolder, tuple[Mapping[str, object], str]] = field(default_factory=dict)
     done: dict[str, str] = field(default_factory=dict)
     faults: dict[str, str] = field(default_factory=dict)
-    notices: list[str] = field(default_factory=list)
+    notices: list[Notice] = field(default_factory=list)
 
 
 def search_fleet(request: FleetRequest, report: StageReport) -> FleetResult:
@@ -280,14 +283,14 @@ def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | N
     writable_folder(folder)
     tidied = put(files, folder, ship.folder.inputs)
     course.done[folder.name] = "computed" if why == NEW else f"computed: {why}"
-    course.notices += [f"{folder.name}: {notice}" for notice in (*notices, *tidied)]
+    course.notices += [notice.of(folder.name) for notice in (*notices, *tidied)]
     return None
 
 
 def _study(fleet: Fleet, course: _Course, output: Path) -> FleetStudy:
     ships = [ship_summary(name, _written(output / name)) for name in course.done]
     ships += [ShipSummary(folder=name, fault=fault) for name, fault in course.faults.items()]
-    notices = [f"{path}: holds neither card nor trial, and was passed over" for path in fleet.passed_over]
+    notices = [Notice(f"{path}: holds neither card nor trial, and was passed over") for path in fleet.passed_over]
     return fleet_study(fleet.folder.resolve().name, ships, notices)
 
 
@@ -300,11 +303,11 @@ def _written(folder: Path) -> GapStudy:
         raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None
 
 
-def _without_ship(study: FleetStudy, output: Path) -> list[str]:
+def _without_ship(study: FleetStudy, output: Path) -> list[Notice]:
     """Notices of results whose ships are no longer in the fleet."""
     ships = {ship.folder for ship in study.ships}
     return [
-        f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept"
+        Notice(f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept")
         for path in sorted(output.glob(f"*/{RUN}"))
         if path.parent.name not in ships
     ]

@@ -12,6 +12,7 @@ from tank2sim.api.verbs import Output, named_numbers, verb
 from tank2sim.arguments import PROCESSES, EnsembleSize, Seed, TuningRange
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     from tank2sim.analysis.ensemble.results import FigureBands
@@ -168,7 +169,7 @@ def tune_ship(
     after = dict(zip((figure.text for figure in study.figures), study.figures_at(tuned.values).tolist(), strict=True))
     changed, notices = derived_card(card, tuned_text(card, tuned), "the tuned card") if tuned.reached else (None, ())
     if found.errors.together:
-        notices = (_INDEPENDENT, *notices)
+        notices = (Notice(_INDEPENDENT), *notices)
     reported = replace(_reported(found, notices), tuned=tuned.reported(after), ensemble=_bands(ship, study, ensemble))
     return TuningResult(reported, ship, changed)
 
@@ -265,7 +266,7 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
     return [texts] if isinstance(texts, str) else list(texts)
 
 
-def _reported(found: CardInfluence, notices: Sequence[str] = ()) -> InfluenceStudy:
+def _reported(found: CardInfluence, notices: Sequence[Notice] = ()) -> InfluenceStudy:
     """The study, with further notices."""
     from tank2sim.native.compiler import find_compiler
     from tank2sim.simulation.integrator import NO_COMPILER

@@ -121,5 +121,5 @@ def reduce(
     reduction = reduce_campaign(read, options)
     contents = card_contents(reduction, fill)
     fillings = fill_notices(contents, fill, ratio, read)
-    warnings = (*reduction_findings(reduction), *fillings, *heel_notices(reduction))
-    return ReductionResult(study_reduction(reduction, contents, warnings, ratio), reduction, contents)
+    notices = (*reduction_findings(reduction), *fillings, *heel_notices(reduction))
+    return ReductionResult(study_reduction(reduction, contents, notices, ratio), reduction, contents)

@@ -12,6 +12,7 @@ from tank2sim.api.commands import VERBS
 from tank2sim.arguments import checked
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import write_together
+from tank2sim.notices import Notice
 from tank2sim.records.csv_table import CsvTable, is_frame, table_of_frame, table_or_path
 from tank2sim.records.reading import READERS, looks_like_a_trial
 from tank2sim.records.reading import read_trial_file as read_record
@@ -54,7 +55,7 @@ class TrialRecord:
         return self.trial.path
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """What was done to the data on reading."""
         return self.trial.notices
 

@@ -23,7 +23,7 @@ from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.records.trials import Trial
 from tank2sim.results.validation import CardValue, SignalError, TrialReplay, ValidationStudy
@@ -49,7 +49,7 @@ def validate_ship(
     given = measured(records, card) if records else Measured((), "angle", ())
     found = validate_figures(card, given.trials, members, required_percent)
     if records and (evidence := evidence_of_other_ship(card, given)):
-        notice = f"{CHECK} these look like trials of another ship: {'; '.join(evidence)}"
+        notice = caution(f"these look like trials of another ship: {'; '.join(evidence)}")
         found = replace(found, notices=(notice, *found.notices))
     return _study(ship_of(card), given, found), card, tuple(trial.path for trial in given.trials)
 
@@ -77,15 +77,15 @@ def _study(ready: TrialShip, given: Measured, found: Validation) -> ValidationSt
     )
 
 
-def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[TrialReplay, ...], list[str]]:
+def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[TrialReplay, ...], list[Notice]]:
     """Replay each trial by itself, so that a trial that cannot be replayed spoils no other; and notices on these."""
     found: list[TrialReplay] = []
-    notices: list[str] = []
+    notices: list[Notice] = []
     for trial in given.trials:
         try:
             found += map(_replay, replay_by_card(card, Measured((trial,), given.driven_by, ())))
         except InputError as error:
-            notices.append(f"{trial.name}: not replayed: {error.problem}")
+            notices.append(Notice(f"{trial.name}: not replayed: {error.problem}"))
     return tuple(found), notices
 
 

@@ -97,8 +97,6 @@ class Verb:
         Name of the bundled ship that the command takes where no card is given; empty if one must be.
     page_required : bool
         Whether the page is the result itself, and must be written.
-    exit_code : callable
-        Of the result: the code with which the command ends.
     """
 
     function: Callable[..., Any]
@@ -113,7 +111,6 @@ class Verb:
     takes: Callable[[str], bool] | None = None
     default_ship: str = ""
     page_required: bool = False
-    exit_code: Callable[[Any], int] = lambda _: 0
 
 
 def named_numbers(argument: str, example: str) -> Callable[[Sequence[str]], dict[str, float]]:

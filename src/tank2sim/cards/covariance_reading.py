@@ -18,6 +18,7 @@ from tank2sim.cards.reading import parse_card
 from tank2sim.cards.scaling import LARGEST_PRIME
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK, named_in, parsed_json, read_text
+from tank2sim.notices import Notice
 
 _ROUNDING = 0.006
 """Share by which a standard error of the card, three figures, may differ from that of the covariance."""
@@ -202,7 +203,7 @@ def _at(content: Any, key: str) -> object:
     return content
 
 
-def derived_card(card: Card, text: str, source: str) -> tuple[Card, tuple[str, ...]]:
+def derived_card(card: Card, text: str, source: str) -> tuple[Card, tuple[Notice, ...]]:
     """The card of `text`, which was made of `card`, with what of the covariance of that still holds.
 
     Parameters
@@ -218,7 +219,7 @@ def derived_card(card: Card, text: str, source: str) -> tuple[Card, tuple[str, .
     -------
     card : Card
         Its ``files`` and ``save`` write the covariance, too.
-    notices : tuple of str
+    notices : tuple of Notice
         What of the covariance was lost.
 
     Raises
@@ -232,11 +233,11 @@ def derived_card(card: Card, text: str, source: str) -> tuple[Card, tuple[str, .
     kept = carried(card, text)
     if kept is None:
         return parse_card(not_referring(text), source), (
-            f"{source} has no covariance: all numbers of {card.source}'s changed",
+            Notice(f"{source} has no covariance: all numbers of {card.source}'s changed"),
         )
     found = replace(parse_card(text, source), covariance=kept)
     if len(kept.names) == len(known.names):
         return found, ()
     changed = ", ".join(name.removeprefix("derivatives.") for name in known.names if name not in kept.names)
     notice = f"the covariance of {source} is that of {len(kept.names)} numbers, moved by {HOLDS:g} standard error"
-    return found, (f"{notice} at most; errors of the others are independent now: {changed}",)
+    return found, (Notice(f"{notice} at most; errors of the others are independent now: {changed}"),)

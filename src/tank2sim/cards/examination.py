@@ -20,7 +20,7 @@ from tank2sim.cards.plausibility import (
     yaw_force,
 )
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 
 FULLEST_BLOCK = 1.15
 """Largest volume over L B d. Nothing is fuller than a box; the rest is for a length between perpendiculars that is
@@ -139,16 +139,16 @@ def refuse_impossible(card: Card) -> None:
             raise InputError(card.source, place, problem, f"give it in {unit} (_deg, _degps) or radians (_rad, _radps)")
 
 
-def doubts(card: Card) -> tuple[str, ...]:
-    """Sizes and signs of a card that no known ship has, as one notice with the mark CHECK; empty if there are none.
+def doubts(card: Card) -> tuple[Notice, ...]:
+    """Sizes and signs of a card that no known ship has, as one caution; empty if there are none.
 
     Examples
     --------
     >>> from tank2sim.cards import read_card
     >>> doubts(read_card("mariner"))
     ()
-    >>> doubts(read_card("mariner", {"model.rudder_sign": "starboard"}))[0][:57]
-    'CHECK: Mariner class: the rudder turns the ship the wrong'
+    >>> doubts(read_card("mariner", {"model.rudder_sign": "starboard"}))[0][:50]
+    'Mariner class: the rudder turns the ship the wrong'
     """
     if isinstance(card, ManoeuvringCard):
         facts = [*_of_ship(card), *(_of_mmg(card) if isinstance(card, MmgCard) else ())]
@@ -159,7 +159,7 @@ def doubts(card: Card) -> tuple[str, ...]:
     if not facts:
         return ()
     name = " ".join(card.ship.name.split())
-    return (f"{CHECK} {name}: {'; '.join(facts)}. Correct the card, or confirm that this ship is so.",)
+    return (caution(f"{name}: {'; '.join(facts)}. Correct the card, or confirm that this ship is so."),)
 
 
 def _refuse_body(card: ManoeuvringCard | CraftCard) -> None:

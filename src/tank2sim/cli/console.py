@@ -16,7 +16,7 @@ from tank2sim.answer.result import Result
 from tank2sim.errors import ArgumentError
 from tank2sim.escaping import file_name, one_line
 from tank2sim.files import PICTURE, STANDARD_OUTPUT, writable_folder, write_together
-from tank2sim.marks import marked
+from tank2sim.notices import Notice
 
 screen = Console(highlight=False)
 """Where summaries go."""
@@ -42,25 +42,16 @@ def show_table(shown: Table) -> None:
         screen.print(escape(one_line(note)), soft_wrap=True)
 
 
-def show_notices(notices: Iterable[str]) -> None:
+def show_notices(notices: Iterable[Notice]) -> None:
     """Print what the user should know, a line each."""
     for notice in notices:
         screen.print(f"[yellow]note:[/yellow] {escape(one_line(notice))}", soft_wrap=True)
 
 
-def show_marked(notices: Iterable[str]) -> list[str]:
-    """Print the notices that mark the result as one that its data do not carry; return the others, for its end."""
-    notices = list(notices)
-    first = marked(notices)
-    for notice in first:
-        screen.print(f"[bold red]{escape(one_line(notice))}[/bold red]", soft_wrap=True)
-    return [notice for notice in notices if notice not in first]
-
-
 def show_result(
     result: Result[Any], written: Iterable[Path] = (), *, quiet: bool = False, verbose: bool = False
 ) -> None:
-    """Print a result: its marks first, then the main findings, tables, files and notices.
+    """Print a result: cautions first, then the main findings, tables, files and notices.
 
     Parameters
     ----------
@@ -68,11 +59,12 @@ def show_result(
     written : paths
         Files that were written.
     quiet : bool
-        Only marks.
+        Only cautions.
     verbose : bool
         All tables, not only those for the screen.
     """
-    others = show_marked(result.notices)
+    for caution in result.cautions:
+        screen.print(f"[bold red]{escape(one_line(caution.line))}[/bold red]", soft_wrap=True)
     if quiet:
         return
     for line in result.headline:
@@ -81,7 +73,7 @@ def show_result(
         show_table(table)
     for path in written:
         screen.print(f"wrote {escape(one_line(str(path)))}", soft_wrap=True)
-    show_notices(others)
+    show_notices(notice for notice in result.notices if not notice.leads)
 
 
 def write_outputs(

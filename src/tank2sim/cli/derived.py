@@ -345,7 +345,8 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
     show_result(result, [*result.written, *written], quiet=values["quiet"], verbose=values["verbose"])
     for fault in result.faults:
         print(f"tank2sim: {one_line(fault)}", file=sys.stderr)
-    return 2 if result.faults else verb.exit_code(result)
+    code: int = result.exit_code
+    return code
 
 
 def _refuse_unplaced(outputs: Iterable[Path], made: Sequence[Path | None]) -> None:

@@ -23,7 +23,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import ArgumentError
-from tank2sim.marks import ASSUMED
+from tank2sim.notices import Notice, caution
 from tank2sim.units import from_si
 
 
@@ -272,25 +272,32 @@ class JointErrors:
     sampled: tuple[int, ...] = ()
 
     @property
-    def in_words(self) -> list[str]:
+    def in_words(self) -> list[Notice]:
         """Notices on the standard errors."""
         words = self._assumed_in_words()
-        return [self.together_in_words, *words] if self.together else words
+        return [Notice(self.together_in_words), *words] if self.together else words
 
-    def _assumed_in_words(self) -> list[str]:
+    @property
+    def assumed(self) -> bool:
+        """Whether every standard error is assumed, because the card states none."""
+        uncertain = [parameter for parameter in self.parameters if parameter.standard_error > 0]
+        return not self.together and bool(uncertain) and all(parameter.assumed for parameter in uncertain)
+
+    def _assumed_in_words(self) -> list[Notice]:
         """Notices on assumed standard errors of the parameters that are not in the covariance."""
         remaining = [parameter for parameter in self.parameters if parameter.key not in self.together]
         assumed = [unlisted.short for unlisted in remaining if unlisted.assumed and unlisted.standard_error > 0]
         exact = [unlisted.short for unlisted in remaining if unlisted.standard_error == 0]
         messages = []
         if assumed:
-            every = len(assumed) + len(exact) == len(self.parameters)
-            subject = "any number" if every else ", ".join(assumed)
-            mark = f"{ASSUMED}, not measured ones: " if every else ""
+            subject = "any number" if self.assumed else ", ".join(assumed)
             share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
-            messages.append(f"{mark}the card states no standard error of {subject}: {share}")
+            text = f"the card states no standard error of {subject}: {share}"
+            messages.append(caution(f"standard errors are ASSUMED: {text}") if self.assumed else Notice(text))
         if exact:
-            messages.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
+            messages.append(
+                Notice(f"taken as exact, because a card states no standard error of them: {', '.join(exact)}")
+            )
         return messages
 
     @property

@@ -21,6 +21,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.units import UNITS
 
 Kind = TypeVar("Kind", bound="Variable")
@@ -145,7 +146,7 @@ class Model:
         Names of the states and quantities that are outputs.
     step_s : float
         Step for fixed-step integration (classical Runge-Kutta) at which it is accurate, s.
-    notices : tuple of str
+    notices : tuple of Notice
         What a user of this model should know (assumptions taken, keys not used).
     source : str
         The file that it was built from, for messages; empty if it is of none.
@@ -165,7 +166,7 @@ class Model:
     quantities: tuple[Quantity, ...]
     outputs: tuple[str, ...]
     step_s: float
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -324,7 +325,7 @@ class Model:
         )
         return replace(self, quantities=quantities, states=states, parameters=parameters)
 
-    def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
+    def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[Notice] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""
 
         def of_kind(kind: type[Kind]) -> tuple[Kind, ...]:

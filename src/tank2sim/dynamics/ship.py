@@ -25,6 +25,7 @@ from tank2sim.dynamics.propulsion import propulsion, revolutions
 from tank2sim.dynamics.rigid_body import Inertia, inertia
 from tank2sim.dynamics.roll import roll_fault, roll_parameters, roll_terms, with_roll
 from tank2sim.dynamics.steering_gear import steering_gear
+from tank2sim.notices import Notice
 from tank2sim.units import rounded_down
 
 OPPOSED = tuple(name for name, _ in OPPOSITE.values())
@@ -97,21 +98,25 @@ def ship_model(card: ManoeuvringCard) -> Model:
     return with_roll(planar, hull, card) if card.roll else planar
 
 
-def _without_yaw(card: ManoeuvringCard) -> list[str]:
+def _without_yaw(card: ManoeuvringCard) -> list[Notice]:
     if card.model.valid_yaw_rate_prime > 0:
         return []
     return [
-        "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r, and with them course "
-        "stability and every turn, are estimates"
+        Notice(
+            "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r are estimates, "
+            "and so are course stability and every turn"
+        )
     ]
 
 
-def _one_sided(card: ManoeuvringCard) -> list[str]:
+def _one_sided(card: ManoeuvringCard) -> list[Notice]:
     if not isinstance(card, MmgCard) or card.rudder.gamma_R_plus == card.rudder.gamma_R_minus:
         return []
     return [
-        "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
-        "rudder) has gamma_R_minus"
+        Notice(
+            "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
+            "rudder) has gamma_R_minus"
+        )
     ]
 
 
@@ -124,7 +129,7 @@ def _description(card: ManoeuvringCard) -> str:
     return f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in {motions} with steering gear"
 
 
-def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
+def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[Notice]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
     mmg = card.model.kind == "mmg"
     every, equations = (MMG_TERMS, "the MMG hull") if mmg else (ALL_TERMS, "(3.8)")
@@ -145,7 +150,7 @@ def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
         return [*ALL_TERMS, *rolling], []
     names = [*roll_terms(card), *LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
     unused = [name for name in card.derivatives if name not in names]
-    return names, [f"the linear model leaves out {len(unused)} derivatives of the card"] if unused else []
+    return names, [Notice(f"the linear model leaves out {len(unused)} derivatives of the card")] if unused else []
 
 
 def _refuse_singular_mass(card: ManoeuvringCard) -> None:

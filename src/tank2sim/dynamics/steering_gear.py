@@ -6,12 +6,13 @@ import casadi as ca
 
 from tank2sim.cards.form import SteeringGear
 from tank2sim.dynamics.model import Input, Parameter, Quantity, State, Variable
+from tank2sim.notices import Notice
 
 UNSTATED_LAG = 0.01
 """Time constant where a card states none, in L/u0: small against every motion of the hull, large against the step."""
 
 
-def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[Variable, ...], list[str]]:
+def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[Variable, ...], list[Notice]]:
     """Variables of the gear, and what a user should know.
 
     d(delta)/dt = sat((sat(order) - delta)/T), 0 while the gear has failed.
@@ -29,7 +30,7 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         Inputs ``rudder.command`` (rad, + starboard) and ``steering.failed``, state ``rudder.angle``, quantities
         ``rudder.rate``, ``rudder.error`` (order less angle, which drives the rate) and ``rudder.effective`` (the angle
         that the hull forces see), parameters ``steering.*``.
-    notices : list of str
+    notices : list of Notice
     """
     gear = gear or SteeringGear()
     notices = [] if gear.time_constant_s else [assumed_lag_notice(ship_time_s)]
@@ -62,9 +63,9 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
     return (command, failed, rudder, error, rate, seen, lag, *limits, start), notices
 
 
-def assumed_lag_notice(ship_time_s: float) -> str:
+def assumed_lag_notice(ship_time_s: float) -> Notice:
     """What a user is reported where a card states no time constant; L/u0 in s."""
-    return (
+    return Notice(
         "the card states no time constant of the steering gear: "
         f"{UNSTATED_LAG * ship_time_s:.3g} s is taken ({UNSTATED_LAG} L/u0)"
     )

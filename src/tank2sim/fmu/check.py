@@ -7,7 +7,7 @@ import io
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -24,6 +24,7 @@ from tank2sim.fmu.process import Drive, drive_apart
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors, relative_errors
 from tank2sim.fmu.reference_run import read_reference
 from tank2sim.fmu.unpacking import FmuType, UnpackedFmu, unpack
+from tank2sim.notices import Level, Notice
 
 LIMITS: dict[FmuType, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
 """Largest error allowed. Co-Simulation is held against the same scheme, Model Exchange against the exact solution."""
@@ -54,8 +55,8 @@ class CheckReport:
         Output to the larger of its errors.
     reference_error : float, optional
         Largest error of an output when the FMU repeats the reference result that it carries, relative as above.
-    notices : tuple of str
-        Doubts about the card.
+    notices : tuple of Notice
+        Why it failed, and doubts about the card.
     compared : bool
         False if there was no model to compare with, and the file alone was validated.
     """
@@ -72,7 +73,27 @@ class CheckReport:
     duration_s: float = 0.0
     reference_error: float | None = None
     passed: bool = False
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
+
+    def judged(self) -> CheckReport:
+        """The report with its verdict, and with a notice for each kind of failure."""
+        beyond = {
+            name: None
+            for kind, found in self.errors.items()
+            for name, error in found.items()
+            if not error <= LIMITS[kind]  # an error that is not a number fails
+        }
+        failures = []
+        if self.validation:
+            failures.append(f"the description is not valid: {len(self.validation)} objections")
+        if self.differences:
+            failures.append(f"the FMU is not what its model says: {len(self.differences)} differences")
+        if beyond:
+            failures.append(f"errors beyond the limits: {', '.join(beyond)}")
+        if self.compared and not (self.errors or failures):
+            failures.append("no output was compared")
+        notices = tuple(Notice(f"{self.path}: {text}", Level.STOP) for text in failures)
+        return replace(self, passed=not failures, notices=(*notices, *self.notices))
 
 
 def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport:
@@ -99,8 +120,7 @@ def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport
         about["validation"] = validation
         if model is None:
             differences, about["reference_error"] = _repeat_reference(unpacked)
-            passed = not validation and not differences
-            return CheckReport(**about, compared=False, differences=tuple(differences), passed=passed)
+            return CheckReport(**about, compared=False, differences=tuple(differences)).judged()
         model = _without_hidden(unpacked, model)
         run = manoeuvre(model)
         differences, errors = _compare(unpacked, model, run)
@@ -117,8 +137,7 @@ def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport
             for name in dict.fromkeys(name for found in errors.values() for name in found)
         },
         duration_s=float(run.times[-1]),
-        passed=not validation and not differences and len(errors) > 0 and _within(errors),
-    )
+    ).judged()
 
 
 def _compare(
@@ -209,11 +228,6 @@ def _parameter_differences(found: Array, expected: dict[str, float]) -> list[str
         for name, value in zip(expected, found.tolist(), strict=True)
         if value != expected[name]
     ]
-
-
-def _within(errors: dict[FmuType, dict[str, float]]) -> bool:
-    # Written so that an error that is not a number fails.
-    return all(error <= LIMITS[kind] for kind, found in errors.items() for error in found.values())
 
 
 def description_differences(path: Path, text: bytes, model: Model, fmi: int) -> list[str]:

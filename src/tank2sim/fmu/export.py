@@ -199,7 +199,7 @@ def _values(model: Model, described: Interface, fmi: int, documents: Documents) 
             "date": _date(),
             "source": documents.source,
             "validity": documents.validity,
-            "notices": model.notices,
+            "notices": [notice.line for notice in model.notices],
         },
         "token": _NO_TOKEN,
         "fmi": fmi,

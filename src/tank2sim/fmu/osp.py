@@ -13,6 +13,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.escaping import is_file_name
 from tank2sim.fmu.interface import FmuVariable, Interface, interface
 from tank2sim.fmu.templates import c_identifier, render
+from tank2sim.notices import Notice
 
 
 @dataclass(frozen=True)
@@ -84,14 +85,16 @@ def osp_system(model: Model, file: str) -> dict[str, str]:
     }
 
 
-def osp_notices(model: Model) -> tuple[str, ...]:
+def osp_notices(model: Model) -> tuple[Notice, ...]:
     """What the user should know of the files of :func:`osp_system`."""
     name = _osp_name(model)
     if name == model.name:
         return ()
     return (
-        f"the ship's name is not a file name: the model description is called {name}_OspModelDescription.xml, and the "
-        "engine of OSP, which looks for the ship's name, does not find the groups of variables; rename the ship",
+        Notice(
+            f"the ship's name is not a file name: the model description is called {name}_OspModelDescription.xml, and "
+            "the engine of OSP, which looks for the ship's name, does not find the groups of variables; rename the ship"
+        ),
     )
 
 

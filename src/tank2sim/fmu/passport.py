@@ -102,9 +102,12 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
             for variable in variables
             if not variable.name.startswith(_NOT_OF_THE_SHIP)
         ),
-        notices=model.notices,
+        notices=tuple(notice.line for notice in model.notices),
         figures={name: run.figures for name, run in manoeuvres.items()},
-        card_range={name: run.reading.as_json() | {"message": run.reading.message} for name, run in manoeuvres.items()},
+        card_range={
+            name: run.reading.as_json() | {"message": "; ".join(run.reading.notices)}
+            for name, run in manoeuvres.items()
+        },
         replay=replay,
         rules=simulator_rules(
             model,

@@ -12,6 +12,7 @@ from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
+from tank2sim.notices import Notice
 
 MISSING = "missing effect"
 NO_EFFECT_MISSING = "no missing effect"
@@ -356,7 +357,7 @@ class Gap:
     agreement : mapping
         Effect parameter's model name to {trial: (value, standard error)}: its estimate by each trial alone.
     next_test : NextTest or None
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     card: ManoeuvringCard
@@ -380,7 +381,7 @@ class Gap:
     could_hide: Mapping[str, Mapping[str, float]]
     agreement: Mapping[str, Mapping[str, tuple[float, float]]]
     next_test: NextTest | None
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     def misfit(self, version: str, *, held_out: bool) -> float | None:
         """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any.

@@ -65,6 +65,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     lowered_bound_notice,
     polynomial_over_trials,
 )
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
@@ -179,7 +180,7 @@ def _without_heel(group: Measured) -> Measured:
         for trial in group.trials
     )
     notice = "heel is computed and not compared: only what it changes of the motion in the plane is seen"
-    return replace(group, trials=trials, notices=(*group.notices, notice))
+    return replace(group, trials=trials, notices=(*group.notices, Notice(notice)))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import read_bytes, read_text
+from tank2sim.notices import Notice
 from tank2sim.records.campaign_form import CampaignFile, SpeltColumn
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.spelt_units import unit_factor
@@ -50,7 +51,7 @@ class Condition:
 
 def read_averages(
     form: CampaignFile, spelt: Mapping[str, SpeltColumn], path: Path
-) -> tuple[list[Condition], list[str]]:
+) -> tuple[list[Condition], list[Notice]]:
     """Every distinct row of the table that ``[averages]`` names, and what should know of reading it.
 
     Only the columns that ``[averages.columns]`` names are read; others may hold text.
@@ -96,7 +97,9 @@ def read_averages(
         for row in distinct
     ]
     repeated = len(rows) - len(distinct)
-    text = f"{file.name}: {repeated} of {len(rows)} rows repeat another to the last digit; each is counted once."
+    text = Notice(
+        f"{file.name}: {repeated} of {len(rows)} rows repeat another to the last digit; each is counted once."
+    )
     return conditions, [text] if repeated else []
 
 

@@ -23,7 +23,7 @@ from tank2sim.cards.reading import parsed_toml
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import named_in, read_text
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.averages import Condition, read_averages
 from tank2sim.records.campaign_form import (
     OSCILLATING,
@@ -140,7 +140,7 @@ class Campaign:
         In the order of the file.
     faults : tuple of InputError
         Runs that could not be read and were left out, because that was asked for.
-    remarks : tuple of str
+    remarks : tuple of Notice
         What was done on reading and should know.
     """
 
@@ -152,7 +152,7 @@ class Campaign:
     full_scale: FullScaleSection | None
     runs: tuple[CaptiveRun, ...]
     faults: tuple[InputError, ...] = ()
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[Notice, ...] = field(default=())
 
     @property
     def inertia_removed(self) -> bool:
@@ -189,7 +189,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     form, spelt = read_campaign_file(path)
     runs: list[CaptiveRun] = []
     faults: list[InputError] = []
-    remarks: list[str] = []
+    remarks: list[Notice] = []
     if (form.averages is None) == (not form.runs):
         problem = "has both [averages] and [[runs]]" if form.runs else "has no run"
         raise InputError(path, "", problem, "give [[runs]] with a file each, or one table in [averages]")
@@ -226,14 +226,14 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     )
 
 
-def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[str]]:
+def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[Notice]]:
     """Runs whose forces are those of a run before, as :func:`tank2sim.records.same_record.likeness` finds: name to
     fault; and remarks on mirror images.
 
     Noise never repeats itself; records without noise, of a computed campaign or a dead gauge, are not evidence.
     """
     faults: dict[str, InputError] = {}
-    remarks = []
+    remarks: list[Notice] = []
     seen: list[tuple[CaptiveRun, Recording]] = []
     for run in runs:
         record = Recording(run.time_s, {column: run.force(force) for force, column in _FORCE_COLUMNS.items()})
@@ -247,7 +247,7 @@ def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list
                 faults.setdefault(run.name, InputError(run.name, "", problem, remedy))
             elif alike is Likeness.MIRROR and has_noise(record):
                 remarks.append(
-                    f"{CHECK} {run.name} is the mirror image of {other.name}, noise included: not a second run."
+                    caution(f"{run.name} is the mirror image of {other.name}, noise included: not a second run.")
                 )
         seen.append((run, record))
     return faults, remarks

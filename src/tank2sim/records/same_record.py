@@ -16,7 +16,7 @@ from scipy.signal import correlate
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.audit.noise import resolution, rounding, white_noise
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial
 
@@ -127,7 +127,7 @@ class Likeness(StrEnum):
     TWICE = "recorded twice"
 
 
-def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None) -> tuple[str, ...]:
+def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None) -> tuple[Notice, ...]:
     """Refuse trials that are one record: among themselves, or fitted and held out if others are given.
 
     Returns
@@ -156,7 +156,7 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
             raise InputError(trial.path, "", problem, "hold out what is not fitted")
         if alike is not None:
             proves = "as a hold-out it proves nothing" if others is not None else "it is not a second run"
-            notices.append(f"{CHECK} {trial.path.name} {_SAID[alike].format(before.path.name)}: {proves}.")
+            notices.append(caution(f"{trial.path.name} {_SAID[alike].format(before.path.name)}: {proves}."))
     return tuple(notices)
 
 

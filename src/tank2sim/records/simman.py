@@ -14,6 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.number_rows import NumberRows, number_rows, read_bytes_as_text
 from tank2sim.records.trials import TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
@@ -78,7 +79,11 @@ def read_simman(path: Path | str) -> Trial:
     signals: dict[str, Array] = {name: column for name, column in named.items() if name in TRIAL_SIGNALS}
     signals["psi_rad"] = unwrapped(signals["psi_rad"])
     signals["delta_rad"] = 0.0 - signals["delta_rad"]
-    notices = [laboratory.omission, laboratory.values, "the rudder is positive to port in the file, to starboard here"]
+    notices = [
+        Notice(laboratory.omission),
+        Notice(laboratory.values),
+        Notice("the rudder is positive to port in the file, to starboard here"),
+    ]
     time = named["t_s"]
     if np.any(np.diff(time) <= 0):
         time, notice = _uniform_time(path, rows)
@@ -123,7 +128,7 @@ def _begins_rows(cells: list[str]) -> bool:
         return False
 
 
-def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
+def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, Notice]:
     """Times of equal step that agree with every time printed, and messages about them.
 
     A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
@@ -144,7 +149,7 @@ def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
         "times are printed with so few digits that some repeat: replaced by a uniform step of "
         f"{step:.6g} s, which agrees with all of them"
     )
-    return time, text
+    return time, Notice(text)
 
 
 def _half_a_digit(cell: str) -> float:

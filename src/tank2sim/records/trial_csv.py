@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, TrialReader, unwrapped
@@ -47,12 +48,12 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     notices = []
     if omitted:
         text = ", ".join(table.heading(name) for name in omitted)
-        notices.append(f"columns that are not part of the trial format are left out: {text}")
+        notices.append(Notice(f"columns that are not part of the trial format are left out: {text}"))
     if "psi_rad" in signals:
         signals["psi_rad"] = unwrapped(signals["psi_rad"])
     if _rudder_sign(table) == "port":
         signals |= {name: 0.0 - signals[name] for name in RUDDERS if name in signals}
-        notices.append("the rudder is positive to port in the file, and to starboard here")
+        notices.append(Notice("the rudder is positive to port in the file, and to starboard here"))
     scale = table.comment_number("scale")
     if scale is not None and scale <= 0:
         raise InputError(table.path, "comment scale", f"is {scale:g}", "a positive number was expected")

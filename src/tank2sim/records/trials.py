@@ -11,6 +11,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 
 RUDDERS = ("delta_rad", "delta_order_rad")
 """Angle and order of the rudder: a trial has one of them or both."""
@@ -46,7 +47,7 @@ class Trial:
         Length of the ship over that of the model of this trial, where the file or its format states it.
     length_m : float or None
         Length between perpendiculars of what the values belong to, ship or model, where the format states it.
-    notices : tuple of str
+    notices : tuple of Notice
         What was done to the data on reading.
     columns : mapping
         Signal to what its column is called in the file, where that differs.
@@ -59,7 +60,7 @@ class Trial:
     signals: Mapping[str, Array]
     noise: Mapping[str, float] = field(default_factory=dict)
     scale: float | None = None
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     columns: Mapping[str, str] = field(default_factory=dict)
     length_m: float | None = None
     origin_deg: tuple[float, float] | None = None
@@ -159,7 +160,7 @@ def with_signals(trial: Trial, changes: Mapping[str, Array | None], notice: str)
     gone = {name for name, values in changes.items() if values is None}
     signals = {name: values for name, values in {**trial.signals, **changes}.items() if values is not None}
     noise = {name: value for name, value in trial.noise.items() if name not in gone}
-    return replace(trial, signals=signals, noise=noise, notices=(*trial.notices, notice))
+    return replace(trial, signals=signals, noise=noise, notices=(*trial.notices, Notice(notice)))
 
 
 def froude_scaled(trial: Trial, length_ratio: float) -> Trial:

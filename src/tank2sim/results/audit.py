@@ -11,6 +11,7 @@ from tank2sim.answer.charts.columns import motions, stem_of
 from tank2sim.answer.charts.motion import TimeMark
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
+from tank2sim.notices import Notice
 from tank2sim.records.audit.finding import ColumnFinding
 from tank2sim.records.audit.study import AuditedTrial, AuditStudy
 from tank2sim.units import from_si
@@ -89,11 +90,9 @@ class AuditResult(Result[AuditStudy]):
         return (found, f"{columns} of {_name(fault)} is wrong: {fault.likely_truth} ({repaired}).")
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Changes made on reading."""
-        return tuple(
-            f"{PurePath(trial.file).stem}: {notice}" for trial in self.study.trials for notice in trial.notices
-        )
+        return tuple(notice.of(PurePath(trial.file).stem) for trial in self.study.trials for notice in trial.notices)
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

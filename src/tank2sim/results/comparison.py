@@ -13,7 +13,6 @@ from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
-from tank2sim.marks import assumed_words
 from tank2sim.results.comparison_charts import FigurePercent, errors_chart, percent_chart
 from tank2sim.units import in_words
 
@@ -199,7 +198,9 @@ class ComparisonResult(Result[CardComparison]):
         percents = self._percents()
         if not percents:
             return []
-        chart = percent_chart(percents, self.labels, assumed_words(self.notices))
+        chart = percent_chart(
+            percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
+        )
         drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
         tables = [self._main_figures(), *map(self._trial_table, self.study.trials)]
         return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]

@@ -8,7 +8,6 @@ from tank2sim.analysis.ensemble.results import ChanceOfAll, FigureBands, Members
 from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.parts import Cell, Section, Table, table
-from tank2sim.marks import assumed_words
 from tank2sim.results.ensemble_charts import curve_charts
 from tank2sim.results.imo import BEYOND_THE_CARD
 from tank2sim.simulation.bands import Band
@@ -41,7 +40,7 @@ def ensemble_heading(found: Members) -> str:
     ----------
     found : Members
     """
-    return f"Ensemble of {found.members}{assumed_words(found.notices)}"
+    return f"Ensemble of {found.members}{', standard errors assumed' * found.assumed_errors}"
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:

@@ -12,6 +12,7 @@ from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdic
 from tank2sim.answer.result import Result
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.export import ExportedFmu
+from tank2sim.notices import Notice
 
 MOST_PROBLEMS = 8
 """Problems that the screen shows. Project choice: they fit under the table."""
@@ -32,7 +33,7 @@ class ExportStudy:
     model_identifier, token : str
     platforms : tuple of str
     size_bytes : int
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -43,7 +44,7 @@ class ExportStudy:
     token: str
     platforms: tuple[str, ...]
     size_bytes: int
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

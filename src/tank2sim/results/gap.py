@@ -20,7 +20,7 @@ from tank2sim.errors import InputError
 from tank2sim.files import folder_made
 from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
-from tank2sim.gap.outcome.correct_sensors import REMAINING_FAULTS, correct_sensor_faults, corrected_text
+from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults, corrected_text
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE, gap_study, joined, replaces
 from tank2sim.gap.outcome.files import CORRECTED, REPORT, SURROUNDED, GapFiles, put
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
@@ -29,6 +29,7 @@ from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.notices import Notice, foremost
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.results.gap_cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.results.gap_charts import (
@@ -50,6 +51,7 @@ from tank2sim.results.gap_text import (
     capital,
     effect_in_words,
     effects_of,
+    found_in_words,
     meaning,
     others_in_words,
     parameter_cells,
@@ -58,7 +60,6 @@ from tank2sim.results.gap_text import (
     sizes_of_candidates,
     trial_name,
     verdict_context,
-    verdict_in_words,
     with_error,
 )
 from tank2sim.units import in_words
@@ -157,7 +158,7 @@ class GapResult(Result[GapStudy]):
         Trials that name the effect, and trials that only prove it.
     written : tuple of Path
         Files that were written.
-    remarks : tuple of str
+    remarks : tuple of Notice
         Messages about them.
     """
 
@@ -166,7 +167,7 @@ class GapResult(Result[GapStudy]):
     fitted: Measured = NO_TRIALS
     held: Measured = NO_TRIALS
     written: tuple[Path, ...] = ()
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Notice, ...] = ()
     command: ClassVar[str] = "gap"
 
     @property
@@ -263,16 +264,16 @@ class GapResult(Result[GapStudy]):
         """The verdict with its probability, explanations that these data cannot distinguish, and the next test."""
         study, test = self.study, self.study.next_test
         return (
-            f"{study.ship}: {verdict_in_words(study)}",
+            f"{study.ship}: {found_in_words(study)}",
             *probabilities_in_words(study)[:1],
             *([others_in_words(study)] if study.alternatives and study.verdict != AMBIGUOUS else []),
             *([f"Next test: {test.manoeuvre}. {capital(test.why)}"] if test else []),
         )
 
     @property
-    def notices(self) -> tuple[str, ...]:
-        """Messages about trials and files; objections to the verdict are in :attr:`headline`."""
-        return *self.study.notices[len(self.study.cautions) :], *self.remarks
+    def notices(self) -> tuple[Notice, ...]:
+        """Objections to the verdict, and messages about trials and files."""
+        return *self.study.notices, *self.remarks
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -284,7 +285,7 @@ class GapResult(Result[GapStudy]):
         """The verdict, its probability, misfits, and the next test."""
         study, effects = self.study, self.study.effects
         named = ", ".join(effect_in_words(effect.name) for effect in effects)
-        sure = study.verdict in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS) and not study.cautions
+        sure = study.verdict in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS) and not foremost(study.notices)
         caution = Verdict.NONE if sure else Verdict.CAUTION
         missing = study.verdict == MISSING
         value, note = (named, MISSING) if missing else (study.verdict, named)
@@ -345,7 +346,7 @@ class GapResult(Result[GapStudy]):
         ]
         return [each for each in sections if each.text or each.tables or each.charts]
 
-    def files(self, folder: Path) -> tuple[GapFiles, list[str]]:
+    def files(self, folder: Path) -> tuple[GapFiles, list[Notice]]:
         """Path to content of the files that belong into a folder, and messages about them.
 
         ``gap.json``, ``improved.toml`` with its covariance, ``report.html``, ``next_test.csv`` where a test would
@@ -364,13 +365,13 @@ class GapResult(Result[GapStudy]):
                 if corrected is not None:
                     files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
                 new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
-                notices += [f"{trial.path.name}: {text}" for text in new if text.startswith(REMAINING_FAULTS)]
+                notices += [notice.of(trial.path.name) for notice in new if notice.leads]
         files |= {folder / SURROUNDED / f"{name}.csv": text for name, text in self._surrounded().items()}
         names = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
         files[folder / GAP] = self.to_json(files=names)
         return files, notices
 
-    def save(self, folder: str | Path) -> tuple[str, ...]:
+    def save(self, folder: str | Path) -> tuple[Notice, ...]:
         """Write :meth:`files` into a folder in place of those of an earlier run; return messages.
 
         Raises
@@ -439,7 +440,7 @@ def gap_result(gap: Gap, fitted: Measured, held: Measured) -> GapResult:
     return GapResult(gap_study(gap, files), gap, fitted, held)
 
 
-def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[str]]:
+def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[Notice]]:
     """Files of the improved card at `path`, with the valid part of the covariance of `card`; messages about it.
 
     A covariance that cannot be read is left out with a message: an hour's search is not lost for it.
@@ -448,7 +449,7 @@ def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[st
         found, messages = derived_card(card, text, path.name)
         return found.files(path), list(messages)
     except InputError as error:
-        return {path: not_referring(text)}, [f"{path.name} has no covariance: {error}"]
+        return {path: not_referring(text)}, [Notice(f"{path.name} has no covariance: {error}")]
 
 
 def _drawn(name: str, chart: alt.TopLevelMixin | None) -> list[Illustration]:

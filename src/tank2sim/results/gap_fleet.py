@@ -14,6 +14,7 @@ from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, S
 from tank2sim.answer.result import Result
 from tank2sim.gap.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
+from tank2sim.notices import Notice
 from tank2sim.results.gap_text import effect_in_words, parameter_cells
 
 _SHIPS = (
@@ -37,7 +38,7 @@ class FleetResult(Result[FleetStudy]):
         Whether the page lies in the folder of the results, and leads to the page of each ship.
     origins : mapping
         Ship to the origin of its results: this search or an earlier one.
-    remarks : tuple of str
+    remarks : tuple of Notice
         Messages about the folder of the results.
     inputs : tuple of Path
         Cards and trials.
@@ -48,7 +49,7 @@ class FleetResult(Result[FleetStudy]):
     study: FleetStudy
     linked: bool = False
     origins: Mapping[str, str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Notice, ...] = ()
     inputs: tuple[Path, ...] = ()
     written: tuple[Path, ...] = ()
     command: ClassVar[str] = "gap"
@@ -73,7 +74,7 @@ class FleetResult(Result[FleetStudy]):
         return f"{study.fleet}: {len(study.ships)} ships ({', '.join(counts)}).", *origins
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Messages about the ships and the folder of the results."""
         return *self.remarks, *self.study.notices
 

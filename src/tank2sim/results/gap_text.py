@@ -45,11 +45,6 @@ def capital(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
-def verdict_in_words(study: GapStudy) -> str:
-    """The finding in a sentence or two, and the objections to it."""
-    return " ".join([found_in_words(study), *(f"Caution: {caution}." for caution in study.cautions)])
-
-
 def probabilities_in_words(study: GapStudy) -> list[str]:
     """Probability of each effect, in any company, and of the explanation as a whole.
 

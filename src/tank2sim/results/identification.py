@@ -13,7 +13,6 @@ from tank2sim.answer.result import Result
 from tank2sim.cards import Card
 from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
 from tank2sim.identification.trials.identify import Identification
-from tank2sim.identification.trials.methods.posterior_sampling import NOT_CONVERGED
 from tank2sim.identification.trials.study import (
     SET_KEYS,
     BootstrapStudy,
@@ -157,29 +156,16 @@ class IdentificationResult(Result[IdentificationStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Whether the posterior has not converged, and how well the card found follows trials."""
-        return (*self._not_converged, *self._followed())
-
-    @property
-    def _not_converged(self) -> list[str]:
-        return [notice for notice in self.study.notices if notice.startswith(NOT_CONVERGED)]
-
-    def _followed(self) -> list[str]:
+        """How well the card found follows trials."""
         word, trials = self._judged
         before, after = (100 * pooled_error(trials, key) for key in ("before", "found"))
         if not np.isfinite(after):
-            return []
+            return ()
         better = "better than" if after < before else "no better than"
         given = f"before ({before:.3g} %)" if np.isfinite(before) else "before"
         followed = f"The card found follows the yaw rate of the trials {word} within {after:.3g} % (rms)"
         text = f"{followed}, {better} the card {given}."
-        return [text if word == HELD_OUT else f"{text} None was held out, so this card is untested."]
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """Changes to the data, and limits of the result; without those of the headline."""
-        every = dict.fromkeys((*self.study.notices, *self.study.warnings))
-        return tuple(notice for notice in every if notice not in self._not_converged)
+        return (text if word == HELD_OUT else f"{text} None was held out, so this card is untested.",)
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

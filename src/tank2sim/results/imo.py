@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.parts import Cell, Illustration, Section, Verdict, table
+from tank2sim.notices import Level, Notice
 from tank2sim.results.stability_charts import criteria_chart
 
 BEYOND_THE_CARD = "beyond the card"
@@ -27,10 +28,11 @@ def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteri
     heading, text : str
         Of the section.
     """
-    remarks: dict[str, list[str]] = {}
+    remarks: dict[Notice, list[str]] = {}
     for criterion in criteria:
         if criterion.remark:
-            remarks.setdefault(criterion.remark, []).append(criterion.name)
+            level = Level.CAUTION if criterion.beyond_card else Level.INFO
+            remarks.setdefault(Notice(criterion.remark, level), []).append(criterion.name)
     rows: list[list[Cell]] = [
         [
             *(one.name, one.found, one.allowed, one.unit, imo_verdict(one)),
@@ -39,7 +41,7 @@ def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteri
         for one in criteria
     ]
     heads = ("criterion", "found", "allowed", "unit", "verdict", "margin (%)")
-    notes = [f"{'; '.join(names)}: {remark}" for remark, names in remarks.items()]
+    notes = [remark.of("; ".join(names)) for remark, names in remarks.items()]
     charts = []
     if any(criterion.found is not None for criterion in criteria):
         charts.append(Illustration(chart=criteria_chart(criteria, title="IMO MSC.137(76)"), caption=_BARS))

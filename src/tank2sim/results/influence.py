@@ -18,7 +18,7 @@ from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.errors import ArgumentError
-from tank2sim.marks import assumed_words
+from tank2sim.notices import Notice
 from tank2sim.results.ensembles import figures_section
 from tank2sim.results.influence_charts import (
     InfluenceData,
@@ -83,7 +83,7 @@ class InfluenceResult(Result[InfluenceStudy]):
         return f"Parameters: {len(self.study.parameters)}. Figures: {len(self.study.figures)}."
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Those of the study, and of its ensemble."""
         members = self.study.ensemble.notices if self.study.ensemble else ()
         return tuple(dict.fromkeys([*self.study.notices, *members]))
@@ -241,7 +241,7 @@ class InfluenceResult(Result[InfluenceStudy]):
         heads = ("figure", "value", "unit", "standard error", "relative (%)", "most of it from")
         known = any(figure.standard_error > 0 for figure in self.study.figures.values())
         return Section(
-            heading=f"Errors of the figures{assumed_words(self.study.notices)}",
+            heading=f"Errors of the figures{', standard errors assumed' * self.study.assumed_errors}",
             text=f"By the delta method: {self.study.standard_errors}. The share of a number is the part of the "
             "variance that would go if it were known exactly; shares of correlated numbers overlap.",
             charts=[Illustration(chart=variance_chart(self._data))] if known else [],

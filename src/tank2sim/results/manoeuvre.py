@@ -14,6 +14,7 @@ from tank2sim.answer.parts import Cell, Column, KeyFigure, Section, Table, Verdi
 from tank2sim.answer.result import Result
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
+from tank2sim.notices import Notice
 from tank2sim.results.ensembles import band_table
 from tank2sim.results.manoeuvre_charts import (
     SIDE_NAMES,
@@ -92,7 +93,7 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         return f"Simulated manoeuvre {self.study.manoeuvre}{members}"
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Those of the run, and of its ensemble."""
         members = self.study.ensemble.notices if self.study.ensemble else ()
         return tuple(dict.fromkeys([*self.study.notices, *members]))

@@ -22,7 +22,6 @@ from tank2sim.answer.charts.motion import SpiralData, spiral_chart
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
-from tank2sim.marks import assumed_words
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.figures import zero_rate_rudders
 
@@ -58,7 +57,7 @@ def members_text(ensemble: ManoeuvreBands) -> str:
     ----------
     ensemble : ManoeuvreBands
     """
-    errors = "assumed errors" if assumed_words(ensemble.notices) else "the errors of the card"
+    errors = "assumed errors" if ensemble.assumed_errors else "the errors of the card"
     return f"{ensemble.usable} ships within {errors}"
 
 
@@ -78,7 +77,7 @@ def manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
     title = title[:1].upper() + title[1:]
     bands, shaded = {}, ""
     if study.ensemble:
-        title += assumed_words(study.ensemble.notices)
+        title += ", standard errors assumed" * study.ensemble.assumed_errors
         bands = study.ensemble.figures
         shaded = f"Shaded: nine of ten of {members_text(study.ensemble)}. Bars: nine of ten of each figure."
     match study.kind:

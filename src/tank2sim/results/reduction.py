@@ -120,11 +120,6 @@ class ReductionResult(Result[ReductionStudy]):
         return "Captive model tests, reduced"
 
     @property
-    def notices(self) -> tuple[str, ...]:
-        """The warnings."""
-        return self.study.warnings
-
-    @property
     def headline(self) -> tuple[str, ...]:
         """Number of derivatives, errors of predicted runs, and the size of the card."""
         text = f"{self._measured} of {len(self.study.derivatives)} derivatives are measured"

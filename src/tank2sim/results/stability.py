@@ -10,6 +10,7 @@ from tank2sim.analysis.stability.study import StabilityStudy
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
 from tank2sim.answer.result import Result
+from tank2sim.notices import Notice
 from tank2sim.results.ensembles import chance_sentences, stability_section
 from tank2sim.results.imo import imo_section
 from tank2sim.results.stability_charts import (
@@ -93,7 +94,7 @@ class StabilityResult(Result[StabilityStudy]):
         return f"Stability and manoeuvrability, {self.study.operating_point.speed_mps:.4g} m/s"
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Those of the study, and of its ensemble."""
         members = self.study.ensemble.notices if self.study.ensemble else ()
         return tuple(dict.fromkeys([*self.study.notices, *members]))

@@ -19,6 +19,7 @@ from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns, Number
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
+from tank2sim.notices import Notice
 from tank2sim.results.imo import imo_section
 from tank2sim.results.validation_charts import COMPARISON_ERRORS, comparison_error_chart
 from tank2sim.units import in_words
@@ -122,7 +123,7 @@ class ValidationStudy:
         Figures of standard trials.
     imo : tuple of ImoCriterion
     replays : tuple of TrialReplay
-    notices : tuple of str
+    notices : tuple of Notice
     kind : str
         Always ``validate``.
     """
@@ -139,7 +140,7 @@ class ValidationStudy:
     verification: tuple[Verified, ...]
     imo: tuple[ImoCriterion, ...]
     replays: tuple[TrialReplay, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     kind: str = "validate"
 
 

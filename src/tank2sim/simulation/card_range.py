@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.hull import VALIDITY_FACTOR
-from tank2sim.marks import EXTRAPOLATED
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -60,11 +60,11 @@ class CardRangeReading:
         return tuple(name for name in self.figures if self.outside(name))
 
     @property
-    def message(self) -> str:
-        """Notice on the exit from the card's range, in a line; empty if no figure is outside it."""
+    def notices(self) -> list[Notice]:
+        """A caution on the exit from the card's range; none if no figure is outside it."""
         if self.exit_s is None or not self.outside_names:
-            return ""
-        return f"{EXTRAPOLATED} what the card was measured in, from {self.exit_s:.3g} s on: {self.how}"
+            return []
+        return [caution(f"EXTRAPOLATED beyond the card's measurements from {self.exit_s:.3g} s on: {self.how}")]
 
     def as_json(self) -> dict[str, object]:
         """Time and cause of the exit from the card's range, and the names of the figures outside it."""

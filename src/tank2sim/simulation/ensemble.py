@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
-from tank2sim.marks import CHECK
+from tank2sim.notices import Level, Notice
 from tank2sim.simulation.member_streams import member_stream
 
 Histories = NDArray[np.float32]
@@ -64,6 +64,8 @@ class Draws:
         Samples of the joint distribution of m of the parameters: a member has one of its rows instead of normal values.
     sampled : array (m,)
         Places of these parameters.
+    assumed : bool
+        Whether all standard errors are assumed.
     """
 
     names: tuple[str, ...]
@@ -74,6 +76,7 @@ class Draws:
     seed: int
     samples: Array | None = None
     sampled: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    assumed: bool = False
 
     def member(self, number: int) -> dict[str, float]:
         """Parameters of a member, by name."""
@@ -253,15 +256,17 @@ class Redrawn:
         counted = Counter(name for names in beyond for name in names)
         return Redrawn(sum(map(bool, beyond)), dict(counted.most_common()))
 
-    def in_words(self, members: int) -> list[str]:
+    def in_words(self, members: int) -> list[Notice]:
         """Notices for an ensemble of `members`."""
         if not self.members:
             return []
         counts = ", ".join(f"{name} {count}" for name, count in self.beyond.items())
         share = 100 * self.members / members
         return [
-            f"{self.members} of {members} members ({share:.2g} %) were drawn again, being beyond what numbers can be "
-            f"({counts}): their distribution is normal, cut off there"
+            Notice(
+                f"{self.members} of {members} members ({share:.2g} %) were drawn again, because numbers were beyond "
+                f"their bounds ({counts}): the distribution is normal, cut off there"
+            )
         ]
 
 
@@ -297,13 +302,18 @@ class Ensemble:
         return self.members - sum(self.unusable.values())
 
     @property
-    def notices(self) -> list[str]:
+    def notices(self) -> list[Notice]:
         """Notices on members that were drawn again, or that are unusable."""
-        mark = f"{CHECK} " if self.members - self.usable > TAIL * self.members else ""
-        messages = [
-            f"{mark}{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()
+        return [*self.redrawn.in_words(self.members), *self.of_unusable]
+
+    @property
+    def of_unusable(self) -> list[Notice]:
+        """Notices on members that are unusable."""
+        level = Level.CAUTION if self.members - self.usable > TAIL * self.members else Level.INFO
+        return [
+            Notice(f"{count} of {self.members} members cannot be used: {why}", level)
+            for why, count in self.unusable.items()
         ]
-        return [*self.redrawn.in_words(self.members), *messages]
 
 
 def ensemble(

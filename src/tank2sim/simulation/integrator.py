@@ -20,6 +20,7 @@ from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
+from tank2sim.notices import Notice
 from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.scheme import runge_kutta_step, step_and_constants
 
@@ -63,7 +64,7 @@ _LOOP = """
 
 Loop = Callable[..., None]
 
-NO_COMPILER = "no working C compiler was found: CasADi evaluates the model, many times slower"
+NO_COMPILER = Notice("no working C compiler was found: CasADi evaluates the model, many times slower")
 
 
 class Integrator:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.records.csv_table import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
@@ -30,16 +31,19 @@ class Run:
         The motion.
     figures : dict
         Manoeuvring figures, units in their names; None for a figure that the run does not show.
-    notices : tuple of str
+    notices : tuple of Notice
         Messages for the user.
     reading : CardRangeReading
         The figures outside the card's range.
+    missing : tuple of Notice
+        Of `notices` those on figures that the run does not show.
     """
 
     trajectory: Trajectory
     figures: Figures
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     reading: CardRangeReading
+    missing: tuple[Notice, ...] = ()
 
 
 def simulate(
@@ -83,12 +87,15 @@ def simulate(
     trajectory = running.trajectory()
     figures = figures_of(manoeuvre, trajectory, values["ship.length"])
     read = reading(figures, trajectory, values)
-    notices = [read.message] if read.message else []
-    notices += model.notices
-    notices += _beyond_the_gear(trajectory, values.get("steering.max_angle"))
-    notices += [] if integrator.compiled else [NO_COMPILER]
-    notices += [] if isinstance(manoeuvre, Orders) else _not_shown(trajectory, figures)
-    return Run(trajectory, figures, tuple(notices), read)
+    missing = () if isinstance(manoeuvre, Orders) else _not_shown(trajectory, figures)
+    notices = (
+        *read.notices,
+        *model.notices,
+        *_beyond_the_gear(trajectory, values.get("steering.max_angle")),
+        *(() if integrator.compiled else (NO_COMPILER,)),
+        *missing,
+    )
+    return Run(trajectory, figures, notices, read, missing)
 
 
 def _refuse_other_steering(model: Model, manoeuvre: Manoeuvre) -> None:
@@ -109,17 +116,16 @@ def _refuse_other_steering(model: Model, manoeuvre: Manoeuvre) -> None:
         raise InputError(model.origin, manoeuvre.words, "needs a rudder, and it has none", remedy)
 
 
-def _not_shown(trajectory: Trajectory, figures: Figures) -> list[str]:
+def _not_shown(trajectory: Trajectory, figures: Figures) -> tuple[Notice, ...]:
     missing = [in_words(name)[0] for name, value in figures.items() if value is None]
-    return [f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}"] if missing else []
+    return (Notice(f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}"),) if missing else ()
 
 
-def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[str]:
+def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[Notice]:
     if largest is None:
         return []
     ordered = float(np.max(np.abs(trajectory["rudder.command"])))
     if ordered <= largest * (1 + 1e-9):
         return []
-    return [
-        f"the rudder was ordered to {np.degrees(ordered):.4g} deg, but its gear stops at {np.degrees(largest):.4g} deg"
-    ]
+    angles = np.degrees([ordered, largest])
+    return [Notice("the rudder was ordered to {:.4g} deg, but its gear stops at {:.4g} deg".format(*angles))]

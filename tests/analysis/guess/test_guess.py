@@ -17,8 +17,8 @@ from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.reading import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK, marked
 from tank2sim.native.lanes import widest_lanes
+from tank2sim.notices import foremost
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate
 
@@ -167,12 +167,12 @@ def test_dimensions_of_no_ship_are_refused(changed) -> None:
 )
 def test_a_figure_outside_nine_of_ten_ships_is_marked_with_its_likely_unit(key, value, error, word) -> None:
     study, _ = guess_ship(TANKER, [figure(key, value, error)], "tanker", 150, 1)
-    marks = marked(study.notices)
-    assert marks and marks[0].startswith(CHECK) and key in marks[0] and word in marks[0]
+    marks = foremost(study.notices)
+    assert marks and marks[0].leads and key in marks[0] and word in marks[0]
 
 
 @pytest.mark.slow
 def test_usual_figures_are_not_marked() -> None:
     given = parse_figures("turn35", "advance=970 tactical=980") + parse_figures("zigzag10", "first=9.4 second=18")
     study, _ = guess_ship(TANKER, given, "tanker", 150, 1)
-    assert not marked(study.notices)
+    assert not foremost(study.notices)

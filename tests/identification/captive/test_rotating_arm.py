@@ -99,8 +99,8 @@ def test_a_yaw_rate_of_the_other_sign_is_in_the_first_lines(tmp_path):
         table = csv.DictWriter(file, list(rows[0]))
         table.writeheader()
         table.writerows([{**row, "r": -float(row["r"])} for row in rows])
-    assert any("Nr" in line for line in t2s.reduce(path).marks)
-    assert not any("Nr" in line for line in t2s.reduce(write_arm(tmp_path, TRUTH)).marks)
+    assert any("Nr" in line for line in t2s.reduce(path).cautions)
+    assert not any("Nr" in line for line in t2s.reduce(write_arm(tmp_path, TRUTH)).cautions)
 
 
 @pytest.mark.slow

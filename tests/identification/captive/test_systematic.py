@@ -8,7 +8,7 @@ import pytest
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.findings import implausible, reduction_findings
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
-from tank2sim.marks import CHECK
+from tank2sim.notices import caution
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
 from tests.marks import first_fast
@@ -46,7 +46,7 @@ def test_a_delay_of_the_forces_is_estimated_and_reported_first(tmp_path, delay, 
     assert error.force == "XYN"
     assert abs(error.size - delay) < 4 * error.standard_error
     assert error.standard_error < 0.1 * abs(delay)
-    assert reduction_findings(found)[0] == f"{CHECK} {error.message}"
+    assert reduction_findings(found)[0] == caution(error.message)
     wrong = ratios(found, written, ("Yvdot", "Yrdot", "Nvdot", "Nrdot"))
     assert max(map(abs, wrong.values())) < 3.0, wrong
     assert 0 < found.derivatives["Yrdot"].type_b["force_delay"] < found.derivatives["Yrdot"].type_a
@@ -115,7 +115,7 @@ def test_a_gauge_that_errs_in_one_kind_of_run_is_named(sound, kind, force):
     assert error.force == force
     assert error.size == pytest.approx(0.05, abs=0.02)
     assert error.runs == kind
-    assert reduction_findings(found)[0] == f"{CHECK} {error.message}"
+    assert reduction_findings(found)[0] == caution(error.message)
     wrong = ratios(found, sound[1], [name for name in ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd") if name[0] == force])
     assert max(map(abs, wrong.values())) < 3.0, wrong
 

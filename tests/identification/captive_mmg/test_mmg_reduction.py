@@ -172,12 +172,12 @@ def test_a_campaign_that_lacks_what_the_method_needs_is_refused(tmp_path, old, n
 @pytest.mark.slow
 def test_a_coefficient_at_the_limit_of_the_search_marks_the_result(tmp_path) -> None:
     fit = fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2)))
-    assert fit.at_limit == () and MmgReductionResult(study_mmg(fit)).marks == ()
+    assert fit.at_limit == () and MmgReductionResult(study_mmg(fit)).cautions == ()
     values = fit.values.copy()
     values[fit.names.index("C_2_plus")] = 5.0
     at_limit = replace(fit, values=values)
     assert at_limit.at_limit == ("C_2_plus",)
-    assert any("C_2_plus" in mark for mark in MmgReductionResult(study_mmg(at_limit)).marks)
+    assert any("C_2_plus" in mark for mark in MmgReductionResult(study_mmg(at_limit)).cautions)
     assert fit_mmg(read_steady_tests(write_campaign(tmp_path, KVLCC2 | {"C_2_plus": 6.0}))).at_limit == ("C_2_plus",)
 
 
@@ -224,12 +224,12 @@ def test_columns_of_another_sign_or_unit_are_refused_by_their_names(tmp_path, co
 def test_points_of_the_open_water_curve_have_a_row_and_mark_a_result_that_they_doubt(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
     sound = t2s.reduce_to_mmg(path)
-    assert sound.marks == () and sound.study.open_water["K_T"].unexplained < 0.02
+    assert sound.cautions == () and sound.study.open_water["K_T"].unexplained < 0.02
     assert [row[0] for row in sound.tables[1].rows][-1].startswith("K_T")
     scale_column(tmp_path, "K_T", 1.1)
     doubted = t2s.reduce_to_mmg(path)
     assert doubted.study.open_water["K_T"].unexplained == pytest.approx(0.09, abs=0.01)
-    assert any("K_T" in mark for mark in doubted.marks)
+    assert any("K_T" in mark for mark in doubted.cautions)
     with_torque = t2s.reduce_to_mmg(write_campaign(tmp_path, KVLCC2, torque=True))
     assert [row[0].partition(" ")[0] for row in with_torque.tables[1].rows][-2:] == ["K_T", "K_Q"]
 
@@ -293,16 +293,16 @@ def test_a_hull_whose_derivatives_no_ship_has_marks_the_result(tmp_path) -> None
     for name, value in (("Nr", 0.03), ("Nr", -0.5), ("Nr", -0.005), ("Nv", 0.1), ("l_R", 0.5), ("t_P", 0.75)):
         values = fit.values.copy()
         values[fit.names.index(name)] = value
-        marks = MmgReductionResult(study_mmg(replace(fit, values=values))).marks
-        assert any(f" {name} is" in mark for mark in marks), name
+        marks = MmgReductionResult(study_mmg(replace(fit, values=values))).cautions
+        assert any(f"{name} is" in mark for mark in marks), name
 
 
 @pytest.mark.slow
 def test_the_polynomial_warns_of_a_yaw_rate_in_another_unit(tmp_path) -> None:
     path = write_campaign(tmp_path, KVLCC2)
-    assert not t2s.reduce(path).marks
+    assert not t2s.reduce(path).cautions
     path.write_text(path.read_text().replace("yaw_rate_prime", "yaw_rate_degps"))
-    assert any("yaw rate" in line for line in t2s.reduce(path).marks)
+    assert any("yaw rate" in line for line in t2s.reduce(path).cautions)
 
 
 def test_the_polynomial_takes_turns_and_leaves_out_other_loads_of_the_propeller(tmp_path) -> None:

@@ -81,7 +81,7 @@ def test_a_delay_explains_table_1_and_is_in_the_result(table_1):
     np.testing.assert_allclose(fit.values, [2772, 185, 2.1], rtol=0.02)
     assert fit.estimates["start_delay_s"] == fit.start_delay_s == fit.values[2]
     assert "start_delay_s" not in result.methods["qr"].estimates
-    assert not any("a late start" in warning for warning in result.warnings)
+    assert not any("a late start" in warning for warning in result.notices)
     text = tow_card_text(result, fit, name="late", source="test")
     assert "delay" not in text.split("[surge]")[1].split("[")[0] and "total_mass_kg = 2772" in text
 

@@ -15,7 +15,7 @@ from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK, marked
+from tank2sim.notices import foremost
 
 # what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
 PRINTED = np.array([2550.0, 92418.0, -26096.0, 2015.0])
@@ -66,7 +66,7 @@ def test_terms_left_out_are_zero_in_the_coefficients(two_unknowns):
 
 
 def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
-    text = "\n".join(four_unknowns.warnings)
+    text = "\n".join(four_unknowns.notices)
     expected = [
         r"M, B1, B2, B3 cannot all be identified from these tows: .* 2.2e\+04 \(qr\) and 5.8e\+05 \(output_error\)",
         r"take fewer terms \(--terms B3\)",
@@ -78,17 +78,17 @@ def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
     ]
     for sentence in expected:
         assert re.search(sentence, text), sentence
-    assert all(warning.endswith(".") for warning in four_unknowns.warnings)
+    assert all(warning.endswith(".") for warning in four_unknowns.notices)
 
 
 def test_three_unknowns_are_still_too_many(table_1):
-    text = "\n".join(identify_tow(table_1, terms=("B3", "B2")).warnings)
+    text = "\n".join(identify_tow(table_1, terms=("B3", "B2")).notices)
     assert "M, B2, B3 cannot all be identified" in text
     assert "output_error: not distinguishable from zero at 95 %: B2" in text
 
 
 def test_two_unknowns_only_show_the_late_start(two_unknowns):
-    (warning,) = two_unknowns.warnings
+    (warning,) = two_unknowns.notices
     assert warning.startswith("output_error: the equation does not follow the tows within their scatter: at 10 s it is")
     assert "too fast; a late start" in warning
 
@@ -97,7 +97,7 @@ def test_tows_that_follow_the_model_give_no_warning_and_their_coefficients():
     truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
     tows = synthetic(truth, np.arange(0, 81, 5.0), scatter=0.001)
     result = identify_tow(tows, 11.63, 2243.0, terms=("B3",), speed_degree=4)
-    assert result.warnings == ()
+    assert result.notices == ()
     for name in ("qr", "output_error"):
         fit = result.methods[name]
         errors = fit.standard_errors
@@ -108,7 +108,7 @@ def test_tows_that_follow_the_model_give_no_warning_and_their_coefficients():
 def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
     truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
     tows = synthetic(truth, np.arange(0, 401, 5.0), scatter=0.001)
-    warnings = identify_tow(tows, 11.63, 2243.0, terms=("B3",)).warnings
+    warnings = identify_tow(tows, 11.63, 2243.0, terms=("B3",)).notices
     assert any("a speed polynomial of degree 2 does not follow the tows" in warning for warning in warnings)
 
 
@@ -125,15 +125,13 @@ def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
 )
 def test_an_added_mass_that_no_body_has_is_marked_with_the_likely_unit(table_1, force, mass, unit, named):
     tows = replace(table_1, speed_mps=unit * table_1.speed_mps)
-    found = marked(identify_tow(tows, force, mass, terms=("B3",)).warnings)
-    assert found and all(
-        message.startswith(CHECK) and "added mass" in message and named in message for message in found
-    )
+    found = foremost(identify_tow(tows, force, mass, terms=("B3",)).notices)
+    assert found and all(message.leads and "added mass" in message and named in message for message in found)
 
 
 def test_the_added_mass_of_the_paper_is_not_marked(table_1):
     for terms in (("B3",), ("B3", "B2", "B1")):
-        assert not marked(identify_tow(table_1, terms=terms).warnings)
+        assert not foremost(identify_tow(table_1, terms=terms).notices)
 
 
 def test_what_is_given_comes_before_the_file_and_is_reported(table_1):
@@ -142,7 +140,7 @@ def test_what_is_given_comes_before_the_file_and_is_reported(table_1):
     reference = identify_tow(table_1, terms=("B3",))
     for name, fit in result.methods.items():
         np.testing.assert_allclose(fit.values, 2 * reference.methods[name].values, rtol=1e-6)
-    assert "The file of the tows states force_N 11.63; 23.26 was given and used." in result.warnings
+    assert "The file of the tows states force_N 11.63; 23.26 was given and used." in result.notices
 
 
 def test_largest_speed_error_is_that_of_the_integrated_model(two_unknowns, table_1):
@@ -162,7 +160,7 @@ def test_json_has_methods_with_units_in_names_and_warnings(four_unknowns):
     assert content["methods"]["qr"]["standard_errors"].keys() == paper["estimates"].keys()
     assert paper["condition"] > paper["condition_scaled"] > 1e4
     assert paper["J"] == pytest.approx(0.444, abs=5e-4)
-    assert content["warnings"] == list(four_unknowns.warnings)
+    assert [notice["text"] for notice in content["notices"]] == list(four_unknowns.notices)
     assert content["readings"] == 53
 
 

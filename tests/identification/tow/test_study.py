@@ -139,19 +139,19 @@ def simulated(estimates, force, tows):
 
 
 def test_notes_tell_the_range_and_offer_a_way_out(study, table_1):
-    text = " ".join(study.warnings)
+    text = " ".join(study.notices)
     assert "M only within 2547 to 3399 kg (added mass 304 to 1156 kg)" in text
     assert "The model of lowest AIC is M, B1, B2, B3, with a drag that is negative at some speeds" in text
     assert "(--start-delay)" in text and "--terms B3" in text and "--total-mass-kg, 2357 by (2.5)" in text
     posed = study_tows(identify_tow(table_1, terms=("B3",), options=TowOptions(start_delay=True)), table_1)
-    assert "--start-delay" not in " ".join(posed.warnings) and "--total-mass-kg" not in " ".join(posed.warnings)
+    assert "--start-delay" not in " ".join(posed.notices) and "--total-mass-kg" not in " ".join(posed.notices)
     assert posed.mass_by_theory == () and posed.drag_coefficients == {}
 
 
 def test_json_keeps_its_keys_and_has_more(study):
     content = TowResult(study).to_dict()
     assert set(content["methods"]) == {"paper", "qr", "output_error"}
-    assert content["warnings"] == list(study.warnings)
+    assert [notice["text"] for notice in content["notices"]] == list(study.notices)
     assert content["mass_range_kg"] == pytest.approx([2547, 3399], abs=1)
     assert [row["degree"] for row in content["speed_polynomials"]] == [0, 1, 2, 3]
     by_length = content["drag_coefficients"]["paper"]["by_length_squared"]
@@ -183,5 +183,5 @@ def test_table_1_is_known_again(table_1):
 
 
 def test_a_tow_that_ends_early_is_reported_with_its_polynomial_continued(study):
-    (note,) = [note for note in study.warnings if note.startswith("Tow ")]
+    (note,) = [note for note in study.notices if note.startswith("Tow ")]
     assert all(words in note for words in ("Tow 4", "45 s", "2682 kg", "50 s", "2687 kg"))

@@ -26,7 +26,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_correlations,
 )
 from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent, structure_that_adds
-from tank2sim.marks import marked
+from tank2sim.notices import foremost
 from tank2sim.records.trials import RUDDERS
 
 
@@ -189,7 +189,7 @@ def test_structures_that_noise_hides_are_marked_unless_a_hard_turn_is_held_out(t
     }
     noisy = replace(trials["zigzag"], trials=(replace(trial, signals=signals),))
     marks = [
-        marked(structure_by_evidence(card, noisy, IdentificationOptions(), held)[1])
+        foremost(structure_by_evidence(card, noisy, IdentificationOptions(), held)[1])
         for held in (None, trials["hard"], trials["gentle"])
     ]
     assert marks[0] and marks[0] == marks[2] and not marks[1]

@@ -24,7 +24,7 @@ from tank2sim.identification.trials.problem.water_current import (
     with_current,
     without_current,
 )
-from tank2sim.marks import marked
+from tank2sim.notices import foremost
 from tank2sim.records.trials import Trial
 
 from .made_up_ship import CARD, TRUTH, problem, trial, turn, zigzag
@@ -125,4 +125,4 @@ def test_only_trials_at_sea_without_a_stated_current_have_one_to_estimate(trials
 def test_a_current_that_is_not_determined_marks_the_result() -> None:
     loose = WaterCurrent(np.array([0.2, 0.0]), np.diag([0.01, 0.3]) ** 2, 5.0)
     assert not loose.determined and loose.standard_error_mps == pytest.approx(0.3)
-    assert marked([undetermined_notice(loose)])
+    assert foremost([undetermined_notice(loose)])

@@ -24,7 +24,7 @@ from tank2sim.apps.rigs.yaw.records import read_yaw_record, yaw_record_text
 from tank2sim.apps.rigs.yaw.simulation import Measuring, run_yaw_rig, yaw_record
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
-from tank2sim.marks import marked
+from tank2sim.notices import foremost
 from tests.marks import first_fast
 from tests.yaw_truth import Truth, mirrored, record, written
 
@@ -81,7 +81,7 @@ def test_the_two_interval_formula_is_biased_and_its_bias_is_reported(result):
     assert two.bias_kgm2 == pytest.approx(off, rel=0.05)
     assert sum(two.bias_from.values()) == pytest.approx(two.bias_kgm2, rel=1e-3)
     assert best.bias_kgm2 is None
-    assert any("two-interval formula" in note for note in result.notes)
+    assert any("two-interval formula" in note for note in result.notices)
     assert len(two.by_hump_kgm2) == result.records[0].programme.humps
     assert two.total_inertia_kgm2 == pytest.approx(sum(two.by_hump_kgm2) / len(two.by_hump_kgm2))
 
@@ -324,7 +324,7 @@ def test_gravity_is_found_by_itself_and_reported(folder):
         assert totals(found)[method] == pytest.approx(0.0504, rel=5e-3)
         assert found.estimates[method].friction["gravity_sine"][0] == pytest.approx(1.5e-3 * np.cos(1.0), rel=0.03)
         assert found.estimates[method].friction["gravity_cosine"][0] == pytest.approx(-1.5e-3 * np.sin(1.0), rel=0.03)
-    assert any("moment of gravity of 0.0015 N m" in note for note in found.notes)
+    assert any("moment of gravity of 0.0015 N m" in note for note in found.notices)
     given = replace(found, body=BodyInertia(value_kgm2=0.0204, error_kgm2=None, source="as given"))
     card = parse_card(rig_card_text(given, "output_error", name="rig", source="a test", known=None), "rig.toml")
     assert card.yaw_rig.gravity_Nm == pytest.approx(1.5e-3, rel=0.02)
@@ -333,7 +333,7 @@ def test_gravity_is_found_by_itself_and_reported(folder):
 
 def test_one_hump_is_said_not_to_tell_gravity(folder, columns):
     made = read_yaw_record(written(folder / "one.csv", replace(TRUTH, humps=1), columns))
-    assert any("One hump" in note for note in identify_yaw([made]).notes)
+    assert any("One hump" in note for note in identify_yaw([made]).notices)
 
 
 def test_units_and_signs_that_cannot_be_are_refused(folder, columns):
@@ -360,11 +360,11 @@ def test_an_added_inertia_that_no_body_has_is_refused_or_marked(folder, columns,
     with pytest.raises(InputError, match="added inertia"):
         found(0.0204, torque_constant_NmpA=0.0051)
     for unit in ({"inertia": 0.0204e-3}, {"inertia": 0.0204, "torque_constant_NmpA": 51.0}):
-        (mark,) = marked(found(**unit).notes)
+        (mark,) = foremost(found(**unit).notices)
         assert "added inertia" in mark and "J_zz" in mark
-    (mark,) = marked(found(0.0500, inertia_error_kgm2=9e-4).notes)
+    (mark,) = foremost(found(0.0500, inertia_error_kgm2=9e-4).notices)
     assert "added inertia" in mark and "zero" in mark
-    assert not marked(found(0.0204, inertia_error_kgm2=2e-4).notes)
+    assert not foremost(found(0.0204, inertia_error_kgm2=2e-4).notices)
 
 
 def test_a_wrapped_angle_is_put_together_and_reported(folder, columns, result):
@@ -392,7 +392,7 @@ def test_errors_of_j_and_of_k_t_count_once(water, folder):
     stated = replace(water, constants={**water.constants, "inertia_kgm2": 0.0204, "inertia_error_kgm2": 1e-3})
     assert identify_yaw([stated]).added_inertia("energy_least_squares")[1] == pytest.approx(1e-3, rel=0.05)
     silent = replace(water, constants={**water.constants, "inertia_kgm2": 0.0204})
-    assert any("no standard error" in note for note in identify_yaw([silent]).notes)
+    assert any("no standard error" in note for note in identify_yaw([silent]).notices)
 
 
 def test_a_current_of_nearly_the_largest_of_the_motor_is_saturation_and_one_below_is_not(tmp_path, columns):
@@ -402,7 +402,7 @@ def test_a_current_of_nearly_the_largest_of_the_motor_is_saturation_and_one_belo
     for share in (0.998, 0.992):
         record = read_yaw_record(written(tmp_path / "near.csv", TRUTH, columns, max_current_A=largest / share))
         try:
-            sides.append(any("saturated" in note for note in identify_yaw([record]).notes))
+            sides.append(any("saturated" in note for note in identify_yaw([record]).notices))
         except InputError as error:
             sides.append("reaches the motor's" in str(error))
     assert sides == [True, False]
@@ -428,7 +428,7 @@ def test_a_copy_of_a_record_is_refused_a_mirror_image_marked_and_a_repeat_taken(
     for name, copy in copies.items():
         with pytest.raises(InputError, match=rf"{name}\.csv.*first\.csv"):
             identify_yaw([read("first", first), read(name, copy)])
-    assert not marked(identify_yaw([read("first", first), read("repeat", noisy(2))]).notes)
+    assert not foremost(identify_yaw([read("first", first), read("repeat", noisy(2))]).notices)
     image = read("image", mirrored(first), replace(TRUTH, top=-TRUTH.top))
-    (mark,) = marked(identify_yaw([read("first", first), image]).notes)
+    (mark,) = foremost(identify_yaw([read("first", first), image]).notices)
     assert "image.csv" in mark and "mirror" in mark

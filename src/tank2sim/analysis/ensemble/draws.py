@@ -16,10 +16,11 @@ from tank2sim.dynamics.card_parameters import (
     joint_errors,
     study_model,
 )
+from tank2sim.notices import Notice
 from tank2sim.simulation.ensemble import Draws
 
 
-def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[str]]:
+def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[Notice]]:
     """The draws of a card, with notices on them.
 
     Numbers in the card's covariance are correlated; all other numbers are independent, with their standard errors.
@@ -48,6 +49,7 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
         seed=seed,
         samples=errors.samples,
         sampled=np.array([rows[place] for place in errors.sampled], dtype=np.int64),
+        assumed=errors.assumed,
     )
 
 

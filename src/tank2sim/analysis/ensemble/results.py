@@ -27,6 +27,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, band_of, figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, Draws, Ensemble, Question, ensemble
 from tank2sim.simulation.lane_figures import USUAL_PACE
@@ -54,13 +55,15 @@ class EnsembleRequest:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Members:
-    """Members of an ensemble: number, seed, usable ones, unusable ones by their reason, and notices."""
+    """Members of an ensemble: number, seed, usable ones, unusable ones by their reason, notices, and whether all
+    standard errors are assumed."""
 
     members: int
     seed: int
     usable: int
     unusable: dict[str, int]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
+    assumed_errors: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -164,26 +167,28 @@ def manoeuvre_bands(
     question = OfManoeuvre(ShipText.of(card), manoeuvre, run_s[0], times)
     model = build(card)
     if request.members > KEPT:
-        notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
+        notices.append(Notice(f"bands of tracks and histories are of the first {KEPT} members; figures are of all"))
         question = replace(question, pace=fastest_pace(question, draws))
     steps = model.step_s, question.pace.step_factor * model.step_s
     if question.pace != USUAL_PACE:
         single = " in single precision" if question.pace.single else ""
         notices.append(
-            f"integration steps are {steps[0]:.3g} s for the first {KEPT} members and {steps[1]:.3g} s{single} for the "
-            f"others: no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
+            Notice(
+                f"integration steps are {steps[0]:.3g} s for the first {KEPT} members, {steps[1]:.3g} s{single} for "
+                f"the others: no figure of the first {TRIED_MEMBERS} changes by more than {100 * STEP_TOLERANCE:g} %"
+            )
         )
     found = _ensemble(card, question, draws, request.members, executor)
     shown, histories, track = history_bands(found, times, tuple(signals_with_bands(model)))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        notices.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
+        notices.append(Notice(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all"))
     if track is not None and track.count < len(shown):
         last = shown[track.count - 1]
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        notices.append(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it")
+        notices.append(Notice(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it"))
     return ManoeuvreBands(
-        **_members(found, notices),
+        **_members(found, draws, notices),
         figures=figure_bands(found),
         t_s=shown,
         histories=histories,
@@ -205,12 +210,12 @@ def stability_bands(
     draws, messages = draws_of(card, request.seed)
     question = OfCriteria(ShipText.of(card))
     trials = _ensemble(card, question, draws, request.members, executor)
-    messages.append("an ensemble is judged at the card's speed")
+    messages.append(Notice("an ensemble is judged at the card's speed"))
     try:
         straight = _ensemble(card, OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
     except InputError as error:
         straight = Ensemble(request.members, request.seed, {})
-        messages.append(f"no bands of the straight course: {error.problem}")
+        messages.append(Notice(f"no bands of the straight course: {error.problem}"))
     chances = tuple(chance(criterion, trials) for criterion in criteria)
     within = {criterion.name for criterion in criteria if not criterion.beyond_card}
     judged = [one for one in chances if one.probability_met is not None]
@@ -220,13 +225,17 @@ def stability_bands(
     chances = tuple(replace(one, tail=each.get(one.name)) for one in chances)
     messages += _counted(judged, trials.usable)
     if judged and not limits:
-        messages.append("no probability of the criteria together: the trials of the card itself leave its range")
+        messages.append(
+            Notice("no probability of the criteria together: the trials of the card itself leave its range")
+        )
     together = all_chances(limits, trials)
     unseen = answering_states(build(card))
     if unseen:
         messages.append(
-            "no probability of stability: the figures of the members are those of slow motions, which "
-            f"{', '.join(unseen)} follow at once"
+            Notice(
+                "no probability of stability: the figures of the members are those of slow motions, which "
+                f"{', '.join(unseen)} follow at once"
+            )
         )
     stable, between = (None, None) if unseen else _stable(straight)
     bands, through = bands_without_poles(straight)
@@ -236,7 +245,7 @@ def stability_bands(
         drawn, about = steering_bands(ShipText.of(card), draws, request.members, curves, executor)
         messages += about
     return StabilityBands(
-        **_members(trials, messages),
+        **_members(trials, draws, messages),
         figures=bands,
         probability_stable=stable,
         probability_stable_interval_95=between,
@@ -256,11 +265,13 @@ def named_bands(
     notices += through
     for name, band in bands.items():
         if band.shown_by < found.usable:
-            notices.append(f"{name}: {found.usable - band.shown_by} of {request.members} members do not show it")
-    return FigureBands(**_members(found, notices), figures=bands)
+            notices.append(
+                Notice(f"{name}: {found.usable - band.shown_by} of {request.members} members do not show it")
+            )
+    return FigureBands(**_members(found, draws, notices), figures=bands)
 
 
-def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
+def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[Notice]]:
     """Bands of figures by name, except for those of :data:`POLES` that pass through infinity, with notices on these."""
     bands = figure_bands(found)
     poles = [name for name in POLES if name in bands]
@@ -274,7 +285,7 @@ def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
     usable, words = found.usable, " and ".join(in_words(name)[0] for name in gone)
     above = int(np.sum(signs[gone[0]] > 0))
     text = f"no band of {words}: {above} of {usable} members have C' above zero, the others below, and between these "
-    return {name: band for name, band in bands.items() if name not in gone}, [f"{text}they go through infinity"]
+    return {name: band for name, band in bands.items() if name not in gone}, [Notice(f"{text}they go through infinity")]
 
 
 def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
@@ -302,14 +313,14 @@ def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
     )
 
 
-def _counted(chances: Sequence[Chance], usable: int) -> list[str]:
+def _counted(chances: Sequence[Chance], usable: int) -> list[Notice]:
     """Notices on members without a figure, and on those beyond the card's range."""
     lost = ", ".join(f"{one.name} {one.not_shown} of {usable}" for one in chances if one.not_shown)
     left = ", ".join(f"{one.name} {one.beyond_card} of {usable}" for one in chances if one.beyond_card)
     lines = [f"members that do not show a figure count as not meeting its criterion: {lost}"] if lost else []
     if left:
         lines.append(f"members that left the card's range before a figure was known count by the value found: {left}")
-    return lines
+    return [Notice(text) for text in lines]
 
 
 def all_chances(limits: Mapping[str, float], found: Ensemble) -> ChanceOfAll | None:
@@ -353,7 +364,7 @@ def _ensemble(
     return found
 
 
-def _members(found: Ensemble, messages: Sequence[str]) -> dict[str, Any]:
+def _members(found: Ensemble, draws: Draws, messages: Sequence[Notice]) -> dict[str, Any]:
     """Fields of :class:`Members`."""
     return {
         "members": found.members,
@@ -361,4 +372,5 @@ def _members(found: Ensemble, messages: Sequence[str]) -> dict[str, Any]:
         "usable": found.members - sum(found.unusable.values()),
         "unusable": dict(found.unusable),
         "notices": (*messages, *found.notices),
+        "assumed_errors": draws.assumed,
     }

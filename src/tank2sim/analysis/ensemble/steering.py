@@ -20,6 +20,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.bands import QUANTILES, STILL_RUNNING, Band, BandOverTime, figure_bands
 from tank2sim.simulation.ensemble import Ask, Draws, Ensemble, MemberResult, ensemble
 
@@ -138,7 +139,7 @@ class SteeringBands:
 
 def steering_bands(
     ship: ShipText, draws: Draws, members: int, about: tuple[float | None, Grid], executor: Executor | None = None
-) -> tuple[SteeringBands | None, list[str]]:
+) -> tuple[SteeringBands | None, list[Notice]]:
     """Bands of the first :data:`CURVES` members, with notices; `about` is the speed (None: the card's) and the grid.
 
     None if no member has such curves.
@@ -149,14 +150,16 @@ def steering_bands(
     found = ensemble(question, draws, min(members, CURVES), executor)
     if found.histories is None or reference.histories is None:
         return None, []
-    messages = [f"no steady turns: {notice}" for notice in found.notices if "cannot be used" in notice]
+    messages = [notice.of("no steady turns") for notice in found.of_unusable]
     if members > CURVES:
-        messages.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
+        messages.append(Notice(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members"))
     bands = [_band(found, row, own.astype(float)) for row, own in enumerate(reference.histories)]
     from_starboard, from_port, magnitude, phase, step = bands
     if not all(np.isfinite(side.p5).all() for side in (from_starboard, from_port)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
-        messages.append(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
+        messages.append(
+            Notice(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
+        )
     turning = TurningBands(
         rudder_deg=np.degrees(grid.rudder_rad),
         yaw_rate_from_starboard_degps=from_starboard,

@@ -24,6 +24,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.questions import BEYOND_CARD_MARK
 from tank2sim.arrays import Array, Mask
+from tank2sim.notices import Notice
 from tank2sim.simulation.ensemble import OUT_OF_BOUNDS, Draws, Ensemble, MixtureDraws, Question, ensemble
 
 FEW_FAILING = 10
@@ -161,7 +162,7 @@ def tails(
     found: Ensemble,
     limits: Mapping[str, float],
     executor: Executor | None = None,
-) -> tuple[dict[str, Tail], Tail | None, list[str]]:
+) -> tuple[dict[str, Tail], Tail | None, list[Notice]]:
     """Probabilities of failing the criteria of :func:`rare_names`, by importance sampling.
 
     Parameters
@@ -182,16 +183,24 @@ def tails(
         By criterion.
     any : Tail or None
         Tail of ships that fail at least one of `limits`; None if that is not rare.
-    notices : list of str
+    notices : list of Notice
         Why there are none.
     """
     names = rare_names(found, limits)
     if not names:
         return {}, None, []
     if draws.samples is not None:
-        return {}, None, ["no probability below what the members show: they are rows of samples, without a density"]
+        return (
+            {},
+            None,
+            [Notice("no probability below what the members show: they are rows of samples, without a density")],
+        )
     if found.members < LEAST:
-        return {}, None, [f"no probability below what the members show: {LEAST} members are needed for its search"]
+        return (
+            {},
+            None,
+            [Notice(f"no probability below what the members show: {LEAST} members are needed for its search")],
+        )
     drawn = [draws.drawn(number).standard for number in range(found.members)]
     standard = np.array([values for values in drawn if values is not None])
     lines = {}
@@ -202,7 +211,11 @@ def tails(
     searched = {name: line for name, line in lines.items() if line.searched}
     one = {name: _too_far(line) for name, line in lines.items() if name not in searched}
     unknown = [name for name in names if name not in lines]
-    about = [f"no probability below what the members show: {', '.join(unknown)} by too few members"] if unknown else []
+    about = (
+        [Notice(f"no probability below what the members show: {', '.join(unknown)} by too few members")]
+        if unknown
+        else []
+    )
     if not searched:
         return one, None, about
     mixture = _search(question, draws, searched, found.members, executor)

@@ -19,6 +19,7 @@ from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model,
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -65,7 +66,7 @@ class CraftAutopilotStudy:
         Share of the time of each run in which an order is at a limit of a thruster.
     histories : dict
         Columns of the runs ``course`` and ``speed``, to draw.
-    notices : tuple of str
+    notices : tuple of Notice
     export : AutopilotExport, optional
         The autopilot as an FMU, if one was made.
     """
@@ -80,7 +81,7 @@ class CraftAutopilotStudy:
     speed_change: StepFigures
     at_limit_percent: dict[str, float]
     histories: dict[str, Columns]
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     export: AutopilotExport | None = None
 
 

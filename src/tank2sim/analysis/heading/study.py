@@ -36,7 +36,7 @@ from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -158,7 +158,7 @@ class AutopilotStudy:
         North and east; empty without a track.
     histories, track_histories : dict
         Columns to draw by run, and by guidance.
-    notices : tuple of str
+    notices : tuple of Notice
     export : AutopilotExport, optional
         The controller as an FMU, if one was made.
     """
@@ -177,7 +177,7 @@ class AutopilotStudy:
     waypoints_m: Array
     histories: dict[str, Columns]
     track_histories: dict[str, Columns]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     export: AutopilotExport | None = None
 
 
@@ -273,21 +273,25 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     return study, Piloted(ship, design.autopilot, runs)
 
 
-def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[str]:
+def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[Notice]:
     """Marks of a weather in which the ship leaves its course, or is carried away."""
     found = []
     if max(abs(kept.heading_error_mean_deg), kept.heading_error_rms_deg) > HELD_DEG:
         rudder = math.degrees(float(np.mean(run["rudder.angle"][len(run.t) // 2 :])))
         found.append(
-            f"{CHECK} the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
-            f"{weather.current_mps:.3g} m/s: it lies {kept.heading_error_mean_deg:.3g} deg off with {rudder:.3g} deg "
-            "of rudder in the mean; the figures of course keeping mean nothing."
+            caution(
+                f"the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
+                f"{weather.current_mps:.3g} m/s: its mean heading error is {kept.heading_error_mean_deg:.3g} deg, with "
+                f"{rudder:.3g} deg of rudder; the figures of course keeping mean nothing."
+            )
         )
     speed = float(np.mean(run["motion.u"][len(run.t) // 2 :]))
     if weather.current_mps >= abs(speed):
         found.append(
-            f"{CHECK} the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
-            "the water): it may hold its heading, but cannot hold a course over the ground."
+            caution(
+                f"the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
+                "the water): it may hold its heading, but cannot hold a course over the ground."
+            )
         )
     return found
 
@@ -327,20 +331,22 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 
 def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
-) -> tuple[tuple[LoopMargins, ...], list[str]]:
+) -> tuple[tuple[LoopMargins, ...], list[Notice]]:
     """Margins at the speed of the design and at five across the card's range, and notices of speeds without any."""
     values = {parameter.name: parameter.start for parameter in ship.parameters}
     design_speed = values["ship.speed"] if speed is None else speed
     found, notices = [loop_margins(ship, design.autopilot, design_speed)], []
     if design_speed_only:
-        return tuple(found), [f"margins at {design_speed:.4g} m/s alone: a linear card does not hold at other speeds"]
+        return tuple(found), [
+            Notice(f"margins at {design_speed:.4g} m/s alone: a linear card does not hold at other speeds")
+        ]
     for card_speed in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
         if abs(card_speed / design_speed - 1) < 1e-6:
             continue
         try:
             found.append(loop_margins(ship, design.autopilot, card_speed))
         except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
-            notices.append(f"no margins at {card_speed:.4g} m/s: {error.problem}")
+            notices.append(Notice(f"no margins at {card_speed:.4g} m/s: {error.problem}"))
     return tuple(found), notices
 
 
@@ -374,19 +380,21 @@ def _notices(
     runs: Mapping[str, Trajectory],
     changes: Mapping[str, CourseChange],
     tracks: Mapping[str, TrackRun],
-) -> list[str]:
-    notices = [f"the loop is not stable at {margin.speed_mps:.4g} m/s" for margin in margins if not margin.stable]
+) -> list[Notice]:
+    notices = [
+        Notice(f"the loop is not stable at {margin.speed_mps:.4g} m/s") for margin in margins if not margin.stable
+    ]
     notices += [
-        f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s"
+        Notice(f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s")
         for name, change in changes.items()
         if change.settling_time_s is None
     ]
     return notices + [
-        f"the track is not finished, {name}" for name, track in tracks.items() if not track.figures.finished
+        Notice(f"the track is not finished, {name}") for name, track in tracks.items() if not track.figures.finished
     ]
 
 
-def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[str]:
+def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[Notice]:
     """Notices on the load of the gear in waves, and on limits of the autopilot below those of the gear."""
     notices = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
@@ -402,11 +410,15 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
             f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
         )
-    return notices
+    return [Notice(text) for text in notices]
 
 
-def _begun_at(speed: float | None) -> list[str]:
-    return [] if speed is None else [f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed"]
+def _begun_at(speed: float | None) -> list[Notice]:
+    return (
+        []
+        if speed is None
+        else [Notice(f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed")]
+    )
 
 
 def _in_degrees(values: Mapping[str, float]) -> dict[str, float]:

@@ -20,6 +20,7 @@ from tank2sim.analysis.tuning.result import TunedStudy
 from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, agreed_by_name, joint_errors
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 
 CURVED = 1.5
 """Reported factor between slope and 10 % difference. Project choice: the figure bends or jumps there."""
@@ -56,7 +57,7 @@ class CardInfluence:
     difference : array (nf, k)
         K % by the 10 % difference; nan where the changed ship does not show the figure, or the parameter is zero.
     agreed : Agreed or None
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -66,7 +67,7 @@ class CardInfluence:
     slopes: Array
     difference: Array
     agreed: Agreed | None = None
-    notices: tuple[str, ...] = field(default=())
+    notices: tuple[Notice, ...] = field(default=())
 
     @property
     def parameters(self) -> tuple[CardParameter, ...]:
@@ -121,6 +122,7 @@ class CardInfluence:
         return InfluenceStudy(
             ship=self.ship,
             standard_errors=self.of_errors,
+            assumed_errors=self.errors.assumed,
             figures={
                 text: FigureErrors(value, error, dict(zip(keys, share, strict=True)))
                 for text, value, error, share in zip(
@@ -216,11 +218,13 @@ class InfluenceStudy:
         By their keys on the card.
     influence_percent : dict
         Figure to parameter to its coefficient.
-    notices : tuple of str
+    notices : tuple of Notice
     agreed : AgreedVariation, optional
     tuned : TunedStudy, optional
         The card tuned to targets.
     ensemble : FigureBands, optional
+    assumed_errors : bool
+        Whether all standard errors are assumed.
     """
 
     ship: str
@@ -228,10 +232,11 @@ class InfluenceStudy:
     figures: dict[str, FigureErrors]
     parameters: dict[str, CardNumber]
     influence_percent: dict[str, dict[str, InfluenceCoefficient]]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     agreed: AgreedVariation | None = None
     tuned: TunedStudy | None = None
     ensemble: FigureBands | None = None
+    assumed_errors: bool = False
 
 
 def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardInfluence:
@@ -291,14 +296,14 @@ def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) ->
     return Agreed(percent, predicted(found.exact), predicted(found.difference), tuple(direct))
 
 
-def _differing(study: Study, sloped: Array) -> Iterable[str]:
+def _differing(study: Study, sloped: Array) -> Iterable[Notice]:
     """Notices on figures whose slopes belong to a different event, with another value than the figure's."""
     for figure, value, sloped_value in zip(study.figures, study.base, sloped, strict=True):
         if not abs(value - sloped_value) <= 1e-4 * max(abs(value), 1e-3):
-            yield f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there"
+            yield Notice(f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there")
 
 
-def _not_smooth(found: CardInfluence) -> list[str]:
+def _not_smooth(found: CardInfluence) -> list[Notice]:
     notices = []
     exact = found.exact
     for row, figure in enumerate(found.figures):
@@ -317,4 +322,4 @@ def _not_smooth(found: CardInfluence) -> list[str]:
             notices.append(
                 f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
             )
-    return notices
+    return [Notice(text) for text in notices]

@@ -21,6 +21,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import ArgumentError
+from tank2sim.notices import Notice
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -66,7 +67,7 @@ class Study:
         self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
         self._equilibria: dict[float, Array] = {}
         self._long_enough: dict[FigureManoeuvre, float] = {}
-        self._notices: dict[str, None] = dict.fromkeys(self.model.notices)
+        self._notices: dict[Notice, None] = dict.fromkeys(self.model.notices)
         self._known = False  # whether the figures of the card itself have been found: others say nothing of it
         self.base: Array = self.figures_at(self.values)
         self._known = True
@@ -90,7 +91,7 @@ class Study:
         return straight_courses(self.model)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Notices on the limits of the card's ship and its manoeuvres."""
         return tuple(self._notices)
 
@@ -198,9 +199,8 @@ class Study:
         model, integrator = self.model, self._integrator
         run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)
         if not self._known:
-            words = manoeuvre.words
-            marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
-            self._notices |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
+            beyond = [notice.of(manoeuvre.words) for notice in run.reading.notices]
+            self._notices |= dict.fromkeys((*beyond, *run.notices[len(beyond) :]))
         return run
 
 

@@ -27,6 +27,7 @@ from tank2sim.cards.card import CraftCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 from tank2sim.units import from_si, to_si
 
@@ -114,7 +115,7 @@ class CraftStabilityStudy:
         Held by the thrusters at their largest revolutions.
     difference_turns : tuple of SteadyCraftTurn
         To starboard, about the revolutions of the straight run.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -124,7 +125,7 @@ class CraftStabilityStudy:
     speeds: tuple[CraftAtSpeed, ...]
     highest_speed_mps: float
     difference_turns: tuple[SteadyCraftTurn, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStabilityStudy:
@@ -157,7 +158,7 @@ def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftSta
         speeds=tuple(craft.straight(share * highest) for share in SPEED_SHARES),
         highest_speed_mps=highest,
         difference_turns=turns,
-        notices=(*build(card).notices, NO_RUDDER),
+        notices=(*build(card).notices, Notice(NO_RUDDER)),
     )
 
 

@@ -134,7 +134,7 @@ class _Trials:
         for name in names:
             values = [run.figures.get(name) for run in runs]
             shown = [value for value in values if value is not None]
-            outside = next((run.reading.message for run in runs if run.reading.outside(name)), "")
+            outside = next((str(each) for run in runs if run.reading.outside(name) for each in run.reading.notices), "")
             if len(shown) == len(values):
                 found.append(_Worse(max(shown), outside))
             else:

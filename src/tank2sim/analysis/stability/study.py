@@ -20,6 +20,7 @@ from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, rever
 from tank2sim.dynamics.effects import EFFECTS, undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice, caution
 
 _FAR = 0.05
 """Distance from the diagram, as a share of the largest yaw rate, from which a steady point of a spiral is reported."""
@@ -63,7 +64,7 @@ class StabilityStudy(StraightLine):
         At the speed of expansion.
     steady_speeds : tuple of SteadySpeed
         Speeds straight ahead that the engine holds at the revolutions of the start.
-    notices : tuple of str
+    notices : tuple of Notice
         Messages for the user.
     ensemble : StabilityBands, optional
     """
@@ -76,7 +77,7 @@ class StabilityStudy(StraightLine):
     spirals: Spirals
     imo: tuple[ImoCriterion, ...]
     steady_speeds: tuple[SteadySpeed, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     ensemble: StabilityBands | None = None
 
 
@@ -105,7 +106,7 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         turning = steady_turning(model)
         notices += turning.notices
     except InputError as error:
-        notices.append(f"no steady-turning diagram: {_reason(error)}")
+        notices.append(Notice(f"no steady-turning diagram: {_reason(error)}"))
     if turning is not None and spirals:
         spiralled, spiral_notes = _spirals(model, turning)
         notices += spiral_notes
@@ -127,7 +128,7 @@ def _reason(error: InputError) -> str:
     return f"{error.place}: {error.problem}" if error.place else error.problem
 
 
-def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]:
+def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Notice]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages = []
@@ -142,26 +143,30 @@ def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]
         messages.append(
             f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
         )
-    return messages
+    return [Notice(text) for text in messages]
 
 
-def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[str]:
+def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[Notice]:
     stable = [f"{speed.speed_mps:.4g}" for speed in held if speed.stable]
     if not held:
         return [
-            "no steady speed straight ahead: the surge force at the revolutions of the start does not vanish below "
-            f"{FASTEST:g} times the speed of expansion, and such a run leaves the card's range"
+            Notice(
+                "no steady speed straight ahead: the surge force at the revolutions of the start does not vanish below "
+                f"{FASTEST:g} times the speed of expansion, and such a run leaves the card's range"
+            )
         ]
     if len(stable) < 2:
         return []
     return [
-        f"CHECK: {len(stable)} stable speeds straight ahead at the same revolutions ({', '.join(stable)} m/s): the "
-        "ship goes at one or another as it comes from below or above, which no ship does; check the terms of X in u "
-        "and low_speed_below_mps"
+        caution(
+            f"{len(stable)} stable speeds straight ahead at the same revolutions ({', '.join(stable)} m/s): the ship "
+            "keeps one or the other, depending on the speed before, which no ship does; check the terms of X in u and "
+            "low_speed_below_mps"
+        )
     ]
 
 
-def _about_effects(found: Stability) -> list[str]:
+def _about_effects(found: Stability) -> list[Notice]:
     """Notices on effects that C' and Nomoto's models neglect, and on modes that contradict them."""
     messages = []
     if found.effect_states:
@@ -175,21 +180,23 @@ def _about_effects(found: Stability) -> list[str]:
             f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
             "nothing of that"
         )
-    return messages
+    return [Notice(text) for text in messages]
 
 
-def _about_weather(model: Model) -> list[str]:
+def _about_weather(model: Model) -> list[Notice]:
     values = dict(zip(model.input_names, model.input_values().tolist(), strict=True))
     blowing = [name.partition(".")[0] for name, absent in undisturbed_inputs(model).items() if values[name] != absent]
     if not blowing:
         return []
     return [
-        f"the straight course is that in the card's {' and '.join(blowing)}, and so are its eigenvalues, C' and "
-        "Nomoto's numbers; steady turns, spirals and the IMO criteria are those of calm water"
+        Notice(
+            f"the straight course is that in the card's {' and '.join(blowing)}, and so are its eigenvalues, C' and "
+            "Nomoto's numbers; steady turns, spirals and the IMO criteria are those of calm water"
+        )
     ]
 
 
-def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[str]]:
+def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice]]:
     """The two spirals, with notices."""
     messages: list[str] = []
     direct = reverse = None
@@ -216,7 +223,7 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[str]]:
                 f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
                 "joined to its straight course, or the diagram ends before them"
             )
-    return Spirals(direct, reverse), messages
+    return Spirals(direct, reverse), [Notice(text) for text in messages]
 
 
 def steady_speeds(model: Model) -> tuple[SteadySpeed, ...]:

@@ -29,7 +29,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.marks import EXTRAPOLATED
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import exceeded_range
 
 _LARGEST_RUDDER = math.radians(35.0)
@@ -86,7 +86,7 @@ class SteadyTurning:
     loop : HysteresisLoop or None
     ended : pair of str
         Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`).
-    notices : tuple of str
+    notices : tuple of Notice
         Messages for the user.
     """
 
@@ -102,7 +102,7 @@ class SteadyTurning:
     folds: tuple[TurningFold, ...]
     loop: HysteresisLoop | None
     ended: tuple[str, str]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
@@ -403,7 +403,7 @@ def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
     return replace(found, loop=loop, notices=(*_end_notices(found), *_out_of_range(model, found)))
 
 
-def _end_notices(found: SteadyTurning) -> list[str]:
+def _end_notices(found: SteadyTurning) -> list[Notice]:
     words = {
         continuation.OUTSIDE: "runs away: the polynomial holds no steady turn beyond",
         continuation.STALLED: "breaks off: no steady turn was found beyond",
@@ -413,14 +413,13 @@ def _end_notices(found: SteadyTurning) -> list[str]:
     for side, row, ended in (("port", 0, found.ended[0]), ("starboard", -1, found.ended[1])):
         if ended in words:
             rudder, rate = np.degrees([found.rudder_rad[row], found.yaw_rate_radps[row]])
-            messages.append(
-                f"the steady-turning diagram {words[ended]} {rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"
-            )
+            place = f"{rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"
+            messages.append(Notice(f"the steady-turning diagram {words[ended]} {place}"))
     return messages
 
 
-def _out_of_range(model: Model, found: SteadyTurning) -> list[str]:
+def _out_of_range(model: Model, found: SteadyTurning) -> list[Notice]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
     outside = exceeded_range(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
-    return [f"{EXTRAPOLATED} what the card was measured in: steady turns have {outside}"] if outside else []
+    return [caution(f"EXTRAPOLATED beyond the card's measurements: steady turns have {outside}")] if outside else []

@@ -31,6 +31,7 @@ from tank2sim.dynamics.card_parameters import CardParameter, card_parameters
 from tank2sim.dynamics.mmg.equivalent import linear_form
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
+from tank2sim.notices import Notice
 
 _SAME_SPEED = 1e-3
 """Froude numbers that differ by less than this share count as equal."""
@@ -89,16 +90,16 @@ class Expansion:
         Name to coefficient; terms that the model lacks are absent.
     refused : mapping
         Name to the reason that prevents a comparison.
-    notes : tuple of str
+    notes : tuple of Notice
         What was converted.
     """
 
     coefficients: Mapping[str, CardCoefficient]
     refused: Mapping[str, str]
-    notes: tuple[str, ...]
+    notes: tuple[Notice, ...]
 
 
-def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[str, ...]]:
+def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[Notice, ...]]:
     """All coefficients of the cards of ships (the first is the reference), with notes on conversions.
 
     Between an MMG card and a polynomial the linear terms are compared: those of the straight course with propeller and
@@ -127,8 +128,10 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
     notes = [note for expansion in expansions[1:] for note in expansion.notes]
     if mixed:
         notes.append(
-            "of MMG cards the linear terms on a straight course are compared, with propeller and rudder, the mean of "
-            "both sides of gamma_R; their standard errors are not known"
+            Notice(
+                "MMG cards are compared by their linear terms on a straight course, with propeller and rudder and the "
+                "mean of both sides of gamma_R; their standard errors are not known"
+            )
         )
     return tuple(rows), tuple(notes)
 
@@ -289,7 +292,7 @@ def _d(name: str) -> int:
     return known_term(name).d
 
 
-def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[str, ...]:
+def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[Notice, ...]:
     messages = []
     if ratio != 1:
         messages.append(f"re-expanded about {ratio:.4g} times its form Froude number, to the third order")
@@ -298,7 +301,7 @@ def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> t
         messages.append(f"primes by the {form.speed_scale} speed converted to the {target.speed_scale} one")
     if form.yaw_rate_terms != target.yaw_rate_terms:
         messages.append(f"yaw rate terms converted from {form.yaw_rate_terms} to {target.yaw_rate_terms}")
-    return tuple(f"{card.ship.name} ({card.source}): {message}" for message in messages)
+    return tuple(Notice(f"{card.ship.name} ({card.source}): {message}") for message in messages)
 
 
 def _conversion(

@@ -30,7 +30,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
-from tank2sim.marks import ASSUMED, EXTRAPOLATED
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.simulation.run import Run
@@ -88,11 +88,13 @@ class TrialComparison:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedCard:
-    """A card: its label, the name of its ship, and the source of its numbers."""
+    """A card: its label, the name of its ship, the source of its numbers, and whether all their standard errors are
+    assumed."""
 
     label: str
     ship: str
     source: str
+    assumed_errors: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +138,7 @@ class CardComparison:
         Whether the cards are those of a craft with thrusters.
     members : int
         Size of the ensembles behind the deviations of the figures.
-    notices : tuple of str
+    notices : tuple of Notice
     kind : str
         Always ``compare``.
     """
@@ -148,7 +150,7 @@ class CardComparison:
     trials: tuple[TrialComparison, ...]
     craft: bool
     members: int
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     kind: str = "compare"
 
     @property
@@ -178,11 +180,11 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
     labels = labels_of(cards)
     ships = [ship_of(card) for card in cards]
     if craft:
-        rows, notes = compare_craft(craft), tuple[str, ...]()
+        rows, notes = compare_craft(craft), tuple[Notice, ...]()
     else:
         rows, notes = compare_coefficients([card for card in cards if isinstance(card, ManoeuvringCard)])
     drawn = [members(ship.card, ship.model, count) for ship in ships]
-    messages = [f"{label}: {message}" for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
+    messages = [message.of(label) for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
     notices, trials = [*_notices(cards, labels), *messages, *notes], []
     for name, manoeuvre in standard_trials(ships).items():
         trial, trouble = _trial(name, manoeuvre, ships, labels, [draws for draws, _ in drawn])
@@ -277,7 +279,7 @@ def _trial(
     ships: Sequence[TrialShip],
     labels: Sequence[str],
     drawn: Sequence[Sequence[Mapping[str, float]]],
-) -> tuple[TrialComparison, list[str]]:
+) -> tuple[TrialComparison, list[Notice]]:
     reference = ships[0].card
     found: list[Numbers] = []
     deviations: list[Numbers] = []
@@ -288,14 +290,12 @@ def _trial(
         start = _start(reference, ship.card)
         run = ship.run(manoeuvre, start)
         if isinstance(run, str):
-            messages.append(f"{label}: {name}: {run}")
+            messages.append(Notice(f"{label}: {name}: {run}"))
             found.append({})
             deviations.append({})
             outside.append(set())
             continue
-        messages += [
-            f"{label}: {name}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice
-        ]
+        messages += [notice.of(name).of(label) for notice in (*run.reading.notices, *run.missing)]
         outside.append(set(run.reading.outside_names))
         found.append(_scaled(figure_numbers(run.figures), ratio))
         # Of each member the numbers alone are kept: the motions of a thousand would fill gigabytes.
@@ -360,36 +360,43 @@ def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
     return CardTrack(card=label, t_s=time[::every], x_m=ratio * x[::every], y_m=ratio * y[::every])
 
 
-def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[str]:
-    messages = [f"{label}: {doubt}" for card, label in zip(cards, labels, strict=True) for doubt in doubts(card)]
+def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[Notice]:
+    messages = [doubt.of(label) for card, label in zip(cards, labels, strict=True) for doubt in doubts(card)]
     reference = cards[0]
     for card, label in zip(cards, labels, strict=True):
         ratio = reference.ship.length_m / card.ship.length_m
         if apart := differences_of_size(reference, card, 1 / ratio):
             form = "; ".join(apart)
             messages.append(
-                f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared"
+                Notice(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
             )
         elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
-            messages.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
+            messages.append(
+                Notice(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
+            )
         present = [name for name, value in card.derivatives.items() if value]
         if assumed := [name for name in present if name not in card.uncertainty]:
-            mark = f"{ASSUMED}, not measured ones: " if assumed == present else ""
             share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
-            messages.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
+            text = f"{len(assumed)} derivatives state no standard error: {share}"
+            every = caution(f"standard errors are ASSUMED: {text}") if assumed == present else Notice(text)
+            messages.append(every.of(label))
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):
-            messages.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
+            messages.append(
+                Notice(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
+            )
         speed = _start(reference, card).get("initial.u", card.model.speed_mps)
         if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
-            messages.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
+            messages.append(
+                Notice(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
+            )
         if _effects(card) != _effects(reference):
             effects, expected = (", ".join(_effects(ship)) or "none" for ship in (card, reference))
             messages.append(
-                f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them"
+                Notice(f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them")
             )
         engines = [ship.propulsion is None for ship in (card, reference) if isinstance(ship, ManoeuvringCard)]
         if len(set(engines)) > 1:
-            messages.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
+            messages.append(Notice(f"{label}: only one of it and the reference has propulsion: no stop is compared"))
     return messages
 
 

@@ -17,6 +17,7 @@ from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, stu
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import Numbers, entry_name, single_figures
 from tank2sim.simulation.ensemble import Redrawn
 from tank2sim.simulation.figures import Figures
@@ -173,7 +174,7 @@ def figure_numbers(figures: Figures) -> Numbers:
 
 def members(
     card: SteeredCard, model: Model, count: int, seed: int = SEED
-) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
+) -> tuple[tuple[dict[str, float], ...], tuple[Notice, ...]]:
     """Parameters of `count` ships drawn within the errors of the card, with notices.
 
     Errors of all numbers are normal, correlated by the card's covariance, or independent without one. Each member has
@@ -193,9 +194,9 @@ def members(
     words = Redrawn.of([draw.beyond for draw in found]).in_words(count)
     drawn = tuple({name: value for name, value in draw.values.items() if name in known} for draw in found)
     if errors.together:
-        return drawn, (errors.together_in_words, *words)
+        return drawn, (Notice(errors.together_in_words), *words)
     alone = "no covariance is next to the card: errors are taken as independent, and deviations of figures may be too"
-    return drawn, (f"{alone} large where errors go together", *words)
+    return drawn, (Notice(f"{alone} large where errors go together"), *words)
 
 
 def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:

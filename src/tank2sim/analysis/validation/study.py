@@ -42,7 +42,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.signatures import fitted_as
-from tank2sim.marks import EXTRAPOLATED
+from tank2sim.notices import Notice
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbers
@@ -180,7 +180,7 @@ class Validation:
 
     figures: tuple[Validated, ...]
     members: int
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -225,7 +225,7 @@ def validate_card(
     drawn, of_errors = members(card, model, count)
     known = [(trial, recognise(trial, model)) for trial in trials]
     messages = [
-        f"{trial.name}: no turning circle and no zigzag, for {what}: only replayed"
+        Notice(f"{trial.name}: no turning circle and no zigzag, for {what}: only replayed")
         for trial, what in known
         if isinstance(what, str)
     ]
@@ -244,15 +244,17 @@ def validate_card(
         if fitted:
             named = f" (as {copied})" if copied not in (None, trial.name) else ""
             messages.append(
-                f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted"
+                Notice(f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted")
             )
     if whats and not between:
         messages.append(
-            "no manoeuvre was run twice alike: u_D is of the record's noise and the errors of its point, heading and "
-            "orders, without weather and helmsman, and so a lower bound"
+            Notice(
+                "no manoeuvre was repeated: u_D holds the record's noise and the errors of its point, heading and "
+                "orders, but neither weather nor helmsman, and is a lower bound"
+            )
         )
     if not count:
-        messages.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
+        messages.append(Notice("no ensemble was run: u_input and U_val are not known, and no figure can be judged"))
     return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)))
 
 
@@ -267,19 +269,19 @@ def made_card(card: ManoeuvringCard, trial: str) -> bool:
     return re.search(rf"(?<![\w-]){re.escape(trial)}(?![\w-])", looked) is not None
 
 
-def verify(ship: TrialShip, count: int = VALIDATION_MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:
+def verify(ship: TrialShip, count: int = VALIDATION_MEMBERS) -> tuple[tuple[Verified, ...], tuple[Notice, ...]]:
     """The standard trials with the model's step, with half of it, and by an ensemble; and notices on failed ones."""
     model = replace(ship.model, step_s=ship.model.step_s / 2)
     finer = TrialShip(ship.card, model, Integrator(model))
     drawn, _ = members(ship.card, ship.model, count)
     rows: list[Verified] = []
-    messages: list[str] = []
+    messages: list[Notice] = []
     for trial, manoeuvre in standard_trials([ship]).items():
         run, fine = ship.run(manoeuvre), finer.run(manoeuvre)
         if isinstance(run, str) or isinstance(fine, str):
-            messages.append(f"{trial}: {run if isinstance(run, str) else fine}")
+            messages.append(Notice(f"{trial}: {run if isinstance(run, str) else fine}"))
             continue
-        messages += [f"{trial}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice]
+        messages += [notice.of(trial) for notice in (*run.reading.notices, *run.missing)]
         many = [ship.run(manoeuvre, member) for member in drawn]
         deviation = member_spread(
             [{} if isinstance(result, str) else figure_numbers(result.figures) for result in many]
@@ -296,23 +298,25 @@ def _validated(
     engines: tuple[Integrator, Integrator],
     drawn: Sequence[dict[str, float]],
     between: Mapping[tuple[str, str], float],
-) -> tuple[list[Validated], list[str]]:
+) -> tuple[list[Validated], list[Notice]]:
     measured = compare_figures(what)
     (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
     ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
     inputs, data = member_spread(ensemble), _read_again(what, engines[0])
     messages = [
-        f"{what.trial.name}: {name}: too few members of the ensemble reach it to determine u_input"
+        Notice(f"{what.trial.name}: {name}: too few members of the ensemble reach it to determine u_input")
         for name in measured
         if drawn and name in coarse and name not in inputs
     ]
     if what.rudder_rate_radps is None and what.begin_s <= what.trial.time_s[0]:
         messages.append(
-            f"{what.trial.name}: the record begins with the order given, which is taken to be given in its first row: "
-            "if it was given before, advance and times are too small by that time, and the figures are wrong"
+            Notice(
+                f"{what.trial.name}: the record begins with the order already given, and its first row is taken as the "
+                "execute: if the order was earlier, advance and times are too small by that time"
+            )
         )
     if beyond := [name for name in measured if read.outside(name) and name in coarse]:
-        messages.insert(0, f"{what.trial.name}: {', '.join(beyond)}: {read.message}")
+        messages[:0] = [notice.of(f"{what.trial.name}: {', '.join(beyond)}") for notice in read.notices]
     rows = []
     for name, value in measured.items():
         simulated, finer = coarse.get(name), fine.get(name)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import named_numbers, verb
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
@@ -102,12 +103,13 @@ def _bridges(
     check_orders(orders)
     loaded = ship.manoeuvring()
     first, second = bridge_of(loaded, orders), None
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     if ballast is not None:
         light = as_vessel(ballast).manoeuvring()
         notices = _check_ballast(loaded, light)
         second = bridge_of(light, orders)
-    missing = () if loaded.propulsion else ("the card has no [propulsion]: stops and speeds by revolutions are blank",)
+    text = "the card has no [propulsion]: stops and speeds by revolutions are blank"
+    missing = () if loaded.propulsion else (Notice(text),)
     said = dict.fromkeys((*notices, *first.notices, *(second.notices if second else ()), *missing))
     study = replace(first.study, notices=tuple(said), ballast=second.study if second else None)
     return study, first, second
@@ -142,7 +144,7 @@ def check_orders(orders: Mapping[str, float]) -> None:
         known.add(name.casefold())
 
 
-def _check_ballast(loaded: ManoeuvringCard, ballast: ManoeuvringCard) -> tuple[str, ...]:
+def _check_ballast(loaded: ManoeuvringCard, ballast: ManoeuvringCard) -> tuple[Notice, ...]:
     """Notices of a ballast card next to the loaded one.
 
     Raises
@@ -157,7 +159,9 @@ def _check_ballast(loaded: ManoeuvringCard, ballast: ManoeuvringCard) -> tuple[s
         raise InputError(ballast.source, "ship", f"is not of the ship of {loaded.source}: {'; '.join(apart)}", remedy)
     deep, light = loaded.ship.draught_m, ballast.ship.draught_m
     if deep is None or light is None:
-        return ("ballast: one of the cards states no draught: whether it is the lighter condition is not known",)
+        return (
+            Notice("ballast: one of the cards states no draught: whether it is the lighter condition is not known"),
+        )
     if light >= deep:
         problem = f"{light:g} m is not smaller than the {deep:g} m of the loaded card"
         raise InputError(ballast.source, "ship.draught_m", problem, remedy)

@@ -14,6 +14,7 @@ from tank2sim.apps.bridge import boxes
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawing
 from tank2sim.apps.bridge.study import SHALLOW, Bridge
+from tank2sim.notices import Notice
 from tank2sim.version import __version__
 
 PANEL_MM = (88.0, 62.0)
@@ -164,11 +165,12 @@ def _circles_title(bridge: Bridge) -> str:
     return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card states no maximum angle"
 
 
-def _notices(*bridges: Bridge | None) -> list[str]:
+def _notices(*bridges: Bridge | None) -> list[Notice]:
     """As many notices as a sheet has room for; the command prints all."""
-    texts = list(dict.fromkeys(_cut(text, _NOTICE) for bridge in bridges if bridge for text in bridge.notices))
+    cut = (Notice(_cut(each.line, _NOTICE), each.level) for bridge in bridges if bridge for each in bridge.notices)
+    texts = list(dict.fromkeys(cut))
     omitted = len(texts) - _NOTICES
-    return texts if omitted <= 0 else [*texts[:_NOTICES], f"and {omitted} more, which the command prints"]
+    return texts if omitted <= 0 else [*texts[:_NOTICES], Notice(f"and {omitted} more, which the command prints")]
 
 
 def _cut(text: str, length: int) -> str:

@@ -22,6 +22,7 @@ from tank2sim.cards.examination import doubts
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run
@@ -112,7 +113,7 @@ class Bridge:
         Rudder that keeps a straight course, + to starboard; None without one.
     squat : tuple of Squat
         Empty without block coefficient, beam and draught.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     card: ManoeuvringCard
@@ -126,7 +127,7 @@ class Bridge:
     hard_over_s: float | None
     neutral_deg: float | None
     squat: tuple[Squat, ...] = ()
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def study(self) -> BridgeStudy:
@@ -177,7 +178,7 @@ class BridgeStudy:
     hard_over_to_hard_over_s: float | None
     rudder_neutral_deg: float | None
     squat: tuple[Squat, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     ballast: BridgeStudy | None = None
 
 
@@ -306,19 +307,19 @@ def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
 
 def _circles(
     ship: TrialShip, rudder: float, depths: Mapping[str, Mapping[str, float]]
-) -> tuple[dict[str, list[ShipTrack]], list[str]]:
+) -> tuple[dict[str, list[ShipTrack]], list[Notice]]:
     """Circles by depth, to starboard and port, with notices."""
     found: dict[str, list[ShipTrack]] = {}
     messages = []
     if rudder > TRIAL_RUDDER * (1 + 1e-9):
         shown = f"{math.degrees(rudder):.3g} deg, the largest of the gear"
-        messages.append(f"turning circles with {shown}: the card does not say how far its rudder was tested")
+        messages.append(Notice(f"turning circles with {shown}: the card does not say how far its rudder was tested"))
     for where, inputs in depths.items():
         for side, sign in (("starboard", 1.0), ("port", -1.0)):
             name = f"turn to {side}, {where} water"
             run = ship.run(Turn(sign * rudder), inputs=inputs)
             if isinstance(run, str):
-                messages.append(f"{name}: {run}")
+                messages.append(Notice(f"{name}: {run}"))
                 continue
             track = circle_track(side, run)
             found.setdefault(where, []).append(track)
@@ -326,16 +327,16 @@ def _circles(
     return found, messages
 
 
-def _range_exit_notice(name: str, exit_mark: TrackMark | None) -> list[str]:
+def _range_exit_notice(name: str, exit_mark: TrackMark | None) -> list[Notice]:
     """Notice on the point where a run leaves the card's range."""
     if exit_mark is None:
         return []
     turned = f" and {exit_mark.heading_change_deg:.0f}° of heading" if abs(exit_mark.heading_change_deg) >= 1 else ""
     place = f"after {exit_mark.time_s:.0f} s{turned}, at {exit_mark.speed_mps:.3g} m/s"
-    return [f"{name}: leaves the card's range {place}: later values are omitted"]
+    return [Notice(f"{name}: leaves the card's range {place}: later values are omitted")]
 
 
-def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ...], list[str]]:
+def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ...], list[Notice]]:
     if not ship.has_engine:
         return (), []
     found, messages = [], []
@@ -345,9 +346,9 @@ def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrac
     ):
         run = ship.run(manoeuvre, inputs=inputs)
         if isinstance(run, str):
-            messages.append(f"{name}: {run}")
+            messages.append(Notice(f"{name}: {run}"))
             continue
-        messages += [f"{name}: {notice}" for notice in run.notices if "not show" in notice]
+        messages += [notice.of(name) for notice in run.missing]
         track = stop_track(name, run)
         found.append(track)
         messages += _range_exit_notice(name, track.range_exit)

@@ -115,7 +115,7 @@ def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, 
             ),
             Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard.", half=True),
         ],
-        notes=[f"{kind}: {notice}." for kind, result in run.items() for notice in result.notices],
+        notes=[notice.of(str(kind)) for kind, result in run.items() for notice in result.notices],
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import altair as alt
@@ -54,7 +53,7 @@ def towed_vehicle(workshop: Workshop) -> DemoOutcome:
         "four_unknowns": study_values(paper),
         "two_unknowns": study_values(chosen),
         "tows": misses,
-        "checks": [asdict(report) for report in reports],
+        "checks": [study_values(report) for report in reports],
     }
     return DemoOutcome(_figures(chosen, misses, reports), [_section(paper, chosen, misses, chart)], result)
 
@@ -97,7 +96,7 @@ def _section(
             _miss_table(misses),
         ],
         charts=[Illustration(chart=chart, caption="Points were measured; the line is the exported FMU, run by FMPy.")],
-        notes=[*paper.warnings[:1], *chosen.warnings],
+        notes=[*paper.notices[:1], *chosen.notices],
     )
 
 

@@ -19,6 +19,7 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, joint_errors
 from tank2sim.dynamics.effects.derivatives import hydrodynamic
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
@@ -65,7 +66,7 @@ class FigureSlopes:
     drawn : array (draws, m, k)
         Slopes of ships drawn from the errors, the card's first.
     errors : JointErrors
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     figures: tuple[InfluenceFigure, ...]
@@ -74,7 +75,7 @@ class FigureSlopes:
     at_card: Array
     drawn: Array
     errors: JointErrors
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
     @property
     def names(self) -> tuple[str, ...]:

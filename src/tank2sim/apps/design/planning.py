@@ -32,7 +32,7 @@ from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.writing import TestedRange
 from tank2sim.errors import ArgumentError
-from tank2sim.marks import ASSUMED, ASSUMED_TANK, CHECK, LINEARISED
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import from_si, to_si
 
@@ -79,7 +79,7 @@ def planned_campaign(
     return _campaign_study(card.ship.name, design, tuple(notices)), design
 
 
-def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[str, ...]) -> CampaignStudy:
+def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[Notice, ...]) -> CampaignStudy:
     runs = design.tank_runs
     return CampaignStudy(
         ship=name,
@@ -166,17 +166,19 @@ def planned_trial(
     if sensors is None:
         notices.insert(
             0,
-            f"{ASSUMED} of the sensors, for none are stated: "
-            + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items()),
+            caution(
+                "ASSUMED standard errors of the sensors, because none are stated: "
+                + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items())
+            ),
         )
-    assumed = _assumed_of_card(polynomial)
-    if assumed:
-        notices.insert(0, assumed)
+    notices = [*_assumed_of_card(polynomial), *notices]
     if design.unstable:
         notices.insert(
             0,
-            f"{LINEARISED} of {card.ship.name}, which is unstable on a straight course: its manoeuvres are not "
-            "linear in the coefficients, and errors after a fit may be many times those predicted here",
+            caution(
+                f"LINEARISED standard errors: {card.ship.name} is unstable on a straight course, so its manoeuvres are "
+                "not linear in the coefficients, and errors after a fit may be many times those predicted here"
+            ),
         )
     manoeuvres = tuple(
         PlannedManoeuvre(
@@ -276,47 +278,47 @@ def _tested_range(largest: tuple[float, float, float]) -> TestedRange:
     return TestedRange(math.radians(drift), math.radians(rudder), rate)
 
 
-def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[str, ...]]:
+def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[Notice, ...]]:
     if not isinstance(card, MmgCard):
         return card, ()
     made, notices = converted_card(card, "abkowitz", Conventions(None, None, 0.0), None)
     assert made.card is not None
     words = "the card is of the MMG method: the plan is for the polynomial that is fitted to it"
-    return manoeuvring_card(made.card), (words, *notices)
+    return manoeuvring_card(made.card), (Notice(words), *notices)
 
 
-def _notices(design: CaptiveDesign, draws: int) -> tuple[str, ...]:
+def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:
     notices = list(design.slopes.notices)
     if design.not_excited:
-        notices.append(
-            f"no run of this tank shows {', '.join(design.not_excited)}: their errors are not in the standard errors"
-        )
+        unseen = ", ".join(design.not_excited)
+        notices.append(Notice(f"no run of this tank shows {unseen}: the standard errors leave out their errors"))
     if design.too_strong:
         left_out = counted(design.too_strong, "candidate run")
-        notices.append(f"left out: {left_out} with a force that exceeds the range of its gauge")
+        notices.append(Notice(f"left out: {left_out} with a force that exceeds the range of its gauge"))
     asked, runs = design.tank_runs.largest, design.tank_runs
     for word, size, most in (
         ("drift", asked.drift_rad, runs.drift_rad),
         ("rudder", asked.rudder_rad, runs.rudder_rad),
     ):
         if size > most + 1e-12:
-            notices.append(
-                f"{word} goes to {math.degrees(most):.3g} deg, not {math.degrees(size):.3g}, by [mechanism] of the tank"
-            )
+            reached = f"{math.degrees(most):.3g} deg, not {math.degrees(size):.3g}"
+            notices.append(Notice(f"{word} goes to {reached}, by [mechanism] of the tank"))
     body = design.tank_runs.tank.mechanism.model_dump()
     missing = [key for key in ("sway_amplitude_m", "heading_amplitude_rad", "drift_rad") if body[key] is None]
     if missing:
-        notices.append(f"not limited, for the tank does not state it: {', '.join(missing)} of [mechanism]")
+        notices.append(Notice(f"not limited, for the tank does not state it: {', '.join(missing)} of [mechanism]"))
     return tuple(dict.fromkeys([*_checks(design), *_assumptions(design, draws), *notices]))
 
 
-def _checks(design: CaptiveDesign) -> list[str]:
+def _checks(design: CaptiveDesign) -> list[Notice]:
     """What needs a second look: too few hours, figures that are hardly certain, gauges far beyond their forces."""
     found = []
     if design.hours < design.usual_hours * (1 - 1e-9):
         found.append(
-            f"{CHECK} the hours, {design.hours:.3g} h, are too few for one usual matrix: the plan is compared with it "
-            f"in its own {design.usual_hours:.3g} h"
+            caution(
+                f"the hours, {design.hours:.3g} h, are too few for one usual matrix: the plan is compared with it "
+                f"in its own {design.usual_hours:.3g} h"
+            )
         )
     for row, figure in enumerate(design.slopes.figures):
         error, value = float(design.standard_errors[row]), abs(float(design.slopes.values[row]))
@@ -324,19 +326,21 @@ def _checks(design: CaptiveDesign) -> list[str]:
             force = max(design.gauge_shares, key=lambda each: float(design.gauge_shares[each][row]))
             part = 100 * float(design.gauge_shares[force][row])
             found.append(
-                f"{CHECK} the standard error of {figure.text} by the plan, {error:.3g}, is more than "
-                f"{100 * _HARDLY_CERTAIN:g} % of its value, {value:.4g}; "
-                f"{part:.0f} % of the variance is by gauge {force}"
+                caution(
+                    f"the standard error of {figure.text} by the plan, {error:.3g}, is more than "
+                    f"{100 * _HARDLY_CERTAIN:g} % of its value, {value:.4g}; "
+                    f"{part:.0f} % of the variance is by gauge {force}"
+                )
             )
     found += [
-        f"{CHECK} the range of gauge {force} is {times:.3g} times the largest force of the usual matrix"
+        caution(f"the range of gauge {force} is {times:.3g} times the largest force of the usual matrix")
         for force, times in design.beyond_use.items()
         if times > _FAR_BEYOND_USE
     ]
     return found
 
 
-def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
+def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
     """What neither the tank's file, nor an option, nor the card states."""
     tank, runs = design.tank_runs.tank, design.tank_runs
     gauges, stated = tank.gauges, tank.gauges.model_fields_set
@@ -351,12 +355,12 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
         lacking.append(f"gain {100 * gauges.gain_relative:g} %")
     if "rate_hz" not in stated:
         lacking.append(f"{gauges.rate_hz:g} independent readings a second")
-    found = [f"{ASSUMED} of the gauges, as [gauges] of the tank does not state them: {', '.join(lacking)}"]
-    if not lacking:
-        found = []
-    card = _assumed_of_card(design.card) if draws else None
-    if card:
-        found.append(card)
+    found = []
+    if lacking:
+        found.append(
+            caution(f"ASSUMED standard errors of the gauges ([gauges] of the tank states none): {', '.join(lacking)}")
+        )
+    found += _assumed_of_card(design.card) if draws else ()
     carriage, model = tank.carriage.model_fields_set, tank.model.model_fields_set
     body = tank.carriage
     lengths = {
@@ -367,14 +371,13 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[str]:
     }
     missing = [text for text in lengths.values() if text]
     if missing:
-        found.append(f"{ASSUMED_TANK}, for it is not stated: {', '.join(missing)}")
+        found.append(caution(f"ASSUMED of the tank, because it is not stated: {', '.join(missing)}"))
     return found
 
 
-def _assumed_of_card(card: ManoeuvringCard) -> str | None:
-    """The derivatives without a stated standard error, which are taken to be known to a share of their values."""
+def _assumed_of_card(card: ManoeuvringCard) -> list[Notice]:
+    """A caution on derivatives without a stated standard error: a share of the value is assumed."""
     names = [name for name, value in card.derivatives.items() if value and name not in card.uncertainty]
-    if not names:
-        return None
     which = ", ".join(names) if len(names) <= _LISTED else f"{len(names)} derivatives"
-    return f"{ASSUMED} of the card, which states none for {which}: {100 * RELATIVE_ERROR:g} % of each"
+    text = f"ASSUMED standard errors: the card states none of {which}, and {100 * RELATIVE_ERROR:g} % of each is taken"
+    return [caution(text)] if names else []

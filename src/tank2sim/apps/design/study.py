@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from tank2sim.arrays import Number
+from tank2sim.notices import Notice
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +153,7 @@ class CampaignStudy:
     certainty: Certainty
     kinds: tuple[PlannedKind, ...]
     runs: tuple[PlannedRow, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True)
@@ -190,4 +191,4 @@ class TrialStudy:
     coefficients: dict[str, PlannedCoefficient]
     certainty: Certainty
     manoeuvres: tuple[PlannedManoeuvre, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]

@@ -18,7 +18,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.bands import Band, band_of
 
 TRIAL_ERROR, OVERSHOOT_ERROR_DEG = 0.05, 1.0
@@ -84,7 +84,7 @@ class GuessStudy:
     next_figures : dict
         Figures not given, to the mean share of the variance of all figures not given that each would take away; the
         most helpful first.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -94,7 +94,7 @@ class GuessStudy:
     figures: dict[str, GuessedFigure]
     parameters: dict[str, GuessedNumber]
     next_figures: dict[str, float]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def figure_unit(key: str) -> str:
@@ -219,7 +219,7 @@ def _next_figures(found: GuessMembers, given: Mapping[str, GivenFigure]) -> dict
     return dict(sorted(gains.items(), key=lambda item: -item[1]))
 
 
-def _outside(figures: Mapping[str, GuessedFigure]) -> Iterator[str]:
+def _outside(figures: Mapping[str, GuessedFigure]) -> Iterator[Notice]:
     """Figures outside what nine of ten ships of these dimensions show, or the guess, by more than their errors."""
     for key, figure in figures.items():
         if figure.given is None or figure.standard_error is None:
@@ -234,26 +234,28 @@ def _outside(figures: Mapping[str, GuessedFigure]) -> Iterator[str]:
             if before.p5 <= value * factor <= before.p95
         ]
         yield (
-            f"{CHECK} {key} is {value:g} {unit}, and nine of ten ships of these dimensions and speed "
-            f"have {before.p5:.4g} to {before.p95:.4g} (the guess {after.p5:.4g} to {after.p95:.4g})"
-            f"{'; ' + ', '.join(units) if units else '; check it, the dimensions and the speed'}."
+            caution(
+                f"{key} is {value:g} {unit}, and nine of ten ships of these dimensions and speed "
+                f"have {before.p5:.4g} to {before.p95:.4g} (the guess {after.p5:.4g} to {after.p95:.4g})"
+                f"{'; ' + ', '.join(units) if units else '; check it, the dimensions and the speed'}."
+            )
         )
 
 
-def _notices(given: Sequence[GivenFigure], members: int, lost: int) -> Iterator[str]:
+def _notices(given: Sequence[GivenFigure], members: int, lost: int) -> Iterator[Notice]:
     """Limits of every guess, ships that were left out, and standard errors that were assumed."""
-    yield (
+    yield Notice(
         "a guess: the model (third order, cross-flow drag, rudder in the slipstream), deep and calm water, and "
         "figures of one loading are taken for granted"
     )
-    yield (
+    yield Notice(
         "rudder, surge and third-order terms have no published regression here: their prior is about what three "
         "ships have"
     )
     if lost:
-        yield f"{lost} of {members} ships of these dimensions do not come round and were left out"
+        yield Notice(f"{lost} of {members} ships of these dimensions do not come round and were left out")
     if any(figure.standard_error == default_error(figure.word, figure.value) for figure in given):
-        yield (
+        yield Notice(
             f"standard errors of figures given without: {100 * TRIAL_ERROR:g} % of distances, "
             f"{OVERSHOOT_ERROR_DEG:g} deg of overshoots"
         )

@@ -20,6 +20,7 @@ from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Columns
 from tank2sim.files import folder_made, write_together
+from tank2sim.notices import Notice
 from tank2sim.results.craft_identification import CraftIdentificationResult, craft_sections
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class LogResult(Result[LogStudy]):
         Coefficients of the craft from all trials, if its card was given.
     written : tuple of Path
         Files that were written.
-    remarks : tuple of str
+    remarks : tuple of Notice
         Sentences on files of an earlier run.
     """
 
@@ -76,7 +77,7 @@ class LogResult(Result[LogStudy]):
     trials: tuple[Any, ...] = ()
     craft: CraftIdentificationResult | None = None
     written: tuple[Path, ...] = ()
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Notice, ...] = ()
     command: ClassVar[str] = "log"
 
     @property
@@ -144,11 +145,11 @@ class LogResult(Result[LogStudy]):
         with folder_made(folder):
             write_together(files, inputs=[Path(log.file) for log in self.study.logs])
         removed = remove_earlier_trials(folder, files)
-        remarks = (f"removed trials that an earlier run cut: {', '.join(removed)}",) if removed else ()
+        remarks = (Notice(f"removed trials that an earlier run cut: {', '.join(removed)}"),) if removed else ()
         return replace(self, written=tuple(files), remarks=remarks)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Limits of the log, and files of an earlier run that were removed."""
         return (*self.study.notices, *self.remarks)
 

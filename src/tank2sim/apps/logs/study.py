@@ -18,6 +18,7 @@ from tank2sim.apps.logs.trial_files import TrialCut
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Columns, Number
 from tank2sim.identification.craft.study import CraftIdentificationStudy
+from tank2sim.notices import Notice, caution
 from tank2sim.records.thinning import thin_line
 
 VOYAGE_SAMPLES = 1500
@@ -129,7 +130,7 @@ class LogStudy:
     identified : CraftIdentificationStudy or None
         Coefficients of the craft, if its card was given.
     findings : tuple of LogFinding
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     logs: tuple[LogFile, ...]
@@ -142,7 +143,7 @@ class LogStudy:
     track: Columns | None
     time_line: dict[str, Columns]
     findings: tuple[LogFinding, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     identified: CraftIdentificationStudy | None = None
 
 
@@ -175,30 +176,32 @@ def study_log(voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[Trial
 
 def _notices(
     voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[TrialCut], current: DriftCurrent | None
-) -> tuple[str, ...]:
+) -> tuple[Notice, ...]:
     notices = list(voyage.notices)
     if not cuts:
         notices.append(_why_no_trial(voyage, stretches))
     elif not all(cut.steered for cut in cuts):
-        notices.append(NO_RUDDER_NOTICE)
+        notices.append(Notice(NO_RUDDER_NOTICE))
     if current:
         notices.append(
-            f"a current of {current.speed_mps:.2g} m/s towards {current.direction_deg:.0f} deg, by {current.by}: "
-            "give it to the card as the effect current, for positions and courses are over the ground"
+            Notice(
+                f"a current of {current.speed_mps:.2g} m/s towards {current.direction_deg:.0f} deg, by {current.by}: "
+                "give it to the card as the effect current, for positions and courses are over the ground"
+            )
         )
     return tuple(notices)
 
 
-def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> str:
+def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> Notice:
     series = voyage.series
     if not any(name in series for name in ("rudder_angle", "rudder_order", "thrust_order_port", "rpm_port")):
         unused = [channel for channel in voyage.channels.channels if "rudder" in channel.quantity]
         candidates = ", ".join(f"{channel.stream} ({QUANTITIES[channel.quantity].words})" for channel in unused)
         hint = f"; it may be {candidates}" if candidates else ""
-        return f"UNCONFIRMED: no rudder or thruster is known{hint}: name it in {CHANNELS_FILE}; no trial is cut"
+        return caution(f"no rudder or thruster is known{hint}: name it in {CHANNELS_FILE}; no trial is cut")
     if not any(stretch.kind.excites for stretch in stretches):
-        return "no stretch excites the vessel: no trial is cut"
-    return "the stretches are too short, or lack a heading and a position: no trial is cut"
+        return Notice("no stretch excites the vessel: no trial is cut")
+    return Notice("the stretches are too short, or lack a heading and a position: no trial is cut")
 
 
 def _channel(channel: LogChannel) -> ChannelStudy:

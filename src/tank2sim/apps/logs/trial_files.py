@@ -157,7 +157,7 @@ def _name(number: int, stretch: Stretch, steered: bool) -> str:
 
 def _remarks(voyage: Voyage, stretch: Stretch, first: float) -> list[str]:
     logs = ", ".join(log.path.name for log in voyage.logs)
-    remarks = [notice for notice in voyage.notices if notice.startswith("UNCONFIRMED")]
+    remarks: list[str] = [*voyage.faults]
     remarks.append(f"{stretch.kind}, {CUT_BY} from {logs}")
     if voyage.dated:
         remarks.append(f"begins: {utc_text(first)}")

@@ -19,7 +19,7 @@ from tank2sim.apps.logs.reference import HEADING_WINDOW_S, differenced, local_me
 from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, joined_parts
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.marks import UNCONFIRMED
+from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.sampling import GAP_STEPS
 
 _GAP_LEAST_S = 3.0
@@ -75,10 +75,15 @@ class Voyage:
         return all(log.dated for log in self.logs)
 
     @property
-    def notices(self) -> tuple[str, ...]:
-        """What the reader must know, faults first and marked."""
-        faults = [f"{UNCONFIRMED}: {finding.text}" for finding in self.findings if finding.kind == "fault"]
-        return (*faults, *(finding.text for finding in self.findings if finding.kind != "fault"))
+    def notices(self) -> tuple[Notice, ...]:
+        """Findings on the logs, faults first: somebody must confirm or correct these."""
+        others = [Notice(finding.text) for finding in self.findings if finding.kind != "fault"]
+        return (*self.faults, *others)
+
+    @property
+    def faults(self) -> list[Notice]:
+        """Cautions on channels and clocks that are not as they seem."""
+        return [caution(f"UNCONFIRMED: {finding.text}") for finding in self.findings if finding.kind == "fault"]
 
 
 def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -> Voyage:

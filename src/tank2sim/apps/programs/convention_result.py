@@ -11,6 +11,7 @@ from typing import ClassVar
 from tank2sim.answer.parts import Cell, KeyFigure, Section, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card
+from tank2sim.notices import Notice
 
 SURE_READING = 0.9
 """Probability from which the first reading is taken without a mark. Project choice; ``benchmarks/convention.py`` prints
@@ -95,7 +96,7 @@ class ConventionStudy:
     left_out: tuple[str, ...]
     scaled_with_nominal_speed: bool | None
     speed_scale: str | None
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,7 +141,7 @@ class ConventionResult(Result[ConventionStudy]):
         return tuple(lines)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Assumed sizes, doubts about the first reading, and what was not read."""
         study, first, found = self.study, self.readings[0], []
         if study.assumed:
@@ -161,7 +162,7 @@ class ConventionResult(Result[ConventionStudy]):
             found.append("the first two readings are one ship in practice: their figures differ by less than 5 %")
         if first.vanished:
             found.append(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits")
-        return tuple(found)
+        return tuple(map(Notice, found))
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

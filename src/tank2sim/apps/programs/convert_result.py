@@ -12,6 +12,7 @@ from tank2sim.answer.result import Result
 from tank2sim.apps.programs.languages import ConvertedText
 from tank2sim.cards import Card
 from tank2sim.files import write_together
+from tank2sim.notices import Notice
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class ConversionStudy:
         The language in words.
     fit : PolynomialRange or None
     figures : tuple of ConvertedFigure
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -62,7 +63,7 @@ class ConversionStudy:
     made: str
     fit: PolynomialRange | None
     figures: tuple[ConvertedFigure, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -31,6 +31,7 @@ from tank2sim.cards.card import MmgCard, manoeuvring_card
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError
+from tank2sim.notices import Notice
 
 _OF_CRAFT = ("small_craft", "gazebo", "vrx")
 _OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
@@ -46,7 +47,9 @@ class ConvertedText:
     changes: tuple[FigureChange, ...] = ()
 
 
-def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -> tuple[ConvertedText, tuple[str, ...]]:
+def converted(
+    card: Card, to: str, wanted: Conventions, scatter: float | None
+) -> tuple[ConvertedText, tuple[Notice, ...]]:
     """A card in another language, and notices.
 
     Parameters
@@ -76,18 +79,18 @@ def converted(card: Card, to: str, wanted: Conventions, scatter: float | None) -
     if to == "mmg" and not isinstance(given, MmgCard):
         problem = f"is {given.model.kind}: without thrust and rudder force its terms cannot be split into MMG's"
         raise given.fault("model.kind", problem, "convert an MMG card to abkowitz, not the other way")
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     if wanted.origin_m:
         notices = (
-            "U of the new origin scales the numbers now: a difference of second order in the distance and r'",
-            "figures, positions and speeds of the new card are those of its own origin",
+            Notice("U of the new origin scales the numbers now: a difference of second order in the distance and r'"),
+            Notice("figures, positions and speeds of the new card are those of its own origin"),
         )
     if to == "abkowitz" and isinstance(given, MmgCard):
         return _fitted(given, wanted, SCATTER if scatter is None else scatter, notices)
     if to == "abkowitz" and given.model.kind == "linear":
         changed = parse_card(changed_text(given.text, given.source, {"model.kind": "abkowitz"}), given.source)
         assert isinstance(changed, ManoeuvringCard)
-        given, notices = changed, (*notices, "third-order terms that the card does not have are zero")
+        given, notices = changed, (*notices, Notice("third-order terms that the card does not have are zero"))
     made = in_conventions(given, wanted)
     build(made)
     return ConvertedText(made.text, made), notices
@@ -100,7 +103,7 @@ def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     return manoeuvring_card(card)
 
 
-def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[str, ...]]:
+def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
         raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")
@@ -127,12 +130,12 @@ def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedT
         also = f", and {', '.join(lost)}" if lost else ""
         notices.append(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}")
     changes = craft_changes(card, model(card))
-    return ConvertedText(text(card), changes=changes), tuple(notices)
+    return ConvertedText(text(card), changes=changes), tuple(map(Notice, notices))
 
 
 def _fitted(
-    card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[str, ...]
-) -> tuple[ConvertedText, tuple[str, ...]]:
+    card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[Notice, ...]
+) -> tuple[ConvertedText, tuple[Notice, ...]]:
     bare = build(card)
     model = build(replace(card, effects=())) if card.effects else bare
     fit = fit_polynomial(card, model, scattered_motions(model, manoeuvre_motions(model), scatter))
@@ -141,22 +144,24 @@ def _fitted(
     made = in_conventions(polynomial, wanted)
     if fit.covariance is not None:
         carried = "standard errors are those of the MMG card's numbers, carried through the fit with their covariance"
-        notices = (*notices, f"{carried}; what the fit itself misses is in the table alone")
+        notices = (*notices, Notice(f"{carried}; what the fit itself misses is in the table alone"))
     return ConvertedText(made.text, made, fit, changes), notices
 
 
-def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[str, ...]]:
+def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to in _OF_MMG:
         if not isinstance(card, MmgCard):
             raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
         notices = [
-            f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
-            "more tightly than the card"
+            (
+                f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
+                "more tightly than the card"
+            )
         ]
         if card.effects:
             notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
         if card.ship.beam_m is None:
             notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
-        return ConvertedText(_OF_MMG[to](card)), tuple(notices)
+        return ConvertedText(_OF_MMG[to](card)), tuple(map(Notice, notices))
     write = mss_function if to == "mss" else pvs_class
     return ConvertedText(write(card, build(card))), ()

@@ -19,6 +19,7 @@ from tank2sim.apps.signals.charts import (
     transfer_chart,
 )
 from tank2sim.apps.signals.study import FilterStudy, SignalsStudy, SignalStudy, Steering, TrialSignals
+from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.statistics import Stationary
 from tank2sim.units import to_si
@@ -130,13 +131,13 @@ class SignalsResult(Result[SignalsStudy]):
         )
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Changes made to the signals, and limits of their analysis."""
-        notices = []
+        notices: list[Notice] = []
         for label, trial in zip(self._labels, self.study.trials, strict=True):
-            prefix = f"{label}: " if len(self.study.trials) > 1 else ""
             steering = trial.rudder_to_yaw_rate.notices if trial.rudder_to_yaw_rate else ()
-            notices += [prefix + notice for notice in (*trial.notices, *steering)]
+            said = (*trial.notices, *steering)
+            notices += [notice.of(label) for notice in said] if len(self.study.trials) > 1 else said
         return tuple(notices)
 
     @property

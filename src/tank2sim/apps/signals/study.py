@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.arrays import Columns, Number
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, SignalName, file_columns, find_signal
 from tank2sim.records.signals.correlation import Autocorrelation, Correlation, autocorrelation, cross_correlation
 from tank2sim.records.signals.effect import Filtered, FilterEffect
@@ -77,13 +78,13 @@ class Steering:
     cross_correlation : Correlation
     transfer : Transfer
         Yaw rate over rudder angle, 1/s.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     rudder: str
     cross_correlation: Correlation
     transfer: Transfer
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,7 +99,7 @@ class TrialSignals:
         Signals by their columns in the trial format.
     rudder_to_yaw_rate : Steering or None
         None where one of both is missing or does not move.
-    notices : tuple of str
+    notices : tuple of Notice
     histories : dict
         The signals over time, thinned to draw.
     """
@@ -106,7 +107,7 @@ class TrialSignals:
     trial: str
     columns: dict[str, SignalStudy]
     rudder_to_yaw_rate: Steering | None
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     histories: Columns
 
 
@@ -172,7 +173,7 @@ def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
             try:
                 series[name] = even_series(trial, name, settings.max_gap_s)
             except InputError as error:
-                notices.append(f"{SignalName(name).file} is left out: it {error.problem}; {error.remedy}")
+                notices.append(Notice(f"{SignalName(name).file} is left out: it {error.problem}; {error.remedy}"))
         if not series:
             raise InputError(trial.path, "", "no signal of it can be analysed", notices[-1])
     notices += [notice for item in series.values() for notice in item.notices]
@@ -248,7 +249,7 @@ def _steering(series: dict[str, Series], segment_s: float | None) -> Steering | 
     )
 
 
-def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tuple[str, ...]:
+def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tuple[Notice, ...]:
     messages = []
     segment = transfer.averaging.samples_in_segment * step_s
     lag = correlation.lag_of_largest_s
@@ -259,4 +260,4 @@ def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tu
         )
     if not np.any(transfer.sure):
         messages.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
-    return tuple(messages)
+    return tuple(map(Notice, messages))

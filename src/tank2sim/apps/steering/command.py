@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tank2sim.api.verbs import Progress, verb
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,7 +105,7 @@ def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, library: str, **
 
 
 def _result(
-    ship: PageShip, ghost: Ghost | None, notices: Sequence[str], scenario: Scenario | None, view_3d: bool
+    ship: PageShip, ghost: Ghost | None, notices: Sequence[Notice], scenario: Scenario | None, view_3d: bool
 ) -> SteeringPageResult:
     from tank2sim.apps.steering.page import steering_page
     from tank2sim.apps.steering.result import SteeringPageResult, SteeringStudy
@@ -137,7 +138,7 @@ def _compiled(model: Model, report: Progress) -> str:
     return page_ship.ship_in_page(model)
 
 
-def _with_autopilot(model: Model) -> tuple[Model, str, tuple[str, ...]]:
+def _with_autopilot(model: Model) -> tuple[Model, str, tuple[Notice, ...]]:
     """The model with the autopilot of the command ``autopilot`` (PID), how it was designed, and a notice without it."""
     from tank2sim.analysis.heading.designs import design_heading
     from tank2sim.dynamics.autopilot_loop import ship_steered_by_either
@@ -145,6 +146,6 @@ def _with_autopilot(model: Model) -> tuple[Model, str, tuple[str, ...]]:
     try:
         design = design_heading(model)
     except InputError as error:
-        return model, "", (f"no autopilot: {error.problem}",)
+        return model, "", (Notice(f"no autopilot: {error.problem}"),)
     gains = ", ".join(f"{name} {value:.3g}" for name, value in design.gains.items())
     return ship_steered_by_either(model, design.autopilot), f"{design.source}: {gains}", ()

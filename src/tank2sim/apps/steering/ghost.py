@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.units import KNOT_MPS
 
@@ -40,7 +41,7 @@ class Ghost:
     by_angle: bool
     start: Mapping[str, float]
     held: Mapping[str, float]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def ghost_of(trial: Trial, model: Model) -> Ghost:
@@ -82,7 +83,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
         by_angle=by_angle,
         start={name: value for name, value in start.items() if name in model},
         held=held,
-        notices=tuple(f"{trial.path.name}: {text}" for text in (*speed_notices, *wind)),
+        notices=tuple(Notice(f"{trial.path.name}: {text}") for text in (*speed_notices, *wind)),
     )
 
 

@@ -31,6 +31,7 @@ from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.escaping import json_in_html
 from tank2sim.fmu.interface import interface
+from tank2sim.notices import Notice
 from tank2sim.version import __version__
 
 LONGEST_ZIGZAG = 150.0
@@ -132,7 +133,7 @@ class PageShip:
 def steering_page(
     ship: PageShip,
     ghost: Ghost | None = None,
-    notices: Sequence[str] = (),
+    notices: Sequence[Notice] = (),
     scenario: Scenario | None = None,
     view_3d: bool = False,
 ) -> str:
@@ -143,7 +144,7 @@ def steering_page(
     ship : PageShip
     ghost : Ghost, optional
         A measured trial.
-    notices : sequence of str
+    notices : sequence of Notice
         What the user should know.
     scenario : Scenario, optional
         Waters to steer in.

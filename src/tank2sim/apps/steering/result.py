@@ -9,6 +9,7 @@ from typing import ClassVar
 from tank2sim.answer.parts import Cell, Section, quantities
 from tank2sim.answer.result import Result
 from tank2sim.apps.steering.members import NO_COVARIANCE
+from tank2sim.notices import Notice
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +29,7 @@ class SteeringStudy:
     scenario : str or None
         Waters to steer in.
     page_kB : float
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -38,7 +39,7 @@ class SteeringStudy:
     autopilot: str | None
     scenario: str | None
     page_kB: float
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

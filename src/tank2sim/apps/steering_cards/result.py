@@ -15,6 +15,7 @@ from tank2sim.apps.steering_cards.charts import influence_bars, steering_diagram
 from tank2sim.apps.steering_cards.comparison import SteeringComparison
 from tank2sim.apps.steering_cards.tuning_result import TUNING_TEXT, stability_change, turn_table
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointTuning
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,10 +59,10 @@ class SteeringModelsResult(Result[SteeringComparison]):
         return "Steering models compared by their turns and their influence coefficients"
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Missing data of each model."""
         titles, missing = self.study.titles, self.study.missing
-        return tuple(f"{titles[name]}: {text}" for name, texts in missing.items() for text in texts)
+        return tuple(Notice(f"{titles[name]}: {text}") for name, texts in missing.items() for text in texts)
 
     @property
     def turns(self) -> pd.DataFrame:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tank2sim.api.verbs import Output, verb
 from tank2sim.errors import ArgumentError
 from tank2sim.files import CARD
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
@@ -66,7 +67,7 @@ def tune_ship_through(ship: Vessel, points: Sequence[str]) -> TurnTuningResult:
 
 def _scaled_card(
     card: ManoeuvringCard, tuning: TwoPointTuning, points: tuple[str, str]
-) -> tuple[Card, tuple[str, ...]]:
+) -> tuple[Card, tuple[Notice, ...]]:
     """The card with the scaled derivatives, whose relative standard errors stay, and notices."""
     from tank2sim.cards.card import MmgCard
     from tank2sim.cards.covariance_reading import derived_card

@@ -36,6 +36,7 @@ from tank2sim.cards.terms import parse_term
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.steering_models import SteeringForm
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 
 LARGEST_FACTOR = 5.0
 """Largest factor, and inverse of the least, of a hull or rudder that is still the card's ship. Project choice."""
@@ -164,7 +165,7 @@ class TwoPointStudy(TwoPointTuning):
 
     ship: str
     points: tuple[str, str]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: WantedTurn) -> TwoPointTuning:

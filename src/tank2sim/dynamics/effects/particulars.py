@@ -9,6 +9,7 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model
+from tank2sim.notices import Notice
 
 BEAMS_IN_LENGTH = 7.0
 BEAMS_IN_DRAUGHT = 0.4
@@ -49,12 +50,6 @@ _ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] 
     "beam_m": ("beam", "m", "L/7", _beam),
     "draught_m": ("draught", "m", "0.4 of the beam", _draught),
     "block_coefficient": ("block coefficient", "", "from mass, length, beam and draught", _block),
-    "propeller_diameter_m": (
-        "propeller diameter",
-        "m",
-        f"{DIAMETER_IN_DRAUGHTS:g} of the draught",
-        lambda card: DIAMETER_IN_DRAUGHTS * model_particular(card, "draught_m"),
-    ),
     "projected_area_front_m2": (
         "area above the water seen from ahead",
         "m2",
@@ -67,7 +62,17 @@ _ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] 
         f"{SIDE_IN_LENGTHS:g} of the length squared",
         lambda card: SIDE_IN_LENGTHS * card.ship.length_m**2,
     ),
+    "propeller_diameter_m": (
+        "propeller diameter",
+        "m",
+        f"{DIAMETER_IN_DRAUGHTS:g} of the draught",
+        lambda card: DIAMETER_IN_DRAUGHTS * model_particular(card, "draught_m"),
+    ),
 }
+
+
+ESTIMABLE = tuple(_ESTIMATES)
+"""Particulars that :func:`model_particular` can estimate."""
 
 
 def model_particular(card: ManoeuvringCard, key: str) -> float:
@@ -77,8 +82,7 @@ def model_particular(card: ManoeuvringCard, key: str) -> float:
     ----------
     card : ManoeuvringCard
     key : str
-        ``beam_m``, ``draught_m``, ``block_coefficient``, ``propeller_diameter_m``, ``projected_area_front_m2`` or
-        ``projected_area_side_m2``.
+        One of :data:`ESTIMABLE`.
     """
     value = getattr(card.ship, key)
     return float(_ESTIMATES[key][-1](card) if value is None else value)
@@ -87,6 +91,13 @@ def model_particular(card: ManoeuvringCard, key: str) -> float:
 def estimated_from(key: str) -> str:
     """In a few words, what :func:`model_particular` takes for a number that the card does not state."""
     return f"{_ESTIMATES[key][2]}, typical"
+
+
+def estimate_notice(card: ManoeuvringCard, key: str) -> Notice:
+    """The notice of an effect that takes an estimate for a number that the card does not state."""
+    name, unit, *_ = _ESTIMATES[key]
+    taken = f"the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
+    return Notice(f"the card states no {key}: {taken} ({estimated_from(key)})")
 
 
 def volume_exponent(block: float) -> float:
@@ -124,11 +135,6 @@ def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[M
     Draught, block coefficient and areas above the water are expressions of ``ship.draught``, where the model has it.
     """
     for key in keys:
-        name, unit, *_ = _ESTIMATES[key]
-        if getattr(card.ship, key) is not None:
-            continue
-        missing = f"the card states no {key}: the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
-        notice = f"{missing} ({estimated_from(key)})"
-        if notice not in model.notices:
+        if getattr(card.ship, key) is None and (notice := estimate_notice(card, key)) not in model.notices:
             model = model.extend(notices=[notice])
     return model, tuple(_at_draught(model, card, key) for key in keys)

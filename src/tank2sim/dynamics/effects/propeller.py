@@ -13,6 +13,7 @@ from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.effects.particulars import with_particulars
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.dynamics.propulsion import propeller_force
+from tank2sim.notices import Notice
 
 
 def _side_force(Y: float, N: float) -> tuple[EffectParameter, EffectParameter]:
@@ -156,7 +157,7 @@ def _with_droop(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
     if "propeller.speed_actual" in model:
         return model.redefine("propeller.speed_actual", lambda order: order * (1 - given["droop"] * loss))
-    text = f"the card states no propulsion: engine_droop takes Xnn = {RESISTANCE:g}, a typical resistance at u0"
+    text = Notice(f"the card states no propulsion: engine_droop takes Xnn = {RESISTANCE:g}, a typical resistance at u0")
     lost = propeller_force(1 - given["droop"] * loss, ca.SX(1), ca.SX(RESISTANCE))
     thrust = scales(model, model.symbol("ship.speed")).force * lost
     return with_forces(model.extend(notices=[text]), X=thrust)

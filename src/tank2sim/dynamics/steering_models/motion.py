@@ -10,6 +10,7 @@ from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.dynamics.steering_gear import steering_gear
 from tank2sim.dynamics.steering_models.form import SteeringForm
+from tank2sim.notices import Notice
 
 _STEPS_PER_LENGTH = 200
 """Integration steps while the ship covers its own length, as of the other ships."""
@@ -65,7 +66,7 @@ def steering_model(
         quantities=(),
         outputs=(),
         step_s=length_m / speed_mps / _STEPS_PER_LENGTH,
-        notices=(*notices, "the speed of a steering model does not fall in a turn"),
+        notices=(*notices, Notice("the speed of a steering model does not fall in a turn")),
     )
     return empty.extend(*position, *motion, *gear, *constants, outputs=_OUTPUTS)
 

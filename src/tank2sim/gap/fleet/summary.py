@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from tank2sim.gap.outcome.study import EffectFound, GapStudy, MisfitBySet
+from tank2sim.notices import Notice
 
 REPORT_FILE = "report.html"
 """Page of a ship, next to its ``gap.json``."""
@@ -86,16 +87,16 @@ class FleetStudy:
         Verdict to the number of ships that have it.
     ships : tuple of ShipSummary
         In the order of their folders' names, those with a fault among them.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     fleet: str
     verdicts: dict[str, int]
     ships: tuple[ShipSummary, ...]
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
 
-def fleet_study(fleet: str, ships: Iterable[ShipSummary], notices: Iterable[str] = ()) -> FleetStudy:
+def fleet_study(fleet: str, ships: Iterable[ShipSummary], notices: Iterable[Notice] = ()) -> FleetStudy:
     """Return the study of a fleet.
 
     Parameters
@@ -104,7 +105,7 @@ def fleet_study(fleet: str, ships: Iterable[ShipSummary], notices: Iterable[str]
         Name of the folder.
     ships : iterable of ShipSummary
         In any order.
-    notices : iterable of str
+    notices : iterable of Notice
     """
     ordered = tuple(sorted(ships, key=lambda ship: ship.folder))
     words = [ship.verdict for ship in ordered if not ship.fault]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.result import AMBIGUOUS, Gap, Named, Passed, Refitted
+from tank2sim.notices import Notice
 
 
 def combine_passes(first: Gap, further: Gap) -> Gap:
@@ -79,16 +80,18 @@ def without_effect(smaller: Gap, both: Gap, dropped: str) -> Gap:
         rivals=both.rivals,
         could_hide=both.could_hide,
         missing_force=both.missing_force,
-        notices=tuple(dict.fromkeys((*smaller.notices, notice))),
+        notices=tuple(dict.fromkeys((*smaller.notices, Notice(notice)))),
     )
 
 
-def _of_names(first: Gap, further: Gap) -> list[str]:
+def _of_names(first: Gap, further: Gap) -> list[Notice]:
     names = (" and ".join(effect.name for effect in gap.effects) for gap in (first, further))
     before, after = names
     return [
-        f"{after}: found on the card improved by {before}, which left more than noise; explanations were compared next "
-        f"to {before}, whose probability is that of the first search"
+        Notice(
+            f"{after}: found on the card improved by {before}, which left more than noise; explanations were compared "
+            f"next to {before}, whose probability is from the first search"
+        )
     ]
 
 

@@ -15,6 +15,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.sensors import correct_reading as without_fault
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.outcome.improve_card import Found, in_short
+from tank2sim.notices import Notice, caution
 from tank2sim.records.audit import repair_trial
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.reading import read_trial_file, reader_of
@@ -22,9 +23,6 @@ from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trial_csv import TRIAL_CSV
 from tank2sim.records.trials import RUDDERS, Trial
 from tank2sim.units import from_si
-
-REMAINING_FAULTS = "left as it is"
-"""First words of the notice of a fault that cannot be corrected in a trial."""
 
 DIGITS_OF_A_CORRECTION = 2
 """Significant digits of the correction in a corrected column, at least (project choice); other columns stay
@@ -49,9 +47,9 @@ def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
         try:
             signals = without_fault(trial.time_s, signals, EFFECTS[name], values)
         except ValueError as error:
-            messages.append(f"{REMAINING_FAULTS}: {error}")
+            messages.append(caution(f"left as it is: {error}"))
         else:
-            messages.append(f"corrected for {name}")
+            messages.append(Notice(f"corrected for {name}"))
     return replace(trial, signals=signals, notices=(*trial.notices, *messages))
 
 

@@ -32,6 +32,7 @@ from tank2sim.gap.outcome.study import (
 )
 from tank2sim.gap.proof.cross_check import proof_cautions
 from tank2sim.gap.result import NO_EFFECT_MISSING, Acting, Gap, MisfitPlace, Named, NextTest, Passed
+from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import Indices, drawn_columns, thin_points
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
@@ -67,7 +68,6 @@ def gap_study(gap: Gap, files: Mapping[str, str] | None = None) -> GapStudy:
     """
     names = {replay.name: (files or {}).get(replay.name, f"{replay.name}.csv") for replay in gap.passed}
     held_out = {replay.name for replay in gap.passed if replay.held_out}
-    cautions = (*proof_cautions(gap), *hidden_effects_caution(gap))
     return GapStudy(
         ship=gap.card.ship.name,
         verdict=gap.verdict,
@@ -91,8 +91,7 @@ def gap_study(gap: Gap, files: Mapping[str, str] | None = None) -> GapStudy:
         missing_force=lacking_study(missing_force_intervals(gap), names),
         missing_signal=lacking_study(contradiction(gap), names),
         replays=tuple(_replay(replay, names[replay.name]) for replay in gap.passed),
-        cautions=cautions,
-        notices=(*cautions, *gap.notices),
+        notices=(*proof_cautions(gap), *hidden_effects_caution(gap), *gap.notices),
     )
 
 
@@ -341,7 +340,7 @@ def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
-def hidden_effects_caution(gap: Gap) -> tuple[str, ...]:
+def hidden_effects_caution(gap: Gap) -> tuple[Notice, ...]:
     """Number of effects that would not show at their usual size, if none is missing and these are many; else empty."""
     if gap.verdict != NO_EFFECT_MISSING:
         return ()
@@ -350,7 +349,7 @@ def hidden_effects_caution(gap: Gap) -> tuple[str, ...]:
     ]
     if not known or sum(known) <= MANY_HIDDEN * len(known):
         return ()
-    return (f"{sum(known)} of {len(known)} effects would not show in these data at their usual size",)
+    return (caution(f"{sum(known)} of {len(known)} effects would not show in these data at their usual size"),)
 
 
 def _is_hidden(card: ManoeuvringCard, name: str, sizes: Mapping[str, float]) -> bool | None:

@@ -12,6 +12,7 @@ from tank2sim.errors import InputError
 from tank2sim.files import folder_made, write_together
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE
+from tank2sim.notices import Notice
 
 REPORT = "report.html"
 
@@ -48,7 +49,7 @@ def refuse_early(folder: Path, inputs: Sequence[Path]) -> None:
                 raise InputError(folder / name, "", f"is an input ({path}), which would be overwritten", remedy)
 
 
-def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path]) -> list[str]:
+def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path]) -> list[Notice]:
     """Write all files or none; return messages about files of an earlier run that this run does not replace.
 
     Parameters
@@ -82,7 +83,7 @@ def _of_earlier_run(folder: Path) -> set[Path]:
     return trials | {folder / name for name in SOMETIMES if PurePosixPath(name) in paths}
 
 
-def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
+def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[Notice]:
     """Remove files of an earlier run that this run does not replace; return messages, also about unknown files."""
     messages = []
     trials = [path for name in FOLDERS for path in sorted((folder / name).glob("*.csv"))]
@@ -90,14 +91,14 @@ def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
         if path in kept or not path.exists():
             continue
         if path not in earlier or path.resolve() in kept:
-            messages.append(f"{path} is not of this run, and was left")
+            messages.append(Notice(f"{path} is not of this run, and was left"))
             continue
         try:
             path.unlink()
         except OSError:
-            messages.append(f"{path} is of an earlier run, and could not be removed")
+            messages.append(Notice(f"{path} is of an earlier run, and could not be removed"))
         else:
-            messages.append(f"{path} was of an earlier run, and was removed")
+            messages.append(Notice(f"{path} was of an earlier run, and was removed"))
     for name in FOLDERS:
         with contextlib.suppress(OSError):  # not there, or not empty
             (folder / name).rmdir()

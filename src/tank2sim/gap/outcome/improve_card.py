@@ -20,7 +20,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS, EffectParameter
-from tank2sim.dynamics.effects.particulars import model_particular
+from tank2sim.dynamics.effects.particulars import ESTIMABLE, estimate_notice, estimated_from, model_particular
 from tank2sim.dynamics.model import Model, Quantity
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
@@ -267,11 +267,10 @@ def _with_particulars(card: ManoeuvringCard, name: str, values: Mapping[str, flo
     model = build(card)
     notices = [notice for notice in EFFECTS[name].apply(model, values, card).notices if notice not in model.notices]
     changes: dict[str, Change] = {}
-    for key in type(card.ship).model_fields:
-        for notice in notices:
-            if notice.startswith(f"the card states no {key}: "):
-                value = float(f"{model_particular(card, key):.{_DIGITS}g}")
-                changes[f"ship.{key}"] = value, f"estimated for {name}: {notice.rpartition('(')[2].rstrip(')')}"
+    for key in ESTIMABLE:
+        if estimate_notice(card, key) in notices:
+            value = float(f"{model_particular(card, key):.{_DIGITS}g}")
+            changes[f"ship.{key}"] = value, f"estimated for {name}: {estimated_from(key)}"
     return _changed(card, changes) if changes else card
 
 

@@ -16,6 +16,7 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY, misfit_of
 from tank2sim.gap.search.model_choice import Strange
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.structures import structure_that_adds
+from tank2sim.notices import Notice
 
 SHOWN = 5
 """Names of effects in a notice at most (project choice)."""
@@ -30,7 +31,7 @@ def gap_notices(
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
     waves: WaveBand | None,
-) -> tuple[str, ...]:
+) -> tuple[Notice, ...]:
     """What a user should know besides the verdict, one sentence each.
 
     Parameters
@@ -49,56 +50,67 @@ def gap_notices(
     named = {name for name, *_ in proof.named.estimated}
     fitted_to_held = tuple(proof.named.by_trial) if trials[1].trials else ()
     notices = [*trials[0].notices, *trials[1].notices, *_partly_measured(trials[0])]
-    notices += [_of_waves(waves)] if waves else []
-    notices += [judged.by_simulation] if judged.by_simulation else []
-    notices += [_in_words(strange) for strange in decision.strange]
+    notices += [Notice(_of_waves(waves))] if waves else []
+    notices += [Notice(judged.by_simulation)] if judged.by_simulation else []
+    notices += [Notice(_in_words(strange)) for strange in decision.strange]
     notices += [
-        f"{names}: fits best from instant to instant, but simulations with it are not closer than without: not named"
+        Notice(
+            f"{names}: fits best from instant to instant, but simulations with it are no closer than without: not named"
+        )
         for names in withheld
     ]
     if fitted_to_held:
         notices.append(
-            f"{' and '.join(fitted_to_held)} of the trials held out: fitted to each of them, two numbers to a "
-            "record; all else is as the fitting trials have it"
+            Notice(
+                f"{' and '.join(fitted_to_held)} of the trials held out: fitted to each of them, two numbers to a "
+                "record; all else is as the fitting trials have it"
+            )
         )
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
-        notices.append(f"{have}: kept as on the card, and not sought")
+        notices.append(Notice(f"{have}: kept as on the card, and not sought"))
     remaining = misfit_of(proof.results, "after")
     if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
         notices.append(
-            f"all trials together are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
-            "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+            Notice(
+                f"all trials together are still missed by {remaining:.3g} times the noise: gusts, waves, "
+                "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+            )
         )
         if structure := structure_that_adds(card, decision.best.hypothesis.effects):
             notices.append(
-                f"identify with structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
-                "trials together with the hull's derivatives, from the card as it was given"
+                Notice(
+                    f"identify with structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
+                    "trials together with the hull's derivatives, from the card as it was given"
+                )
             )
     notices += [
-        f"{name}: the same to these trials as {coefficient.name}, which was refitted by {coefficient.moved:.2g} of its "
-        "standard errors"
+        Notice(
+            f"{name}: these trials cannot distinguish it from an error of {coefficient.name}, now "
+            f"{coefficient.moved:.2g} standard errors off"
+        )
         for name, coefficient in effects_like(proof.coefficients, named).items()
     ]
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [
-            f"{name}: the improved card follows it worse than the given one" for name in worse_trials(proof.results)
+            Notice(f"{name}: the improved card follows it worse than the given one")
+            for name in worse_trials(proof.results)
         ]
     for variable, values in agreement.items():
         if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
-            notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
+            notices.append(Notice(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})"))
     return tuple(dict.fromkeys(notices))
 
 
-def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[str, ...]:
+def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[Notice, ...]:
     """That not all effects were tried which the card and the trials allow; empty if all were."""
     if set(possible) <= set(tried):
         return ()
     shown = ", ".join(tried) if len(tried) <= SHOWN else f"{len(tried)}"
-    return (f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing",)
+    return (Notice(f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing"),)
 
 
-def _partly_measured(fitted: Measured) -> list[str]:
+def _partly_measured(fitted: Measured) -> list[Notice]:
     """Notices of winds and currents that some of the fitted trials recorded, and not all."""
     notices = []
     for name, effect in EFFECTS.items():
@@ -106,9 +118,10 @@ def _partly_measured(fitted: Measured) -> list[str]:
         having = [trial.name for trial in fitted.trials if signals and signals <= set(trial.signals)]
         if 0 < len(having) < len(fitted.trials):
             notices.append(
-                f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}), and is "
-                "not used: it is estimated in each trial where it is tried; give its columns in all trials, or give "
-                "those alone that have them"
+                Notice(
+                    f"{name} was measured in {len(having)} of {len(fitted.trials)} trials ({', '.join(having)}). It is "
+                    "not used, but estimated in each trial: give its columns in all trials, or only trials with them"
+                )
             )
     return notices
 

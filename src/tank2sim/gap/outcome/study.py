@@ -12,6 +12,7 @@ from pydantic import Field
 from tank2sim.arrays import Columns, Number, Unbounded
 from tank2sim.gap.result import MisfitPlace, Refitted, Rival
 from tank2sim.identification.trials.study import TrialMotions
+from tank2sim.notices import Notice
 
 STATE_COLUMNS = {
     "rudder": "rudder_deg",
@@ -285,9 +286,8 @@ class GapStudy:
     missing_force, missing_signal : Lacking or None
     replays : tuple of GapReplay
         In the order of `trials`.
-    cautions : tuple of str
         Objections to the verdict.
-    notices : tuple of str
+    notices : tuple of Notice
         The cautions, then messages about the trials.
     files : tuple of str
         Files written next to ``gap.json``.
@@ -312,8 +312,7 @@ class GapStudy:
     missing_force: Lacking | None
     missing_signal: Lacking | None
     replays: tuple[GapReplay, ...]
-    cautions: tuple[str, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     files: tuple[str, ...] = ()
 
     def set_misfit(self, version: str, *, held_out: bool, signal: str | None = None) -> float | None:

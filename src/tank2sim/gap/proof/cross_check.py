@@ -15,6 +15,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, downhill, input_record
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 _LINEAR = ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd", "Xu")
@@ -232,7 +233,7 @@ NEAR_A_BOUND = 1e-4
 """Share of the range of a parameter within which it lies at a bound (project choice: a search ends there exactly)."""
 
 
-def proof_cautions(gap: Gap) -> tuple[str, ...]:
+def proof_cautions(gap: Gap) -> tuple[Notice, ...]:
     """Objections to a verdict: coefficients further off than their errors allow, sizes at the bound of what is
     possible, the remaining share of the gap, and a mere refit that follows better.
 
@@ -242,18 +243,20 @@ def proof_cautions(gap: Gap) -> tuple[str, ...]:
     return (*_impossible_coefficients(gap), *_impossible_sizes(gap), *_cautions_of_name(gap))
 
 
-def _impossible_coefficients(gap: Gap) -> tuple[str, ...]:
+def _impossible_coefficients(gap: Gap) -> tuple[Notice, ...]:
     farthest = max(gap.coefficients, key=lambda coefficient: coefficient.moved, default=None)
     if farthest is None or farthest.moved < IMPOSSIBLE:
         return ()
     return (
-        f"{farthest.name} is {farthest.moved:.0f} of its standard errors from the given card: the card may be of "
-        "another ship or loading, have a number or sign in another unit or convention, or state errors that are too "
-        "small; what is named may be due to that",
+        caution(
+            f"{farthest.name} is {farthest.moved:.0f} of its standard errors from the given card: the card may be of "
+            "another ship or loading, have a number or sign in another unit or convention, or state too small errors; "
+            "what is named may be due to that"
+        ),
     )
 
 
-def _impossible_sizes(gap: Gap) -> tuple[str, ...]:
+def _impossible_sizes(gap: Gap) -> tuple[Notice, ...]:
     """Amplitudes at a bound of their parameter."""
     found = []
     for effect in gap.effects:
@@ -264,26 +267,29 @@ def _impossible_sizes(gap: Gap) -> tuple[str, ...]:
                 continue
             if min(abs(value - bound) for bound in bounds) < NEAR_A_BOUND * (bounds[1] - bounds[0]):
                 found.append(
-                    f"{parameter.name} of {effect.name} lies at the bound of what is possible: the card may be of "
-                    "another ship or have numbers in other units"
+                    caution(
+                        f"{parameter.name} of {effect.name} lies at the bound of what is possible: the card may be of "
+                        "another ship or have numbers in other units"
+                    )
                 )
     return tuple(found)
 
 
-def _cautions_of_name(gap: Gap) -> tuple[str, ...]:
+def _cautions_of_name(gap: Gap) -> tuple[Notice, ...]:
     held = any(replay.held_out for replay in gap.passed)
     before, after, box = (gap.misfit(version, held_out=held) for version in ("before", "after", "black_box"))
     if gap.verdict not in (MISSING, AMBIGUOUS) or not gap.effects or before is None or after is None:
         return ()
     group, notices = f"the {'held-out' if held else 'fitting'} trials", []
     if round(after, 6) > REMAINS:
-        notices.append(
-            _what_remains(before, after, group, "named, but" if gap.verdict == MISSING else "with the best of them")
-        )
+        begin = "named, but" if gap.verdict == MISSING else "with the best of them"
+        notices.append(caution(_what_remains(before, after, group, begin)))
     if box is not None and box < (1 - _BETTER) * after:
         notices.append(
-            f"a linear black box with as many coefficients follows {group} better (misfit {box:.3g} against "
-            f"{after:.3g}): the name explains less than a mere refit does"
+            caution(
+                f"a linear black box with as many coefficients follows {group} better (misfit {box:.3g} against "
+                f"{after:.3g}): the name explains less than a mere refit does"
+            )
         )
     return tuple(notices)
 

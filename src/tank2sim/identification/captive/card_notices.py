@@ -6,6 +6,7 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.captive.reduction import Reduction
 from tank2sim.identification.captive.result_card import FILLS, Contents, reynolds_ratio
 from tank2sim.identification.captive.study import terms_of_heel
+from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign
 
 
@@ -26,18 +27,20 @@ def length_ratio(campaign: Campaign, given: float | str | None) -> float | None:
     return ratio
 
 
-def heel_notices(reduction: Reduction) -> list[str]:
+def heel_notices(reduction: Reduction) -> list[Notice]:
     """Notices on terms of heel that the card does not take."""
     names = terms_of_heel(reduction)
     if not names:
         return []
     return [
-        f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with [roll], "
-        "a metacentric height and terms of K takes them."
+        Notice(
+            f"Found and not on the card, which does not roll: {', '.join(names)} (prime, heel in rad). A card with "
+            "[roll], a metacentric height and terms of K takes them."
+        )
     ]
 
 
-def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[str]:
+def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[Notice]:
     """Notices on what the card has from estimates, lacks, and takes from another size.
 
     Parameters
@@ -69,4 +72,4 @@ def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign
             f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
             f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
         )
-    return notices
+    return [Notice(text) for text in notices]

@@ -17,7 +17,7 @@ from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
 from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.campaigns import FORCE_COLUMNS
 
 _SHEET = 0.05
@@ -31,11 +31,11 @@ _DRIFTS_ENOUGH, _SURE = 4, 4.0
 """Runs, and standard errors of their mean drift, from which a common drift is not chance (project choice)."""
 
 
-def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
+def reduction_findings(reduction: Reduction) -> tuple[Notice, ...]:
     """All findings of a reduction, the gravest first."""
     found = [
         *implausible(reduction),
-        *(f"left out because of a fault: {fault}" for fault in reduction.faults),
+        *(Notice(f"left out because of a fault: {fault}") for fault in reduction.faults),
         *_omitted_runs(reduction),
         *reduction.campaign.remarks,
         *_missing(reduction),
@@ -52,18 +52,18 @@ def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
     return tuple(found)
 
 
-def implausible(reduction: Reduction) -> tuple[str, ...]:
-    """Findings that question all derivatives, marked: systematic errors of the records, values that no ship has."""
+def implausible(reduction: Reduction) -> tuple[Notice, ...]:
+    """Findings that question all derivatives: systematic errors of the records, values that no ship has."""
     values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
     errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
     cautions = cautions_of_result(values, errors, reduction.campaign)
-    found = [error.message for error in reduction.systematic] + [caution.message for caution in cautions]
+    found = [error.message for error in reduction.systematic] + [each.message for each in cautions]
     found += [*drifting_zeros(reduction.runs)]
-    campaign, resonant = reduction.campaign, [run for caution in _resonances(reduction) for run in caution.runs]
+    campaign, resonant = reduction.campaign, [run for each in _resonances(reduction) for run in each.runs]
     if reduction.systematic and resonant:
         found.append(f"standing waves of the tank would do the same to {_listed(resonant)}: compare without them.")
-    found += [caution.message for caution in tank_size(Tank(campaign.tank.breadth_m, campaign.tank.depth_m))]
-    return tuple(f"{CHECK} {message}" for message in found)
+    found += [each.message for each in tank_size(Tank(campaign.tank.breadth_m, campaign.tank.depth_m))]
+    return tuple(map(caution, found))
 
 
 def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
@@ -86,15 +86,15 @@ def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
             )
 
 
-def _omitted_runs(reduction: Reduction) -> Iterator[str]:
+def _omitted_runs(reduction: Reduction) -> Iterator[Notice]:
     reasons: dict[str, list[str]] = defaultdict(list)
     for name, reason in reduction.not_used.items():
         reasons[reason.partition(" is ")[0]].append(name)
     for cause, names in reasons.items():
         first = reduction.not_used[names[0]]
-        yield f"{len(names)} run{'s' * (len(names) > 1)} left out ({_listed(names)}): {first}."
+        yield Notice(f"{len(names)} run{'s' * (len(names) > 1)} left out ({_listed(names)}): {first}.")
         if cause == "its speed" and _constant_revolutions(reduction, names):
-            yield (
+            yield Notice(
                 "The runs away from the test speed keep its revolutions, so that speed and propeller load change "
                 "together: they give no term in Du of hull or rudder alone. --off-speed uses them, and its "
                 "terms in Du then hold at constant revolutions."
@@ -102,7 +102,7 @@ def _omitted_runs(reduction: Reduction) -> Iterator[str]:
     if reduction.options.off_speed:
         revolutions = {run.run.propeller_radps for run in reduction.runs}
         if len(revolutions) == 1 and None not in revolutions:
-            yield (
+            yield Notice(
                 "Runs at other speeds keep the revolutions of the test speed: speed and propeller load change "
                 "together, and the terms in Du hold at constant revolutions."
             )
@@ -113,11 +113,11 @@ def _constant_revolutions(reduction: Reduction, names: list[str]) -> bool:
     return len(revolutions) == 1 and None not in revolutions and 0.0 not in revolutions
 
 
-def _missing(reduction: Reduction) -> Iterator[str]:
+def _missing(reduction: Reduction) -> Iterator[Notice]:
     if reduction.missing:
-        yield f"The campaign does not give {', '.join(reduction.missing)}."
+        yield Notice(f"The campaign does not give {', '.join(reduction.missing)}.")
     if reduction.campaign.model.yaw_inertia_kgm2 is None:
-        yield "[model] yaw_inertia_kgm2 is missing: the card has an estimate by a radius of gyration of 0.25 L."
+        yield Notice("[model] yaw_inertia_kgm2 is missing: the card has an estimate by a radius of gyration of 0.25 L.")
 
 
 def _oscillating(reduction: Reduction) -> tuple[OscillationMotion, ...]:
@@ -132,16 +132,16 @@ def _resonances(reduction: Reduction) -> Iterator[Caution]:
     return tank_resonance(_oscillating(reduction), Tank(tank.breadth_m, tank.depth_m), gravity)
 
 
-def _physics(reduction: Reduction) -> Iterator[str]:
-    for caution in cautions_of_test(reduction.campaign, _oscillating(reduction)):
-        yield f"{caution.message}{f' Runs: {_listed(caution.runs)}.' if caution.runs else ''}"
+def _physics(reduction: Reduction) -> Iterator[Notice]:
+    for doubt in cautions_of_test(reduction.campaign, _oscillating(reduction)):
+        yield Notice(f"{doubt.message}{f' Runs: {_listed(doubt.runs)}.' if doubt.runs else ''}")
 
 
-def _conventions(reduction: Reduction) -> Iterator[str]:
+def _conventions(reduction: Reduction) -> Iterator[Notice]:
     campaign = reduction.campaign
     if "X0" in reduction.derivatives and is_resistance(campaign):
         found = reduction.derivatives["X0"]
-        yield (
+        yield Notice(
             f"X0 = {found.value:.4g} ± {found.standard_error:.2g} is the resistance at the test speed, of a model "
             "towed without a propeller (no [test] propeller_rps). It is left out of the card, where the thrust at the "
             "nominal revolutions balances it."
@@ -149,24 +149,24 @@ def _conventions(reduction: Reduction) -> Iterator[str]:
     turning = any(run.run.type == "yaw_with_drift" for run in reduction.runs)
     if turning and not campaign.inertia_removed and campaign.test.inertia_speed == "test":
         prime = campaign.model.mass_kg / float(campaign.scales.mass)
-        yield (
+        yield Notice(
             "The carried body's m u r was taken with u = U, as Krezelewski and Misiag take it. With u = U cos(beta) in "
             f"the runs that yaw with drift Yvvr would come out lower by m'/2 = {prime / 2:.3g} and Nvvr by "
             f'{prime * campaign.model.x_G_m / campaign.model.length_m / 2:.2g}: [test] inertia_speed = "axial".'
         )
 
 
-def _unchecked(reduction: Reduction) -> Iterator[str]:
+def _unchecked(reduction: Reduction) -> Iterator[Notice]:
     """Systematic errors that this campaign could not show."""
     kinds = dict.fromkeys(kind for force in "YN" for kind in reduction.forces[force].unchecked)
     if kinds:
-        yield (
+        yield Notice(
             f"It is not known whether the gauges read the same in runs of {', '.join(kinds)} as in other runs: "
             "no other kind of run gives the same derivatives."
         )
     if any(run.run.oscillates for run in reduction.runs) and not can_show_delay(reduction.runs):
         effect = _effect_of_delay(reduction)
-        yield (
+        yield Notice(
             "It is not known whether the forces lag the motion, and the standard errors do not include it: that needs "
             f"oscillations at two frequencies or more{effect}."
         )
@@ -176,21 +176,21 @@ def _unchecked(reduction: Reduction) -> Iterator[str]:
             f"{channel.force} in {channel.motion} {channel.size:.3g} ± {channel.standard_error:.2g} s"
             for channel in delay.channels
         )
-        yield (
+        yield Notice(
             f"The forces lag the motion by times that differ ({channels}): memory of the flow, or a fault of one "
             "channel, not a delay of all; nothing is corrected for it."
         )
     elif delay is not None and not delay.supported and any(e.source == "force_delay" for e in reduction.systematic):
-        yield "Sway and yaw do not both show the delay: memory of the flow in one of them would look the same."
+        yield Notice("Sway and yaw do not both show the delay: memory of the flow in one of them would look the same.")
 
 
-def _alignment(reduction: Reduction) -> Iterator[str]:
+def _alignment(reduction: Reduction) -> Iterator[Notice]:
     """A zero of the drift angle that Y0 and N0 agree on."""
     found = reduction.alignment
     if found is None or not found.shown or "alignment_rad" in reduction.campaign.uncertainty.model_fields_set:
         return
     angle, error = math.degrees(found.angle_rad), math.degrees(found.standard_error_rad)
-    yield (
+    yield Notice(
         f"Y0 and N0 are as if the model were turned by {angle:.3g} ± {error:.1g} deg against the recorded drift (or "
         "the hull were as asymmetric): check its alignment. Nothing is corrected; the standard errors of Y0 and N0 "
         "include it. [uncertainty] alignment_deg states how well it is known."
@@ -211,31 +211,31 @@ def _effect_of_delay(reduction: Reduction) -> str:
     return f"; 10 ms would change {', '.join(moved)}" if moved else ""
 
 
-def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[str]:
+def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[Notice]:
     for difference in result.disagreements:
-        yield (
+        yield Notice(
             f"{difference.name} is {difference.together:.4g} by the regression over the whole campaign and "
             f"{difference.stepwise:.4g} test by test, {abs(difference.ratio):.1f} standard errors apart: the "
             "tests do not agree with each other within the equations of the model."
         )
     for trend in result.trends:
         if trend.used:
-            yield (
+            yield Notice(
                 f"{trend.name} changes with the frequency, by {trend.slope:.3g} ± {trend.standard_error:.2g} times "
                 "(omega L/U)^2; its value is that extrapolated to zero frequency."
             )
     collinear = [choice.name for choice in result.selection.choices if choice.reason == "collinear"]
     if collinear:
-        yield f"The campaign cannot distinguish {', '.join(collinear)} from other terms: they are left out."
+        yield Notice(f"The campaign cannot distinguish {', '.join(collinear)} from other terms: they are left out.")
     odd = [row for row in result.left_out if row.unlikely]
     for row in odd:
-        yield (
+        yield Notice(
             f"{row.run}: {force} does not fit the other runs (chance {row.chance:.1g}); without it {row.moved} would "
             f"move by {row.influence:.1f} standard errors."
         )
     noise = result.selection.spread.noise
     if noise > _UNEXPLAINED**2:
-        yield (
+        yield Notice(
             f"The harmonics of {force} scatter from run to run {np.sqrt(noise):.1f} times as much as the noise within "
             "the runs explains, and the standard errors are as much wider: (3.8) does not follow them fully, or the "
             "recorded motion is wrong."
@@ -243,13 +243,13 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
     test = result.asymmetry
     if test is not None and test.names:
         text = "does not hold" if test.chance < _ASYMMETRIC else "holds"
-        yield (
+        yield Notice(
             f"Symmetry of {force} to port and starboard {text} (chance {test.chance:.2g}; tested: "
             f"{', '.join(test.names)})."
         )
 
 
-def _sheet(reduction: Reduction) -> Iterator[str]:
+def _sheet(reduction: Reduction) -> Iterator[Notice]:
     """Frequencies and amplitudes of the sheet that differ from the measured ones."""
     for run in reduction.runs:
         sheet, motion = run.run.sheet, run.motion
@@ -265,20 +265,20 @@ def _sheet(reduction: Reduction) -> Iterator[str]:
         )
         for quantity, unit, stated, found in measured:
             if stated is not None and run.run.oscillates and abs(found / stated - 1) > _SHEET:
-                yield (
+                yield Notice(
                     f"{run.run.name}: its {quantity} is {found:.4g} {unit}, and {stated:.4g} by the sheet; the "
                     "measured value is used."
                 )
 
 
-def _repeated(reduction: Reduction) -> Iterator[str]:
+def _repeated(reduction: Reduction) -> Iterator[Notice]:
     found = repeats(reduction.campaign, reduction.runs)
     if found is None or found.freedom < _REPEATED_ENOUGH:
         return
     for force, deviation in found.deviation.items():
         zero = float(np.sqrt(reduction.forces[force].selection.spread.zero_variance))
         if zero and not 1 / 3 < deviation / zero < 3:
-            yield (
+            yield Notice(
                 f"Repeated runs differ in {force}' by {deviation:.2g}, and runs altogether from the fit by {zero:.2g}: "
                 "the standard errors use the latter."
             )

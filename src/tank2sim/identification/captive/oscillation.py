@@ -17,6 +17,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.captive import tank_conditions
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign
 
 _DIFFER = 3.0
@@ -170,7 +171,7 @@ def _from_amplitude(rows: Sequence[OscillationDerivatives], name: str) -> tuple[
     return slope, float(np.linalg.norm(inverse[-1]))
 
 
-def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[str]:
+def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[Notice]:
     """Sentences on third-order terms that the third harmonic and the amplitude give differently."""
     messages = []
     for cubic in found:
@@ -178,8 +179,10 @@ def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[str]:
             continue
         (first, first_error), (second, second_error) = cubic.from_third_harmonic, cubic.from_amplitude
         messages.append(
-            f"{cubic.name} is {first:.3g} ± {first_error:.2g} by the third harmonic and {second:.3g} ± "
-            f"{second_error:.2g} by the amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is not "
-            "cubic in this range, or it depends on the frequency."
+            Notice(
+                f"{cubic.name} is {first:.3g} ± {first_error:.2g} by the third harmonic and {second:.3g} ± "
+                f"{second_error:.2g} by the amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is not "
+                "cubic in this range, or it depends on the frequency."
+            )
         )
     return messages

@@ -22,7 +22,7 @@ from tank2sim.identification.captive.harmonics import ReducedRun, reduced_run
 from tank2sim.identification.captive.motion import harmonic_basis
 from tank2sim.identification.captive.oscillation import OscillationDerivatives, oscillations
 from tank2sim.identification.captive.run_faults import motion_faults, record_faults, reduced_faults
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
 from tank2sim.records.thinning import drawn_columns
 
@@ -189,17 +189,17 @@ class CaptiveRunStudy:
         Scatter of the coefficients between the runs; empty for a single one and for runs of different tests.
     inertia_removed : bool
         Whether the model is known, and its inertia removed.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     runs: tuple[SingleRun, ...]
     repeats: tuple[RepeatedCoefficient, ...]
     inertia_removed: bool
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def study_runs(
-    runs: Sequence[CaptiveRun], campaign: Campaign | None, remarks: Sequence[str] = ()
+    runs: Sequence[CaptiveRun], campaign: Campaign | None, remarks: Sequence[Notice] = ()
 ) -> tuple[CaptiveRunStudy, tuple[ReducedRun, ...]]:
     """Reduce runs, each by itself, and compare repeats.
 
@@ -208,7 +208,7 @@ def study_runs(
     runs : sequence of CaptiveRun
     campaign : Campaign or None
         Model and test; without them no inertia is removed and no derivatives are given.
-    remarks : sequence of str
+    remarks : sequence of Notice
         Notices on the records.
 
     Raises
@@ -219,17 +219,21 @@ def study_runs(
     single, reduced = zip(*(single_run(run, campaign) for run in runs), strict=True)
     alike = len(runs) > 1 and same_test(single)
     repeats = repeated_coefficients(single) if alike else ()
-    notices = [*remarks, *(f"{CHECK} {fault}" for run in single for fault in run.faults)]
+    notices = [*remarks, *(caution(fault) for run in single for fault in run.faults)]
     if campaign is None:
         notices.append(
-            "Without a campaign the forces are as recorded, with the reaction of the model's inertia, and no "
-            "derivatives are given: --campaign campaign.toml."
+            Notice(
+                "Without a campaign the forces are as recorded, with the reaction of the model's inertia, and no "
+                "derivatives are given: --campaign campaign.toml."
+            )
         )
     if len(runs) > 1 and not alike:
-        notices.append("The runs are of different tests (angles, frequency, amplitude or speed): not compared.")
+        notices.append(Notice("The runs are of different tests (angles, frequency, amplitude or speed): not compared."))
     notices += [
-        f"Repeats differ in {row.signal} {row.part} {row.order or ''}".rstrip()
-        + f" by {row.deviation:.3g} {row.unit}, and their noise explains {row.expected:.2g} (chance {row.chance:.1g})."
+        Notice(
+            f"Repeats differ in {row.signal} {row.part} {row.order or ''}".rstrip()
+            + f" by {row.deviation:.3g} {row.unit}; their noise explains {row.expected:.2g} (chance {row.chance:.1g})."
+        )
         for row in repeats
         if row.differs
     ]

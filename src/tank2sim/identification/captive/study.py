@@ -30,6 +30,7 @@ from tank2sim.identification.captive.uncertainty_budget import (
     sources_not_stated,
     uncertainty_budget,
 )
+from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign
 
 _SectionValues = dict[str, bool | float | str | list[str] | None]
@@ -245,7 +246,7 @@ class ReductionStudy:
     uncertainty_budget : UncertaintyBudget
     missing : tuple of str
         Essential derivatives that are neither measured nor estimated.
-    warnings : tuple of str
+    notices : tuple of Notice
     methods, selection, spread, symmetry, leave_one_out : dict
         By force: methods, choice of terms, scatter of the runs, test of the symmetry (on request), predicted runs.
     systematic_errors : tuple of SystematicError
@@ -280,7 +281,7 @@ class ReductionStudy:
     heel_derivatives: dict[str, ReducedDerivative]
     uncertainty_budget: UncertaintyBudget
     missing: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notices: tuple[Notice, ...]
     methods: dict[str, ForceMethods]
     selection: dict[str, tuple[Choice, ...]]
     spread: dict[str, RunSpread]
@@ -307,7 +308,7 @@ class ReductionStudy:
 
 
 def study_reduction(
-    reduction: Reduction, card: Contents, warnings: tuple[str, ...] = (), card_scale: float | None = None
+    reduction: Reduction, card: Contents, notices: tuple[Notice, ...] = (), card_scale: float | None = None
 ) -> ReductionStudy:
     """The study of a reduction.
 
@@ -316,7 +317,7 @@ def study_reduction(
     reduction : Reduction
     card : Contents
         Contents of its card.
-    warnings : tuple of str
+    notices : tuple of Notice
         Messages for the user, in sentences.
     card_scale : float, optional
         As of :class:`ReductionStudy`.
@@ -338,7 +339,7 @@ def study_reduction(
         },
         uncertainty_budget=_budget(reduction),
         missing=card.missing,
-        warnings=warnings,
+        notices=notices,
         methods={force: _methods(result) for force, result in forces.items()},
         selection={force: result.selection.choices for force, result in forces.items()},
         spread={force: _spread(result) for force, result in forces.items()},

@@ -19,6 +19,7 @@ from tank2sim.identification.captive_mmg.contradicted_tests import (
     refuse_impossible_sizes,
     refuse_other_curve,
 )
+from tank2sim.notices import Notice
 from tank2sim.records.averages import Condition, read_averages, read_columns
 from tank2sim.records.campaign_form import CampaignFile
 from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_file, together
@@ -52,7 +53,7 @@ class SteadyTests:
         :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
     open_water : array, (points, 2 or 3)
         J, K_T, and K_Q if the torque was measured.
-    remarks : tuple of str
+    remarks : tuple of Notice
         Remarks from reading the files.
     """
 
@@ -62,7 +63,7 @@ class SteadyTests:
     motion: Array
     readings: Array
     open_water: Array
-    remarks: tuple[str, ...]
+    remarks: tuple[Notice, ...]
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -188,7 +189,7 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
     }
 
 
-def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[str]]:
+def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[Notice]]:
     """Means of the steady runs; oscillating ones are left out and named, all runs with faults are refused together."""
     campaign = read_campaign(path)
     steady = [run for run in campaign.runs if not run.oscillates]
@@ -201,9 +202,8 @@ def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], lis
     oscillating = [run.name for run in campaign.runs if run.oscillates]
     remarks = []
     if oscillating:
-        remarks = [
-            f"Left out, because MMG takes steady tests: {len(oscillating)} oscillating runs, {oscillating[0]} first."
-        ]
+        runs = f"{len(oscillating)} oscillating runs, {oscillating[0]} first"
+        remarks = [Notice(f"Left out, because MMG takes steady tests: {runs}.")]
     return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
 
 

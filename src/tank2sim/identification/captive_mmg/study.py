@@ -19,7 +19,7 @@ from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
 from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
 from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 
 _UNEXPLAINED = 0.5
 """Share of a channel (rms of the residuals over rms of the readings) from which the method does not describe the
@@ -101,7 +101,7 @@ class MmgStudy:
         Channel to its readings.
     conditions, not_excited : tuple of str
         Names of the conditions, and of the terms that none of them shows.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     campaign: str
@@ -115,7 +115,7 @@ class MmgStudy:
     readings: dict[str, ChannelReadings]
     conditions: tuple[str, ...]
     not_excited: tuple[str, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def study_mmg(fit: MmgFit) -> MmgStudy:
@@ -191,7 +191,7 @@ def _significant(fit: MmgFit, name: str, sign: int) -> bool:
     return sign * fit.value(name) > _SIGNIFICANT * float(fit.errors[fit.names.index(name)])
 
 
-def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[str]:
+def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[Notice]:
     """Marks of a result that contradicts itself, or that no ship has."""
     found: list[str] = []
     for name, share in fit.curves_unexplained.items():
@@ -217,7 +217,7 @@ def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[str
     found += [f"by 1/2 rho L² U², {caution.message.rstrip('.')}" for caution in cautions]
     if "l_R" in fit.names and _significant(fit, "l_R", +1):
         found.append(f"l_R is {fit.value('l_R'):+.3g}; it is negative of every ship: check the sign of the yaw rate")
-    return [f"{CHECK} {text}." for text in found]
+    return [caution(f"{text}.") for text in found]
 
 
 def mmg_coefficients(fit: MmgFit) -> dict[str, MmgCoefficient]:
@@ -268,38 +268,48 @@ def mmg_card(fit: MmgFit) -> Card:
     return replace(card, covariance=Covariance(tuple(_place(key) for key, _ in keys), matrix))
 
 
-def _notices(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[str]:
+def _notices(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[Notice]:
     found = list(fit.tests.remarks)
     if opened := [name for name, entry in coefficients.items() if entry.origin == "open"]:
-        found.append(f"The tests leave open, and the card has the values of ordinary ships: {', '.join(opened)}.")
+        found.append(
+            Notice(f"The tests leave open, and the card has the values of ordinary ships: {', '.join(opened)}.")
+        )
     if missing := [name for name in fit.not_excited if name not in ("Y0", "N0")]:
         found.append(
-            f"No condition shows {', '.join(missing)}: they are zero on the card, and a turn simulated "
-            "with it is as wrong as that."
+            Notice(
+                f"No condition shows {', '.join(missing)}: they are zero on the card, and a turn simulated "
+                "with it is as wrong as that."
+            )
         )
     for name, (mean, deviation) in ORDINARY.items():
         entry = coefficients[name]
         if _FAR * deviation < abs(entry.value - mean) <= _TOO_FAR * deviation:
-            found.append(f"{name} is {entry.value:.3g}; ordinary ships have {mean:g} ± {deviation:g}.")
+            found.append(Notice(f"{name} is {entry.value:.3g}; ordinary ships have {mean:g} ± {deviation:g}."))
     if "rudder_offset" in fit.names:
         angle = -np.degrees(fit.value("rudder_offset"))
         found.append(
-            f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of "
-            "the propeller or the zero of the gear; the card does not have it."
+            Notice(
+                f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of "
+                "the propeller or the zero of the gear; the card does not have it."
+            )
         )
     if not fit.common:
         found.append(
-            "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to "
-            "all conditions, are in them where [uncertainty] of the campaign states them."
+            Notice(
+                "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to "
+                "all conditions, are in them where [uncertainty] of the campaign states them."
+            )
         )
     form = fit.tests.form
     raised = blockage_speed(form.model, form.tank, form.test)
     if raised and not form.uncertainty.blockage_relative:
         found.append(
-            f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
-            "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in."
+            Notice(
+                f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
+                "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in."
+            )
         )
-    found.append("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated.")
+    found.append(Notice("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated."))
     return found
 
 

@@ -22,7 +22,7 @@ from tank2sim.identification.craft.fit import (
 )
 from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
 from tank2sim.identification.craft.order_response import OrderResponse
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.units import from_si
 
 NOT_ITS_OWN = (
@@ -96,7 +96,7 @@ class CraftIdentificationStudy:
         By thruster, where the trials hold orders next to revolutions.
     next_trials : tuple of CandidateTrial
         Manoeuvres of five minutes; the first determines most of the coefficients that these trials do not.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -109,7 +109,7 @@ class CraftIdentificationStudy:
     order_responses: dict[str, ThrusterResponse]
     held_out: tuple[str, ...]
     next_trials: tuple[CandidateTrial, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def study_craft(
@@ -141,18 +141,22 @@ def study_craft(
         for name, verdict in zip(fit.problem.free, fit.verdicts, strict=True)
         if name.endswith((".ahead", ".astern")) and verdict is CoefficientVerdict.PRIOR
     ]:
-        notices.append(f"{CHECK} the trials do not determine {', '.join(open_thrust)}: it is that of the card")
+        notices.append(caution(f"the trials do not determine {', '.join(open_thrust)}: it is that of the card"))
     if held and not predictions:
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
-        notices.append(f"no held-out trial is longer than {least:g} s: none is predicted")
+        notices.append(Notice(f"no held-out trial is longer than {least:g} s: none is predicted"))
     if driven_by == "orders":
         notices.append(
-            "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
+            Notice(
+                "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
+            )
         )
     notices += _dead_band_notices(card, responses, driven_by)
     notices.append(
-        "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
-        "mass is one of all forces, in the same share"
+        Notice(
+            "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
+            "mass is one of all forces, in the same share"
+        )
     )
     return CraftIdentificationStudy(
         ship=card.ship.name,
@@ -169,11 +173,11 @@ def study_craft(
     )
 
 
-def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[str]:
+def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
     if not responses:
         words = "orders" if driven_by == "orders" else "revolutions"
         other = "revolutions" if driven_by == "orders" else "orders"
-        return [f"dead bands are those of the card: the trials have {words}, and need {other} next to them"]
+        return [Notice(f"dead bands are those of the card: the trials have {words}, and need {other} next to them")]
     notices = []
     for thruster in card.thrusters:
         response = responses.get(thruster.name)
@@ -182,10 +186,9 @@ def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], 
         least = from_si("n_rpm", response.turning_radps)
         text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
         if thruster.dead_band_radps >= response.turning_radps:
-            text = f"{CHECK} {text}, and one of {least:.3g} rpm, within it, turned it"
+            notices.append(caution(f"{text}, and one of {least:.3g} rpm, within it, turned it"))
         else:
-            text += f"; one of {least:.3g} rpm turned it"
-        notices.append(text)
+            notices.append(Notice(f"{text}; one of {least:.3g} rpm turned it"))
     return notices
 
 
@@ -258,7 +261,7 @@ class CraftValidationStudy:
         As of :class:`CraftReplay`, for all trials.
     trials : dict
         Predictions by trial.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     ship: str
@@ -266,11 +269,11 @@ class CraftValidationStudy:
     end_distance_m: float | None
     end_heading_deg: float | None
     trials: dict[str, CraftReplay]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def study_predictions(
-    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[str]
+    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[Notice]
 ) -> CraftValidationStudy:
     """Study of predictions of trials by a card.
 
@@ -281,13 +284,13 @@ def study_predictions(
         Files of all trials.
     predictions : sequence of FreePrediction
         Those of trials that are long enough.
-    alike : sequence of str
+    alike : sequence of Notice
         Notices of trials that are alike.
     """
     known = {entry.run.file for entry in predictions}
     short = [Path(file).name for file in files if file not in known]
     least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
-    too_short = [f"not longer than {least:g} s, and not predicted: {', '.join(short)}"] if short else []
+    too_short = [Notice(f"not longer than {least:g} s, and not predicted: {', '.join(short)}")] if short else []
     distance, heading = _at_ends(predictions)
     return CraftValidationStudy(
         ship=card.ship.name,
@@ -295,7 +298,7 @@ def study_predictions(
         end_distance_m=distance,
         end_heading_deg=heading,
         trials={entry.run.name: _replay(entry) for entry in predictions},
-        notices=(*doubts(card), *alike, *too_short, NOT_ITS_OWN),
+        notices=(*doubts(card), *alike, *too_short, Notice(NOT_ITS_OWN)),
     )
 
 

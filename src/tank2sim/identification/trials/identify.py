@@ -79,7 +79,7 @@ from tank2sim.identification.trials.problem.water_current import (
     with_current,
     without_current,
 )
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -92,7 +92,9 @@ LEAST_WEIGHT = 0.02
 WHOLE_RUN_MISFIT = 3.0
 """Largest error, over the noise of every signal, of a model that is fitted to whole runs, too (project choice)."""
 
-_NO_UNCERTAINTY = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
+_NO_UNCERTAINTY = Notice(
+    "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
+)
 
 METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error": ("output error", "kalman")}
 """Method that a choice takes, to its name in words and the other method."""
@@ -136,7 +138,7 @@ class Identification:
         On request; values and covariance of the estimate are then its means and covariance.
     bootstrap : array (members, k) or None
         Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
-    notices : tuple of str
+    notices : tuple of Notice
     current : WaterCurrent or None
         Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have it.
     choice : MethodChoice or None
@@ -161,7 +163,7 @@ class Identification:
     bootstrap: Array | None
     manoeuvres: Mapping[str, str]
     forced: tuple[str, ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     current: WaterCurrent | None = None
     choice: MethodChoice | None = None
 
@@ -242,7 +244,7 @@ def _identified(
         card = card_in(card, _first_current(card, trials))
     structures: Mapping[str, CrossValidation] = {}
     weights: dict[str, float] = {}
-    chosen: tuple[str, ...] = ()
+    chosen: tuple[Notice, ...] = ()
     structure = options.structure
     if structure in (AUTO, AVERAGE):
         structures = cross_validate_structures(card, trials, options, executor)
@@ -252,7 +254,7 @@ def _identified(
     if options.structure == AVERAGE:
         weights = _kept_weights(card, trials, options, structures)
         structure = max(weights, key=weights.__getitem__)
-        chosen = (_average_in_words(weights),)
+        chosen = (Notice(_average_in_words(weights)),)
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
         raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
@@ -506,15 +508,15 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 
 
-def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Sequence[str]:
+def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Sequence[Notice]:
     if captive is None:
         return ()
     times = card.ship.length_m / captive.campaign.model.length_m
     words = f"{captive.campaign.path}: {len(captive.runs)} captive tests are fitted together with the trials"
-    return (f"{words}, scaled by Froude's law to a ship {times:.4g} times as long",)
+    return (Notice(f"{words}, scaled by Froude's law to a ship {times:.4g} times as long"),)
 
 
-def _current_notice(current: WaterCurrent | None) -> Sequence[str]:
+def _current_notice(current: WaterCurrent | None) -> Sequence[Notice]:
     if current is None:
         return ()
     speed_error, direction_error = current.errors
@@ -523,27 +525,28 @@ def _current_notice(current: WaterCurrent | None) -> Sequence[str]:
         f"{math.degrees(current.direction_rad):.0f} ± {math.degrees(direction_error):.2g} deg was estimated with the "
     )
     words += "coefficients: the card has it as its effect current; leave that out for still water"
-    return (words,) if current.determined else (undetermined_notice(current), words)
+    notice = Notice(words)
+    return (notice,) if current.determined else (undetermined_notice(current), notice)
 
 
-def undetermined_notice(current: WaterCurrent) -> str:
-    """That the trials do not determine the current, as a marked sentence."""
-    return (
-        f"{CHECK} the trials do not determine the current (to {current.standard_error_mps:.2g} m/s in one direction): "
+def undetermined_notice(current: WaterCurrent) -> Notice:
+    """A caution that the trials do not determine the current."""
+    return caution(
+        f"the trials do not determine the current (to {current.standard_error_mps:.2g} m/s in one direction): "
         "coefficients and figures may hold a part of it; add speed through the water or a full turn, or give the card "
         "its effect current"
     )
 
 
-def _choice_notice(choice: MethodChoice | None) -> Sequence[str]:
+def _choice_notice(choice: MethodChoice | None) -> Sequence[Notice]:
     if choice is None:
         return ()
     name, other = METHOD_WORDS[choice.method]
-    return (f"method: {name}, because {choice.reason}; method {other} takes the other",)
+    return (Notice(f"method: {name}, because {choice.reason}; method {other} takes the other"),)
 
 
-def _unseen_notice(names: Sequence[str]) -> Sequence[str]:
+def _unseen_notice(names: Sequence[str]) -> Sequence[Notice]:
     if not names:
         return ()
     text = ", ".join(name.removeprefix("derivatives.") for name in names)
-    return (f"the trials show nothing of {text}: held as the card has them",)
+    return (Notice(f"the trials show nothing of {text}: held as the card has them"),)

@@ -27,7 +27,7 @@ from tank2sim.identification.trials.methods.posterior_sampling import PosteriorS
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.water_current import WaterCurrent, card_in
-from tank2sim.marks import FORCED
+from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
@@ -251,7 +251,7 @@ class IdentifiabilityStudy:
         The closest first.
     unseen : tuple of tuple of str
         Combinations of parameters that the trials do not determine.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     parameters: tuple[str, ...]
@@ -260,7 +260,7 @@ class IdentifiabilityStudy:
     correlation: Array
     correlated_pairs: tuple[tuple[str, str, float], ...]
     unseen: tuple[tuple[str, ...], ...]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -323,7 +323,7 @@ class IdentificationStudy:
         Factor on the standard errors of the card by group of parameters.
     cost : tuple of float
     identifiability : IdentifiabilityStudy
-    notices, warnings : tuple of str
+    notices : tuple of Notice
         Changes to the data and marks; all that limits the result.
     replays : tuple of CardReplay
     """
@@ -351,8 +351,7 @@ class IdentificationStudy:
     prior_scale: dict[str, Number]
     cost: tuple[Number, ...]
     identifiability: IdentifiabilityStudy
-    notices: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notices: tuple[Notice, ...]
     replays: tuple[CardReplay, ...]
 
     @property
@@ -377,7 +376,7 @@ def study_identification(
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
-    forced = [f"{FORCED}: {'; '.join(result.forced)}"] if result.forced else []
+    forced = [caution(f"FORCED: {'; '.join(result.forced)}")] if result.forced else []
     unfinished = [] if result.posterior is None or result.posterior.converged else result.posterior.notices
     comparisons = {SET_KEYS[word]: (given, found) for word, given, found in result.comparisons}
     return IdentificationStudy(
@@ -419,8 +418,7 @@ def study_identification(
             unseen=tuple(map(tuple, known.unseen)),
             notices=tuple(known.notices),
         ),
-        notices=(*unfinished, *forced, *result.notices),
-        warnings=(*unfinished, *result.notices, *known.notices, *remarks(result)),
+        notices=tuple(dict.fromkeys((*unfinished, *forced, *result.notices, *known.notices, *remarks(result)))),
         replays=_replays(before, result, fitted, held),
     )
 
@@ -605,7 +603,7 @@ def identified_card_text(result: Identification, trials: list[str]) -> str:
     card = result.card
     origin = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
     if result.forced:
-        origin = f"{FORCED}, although not of this ship by the rudder's moment: {origin}"
+        origin = f"FORCED, although not of this ship by the rudder's moment: {origin}"
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {origin}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {origin}: {card.ship.notes}"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tank2sim.arrays import Columns, Number
+from tank2sim.notices import Notice
 from tank2sim.records.audit import audit_trial, record_noise
 from tank2sim.records.audit.finding import ColumnFinding
 from tank2sim.records.signals.columns import file_columns
@@ -45,7 +46,7 @@ class AuditedTrial:
         Heads in the file.
     noise : dict
         Noise by the name of the signal in SI.
-    notices : tuple of str
+    notices : tuple of Notice
     histories : dict
         The record thinned to draw.
     """
@@ -56,7 +57,7 @@ class AuditedTrial:
     rows: int
     columns: tuple[str, ...]
     noise: dict[str, ColumnNoise]
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     histories: Columns
 
 

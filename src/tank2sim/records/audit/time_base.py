@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
+from tank2sim.notices import Notice
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.trials import Trial, sampling_step, select_rows
 
@@ -63,7 +64,7 @@ def _stray(trial: Trial) -> Finding | None:
     truth = "a time of another clock or a slip in these rows: they are left out"
 
     def omit(other: Trial) -> Trial:
-        return replace(select_rows(other, np.flatnonzero(~far)), notices=(*other.notices, f"time: {truth}"))
+        return replace(select_rows(other, np.flatnonzero(~far)), notices=(*other.notices, Notice(f"time: {truth}")))
 
     return replace(found, likely_truth=truth, repair=omit, safe=True)
 
@@ -116,7 +117,7 @@ def _not_rising(trial: Trial, steps: NDArray[np.float64]) -> Finding:
         )
 
     def repair(other: Trial) -> Trial:
-        return replace(select_rows(other, rows), notices=(*other.notices, f"time: {truth}"))
+        return replace(select_rows(other, rows), notices=(*other.notices, Notice(f"time: {truth}")))
 
     enough = len(rows) > 1
     return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, repair, safe=enough)
@@ -145,7 +146,7 @@ def _uniform(trial: Trial, what: str, evidence: dict[str, float]) -> Finding:
     truth = f"times are rounded: the step is uniform, {step:.5g} s"
 
     def repair(other: Trial) -> Trial:
-        return replace(other, time_s=other.time_s[0] + step * count, notices=(*other.notices, f"time: {truth}"))
+        return replace(other, time_s=other.time_s[0] + step * count, notices=(*other.notices, Notice(f"time: {truth}")))
 
     figures = {**evidence, "step_s": step}
     return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", figures, repair, safe=True)
@@ -175,7 +176,7 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
 
 def _in_seconds(trial: Trial, factor: float, name: str) -> Trial:
     text = f"time was in {name} and is in seconds now"
-    return replace(trial, time_s=factor * trial.time_s, notices=(*trial.notices, text))
+    return replace(trial, time_s=factor * trial.time_s, notices=(*trial.notices, Notice(text)))
 
 
 def _turned(trial: Trial) -> float | None:

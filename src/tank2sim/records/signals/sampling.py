@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName
 from tank2sim.records.trials import Trial
 
@@ -38,7 +39,7 @@ class Series:
         Time of the first sample, and from one to the next.
     values : array (n,)
         In SI.
-    notices : tuple of str
+    notices : tuple of Notice
         What was done to get here.
     """
 
@@ -47,7 +48,7 @@ class Series:
     start_s: float
     step_s: float
     values: Array
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def time_s(self) -> Array:
@@ -120,7 +121,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
         values = _at(time, values, grid, held=name in HELD_COLUMNS)
         way = "held" if name in HELD_COLUMNS else "interpolated by straight lines"
         notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
-    messages = tuple(f"{column.removeprefix('column ')} {notice}" for notice in notices)
+    messages = tuple(Notice(f"{column.removeprefix('column ')} {notice}") for notice in notices)
     return Series(trial.path, name, float(time[0]), step, values, messages)
 
 

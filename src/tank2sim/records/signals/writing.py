@@ -11,6 +11,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.sampling import Series, even_series
@@ -58,7 +59,7 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
     for name in trial.signals:
         if name in HELD_COLUMNS:
             signals[name] = _held(even_series(trial, name), time)
-    return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, notice))
+    return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, Notice(notice)))
 
 
 def trial_text(trial: Trial, remarks: Sequence[str]) -> str:

@@ -23,6 +23,7 @@ from tank2sim.dynamics.glider_forces import (
     momentum,
 )
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+from tank2sim.notices import Notice
 from tank2sim.units import rounded_down
 
 SMALL_INCIDENCE = math.radians(10.0)
@@ -41,7 +42,7 @@ _PITCH = 0.5
 """Pitch of the dive in which an FMU starts, 28.6 deg: the paper's sample dives at 30 deg have 27.8 deg."""
 
 
-def glider_warnings(card: GliderCard) -> tuple[str, ...]:
+def glider_warnings(card: GliderCard) -> tuple[Notice, ...]:
     """Messages about a card: a displaced volume that does not carry its mass, and an area that is V^(2/3).
 
     Both are so in the paper's own data.
@@ -62,7 +63,7 @@ def glider_warnings(card: GliderCard) -> tuple[str, ...]:
             "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
             "area that belongs to them in glider.reference_area_m2"
         )
-    return tuple(messages)
+    return tuple(map(Notice, messages))
 
 
 def glider_model(card: GliderCard) -> Model:
@@ -95,7 +96,7 @@ def glider_model(card: GliderCard) -> Model:
         step_s=_step(card),
         notices=(
             *glider_warnings(card),
-            "the attitude is prescribed, the glider does not slip sideways, and its added masses are estimates",
+            Notice("the attitude is prescribed, the glider does not slip sideways, and its added masses are estimates"),
         ),
     )
 

@@ -32,6 +32,7 @@ from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 
 _STEEPEST = math.radians(89.5)
@@ -321,7 +322,7 @@ class GlideStudy:
     transient : TransientPath, optional
     quasi_steady_error : QuasiSteadyErrors, optional
         Only if views were asked for.
-    notices : tuple of str
+    notices : tuple of Notice
     """
 
     glider: str
@@ -339,7 +340,7 @@ class GlideStudy:
     path_as_printed_histories: Columns
     transient: TransientPath | None
     quasi_steady_error: QuasiSteadyErrors | None
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:

@@ -15,7 +15,7 @@ from tank2sim.apps.rigs.tow.output_error import simulated_speeds
 from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.arrays import Array
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 
 ADDED_SHARES = (0.0, 1.0)
 """Added mass in surge over the mass with the water inside. A sphere has 0.5, slender bodies less (Lamb 1932, art. 92
@@ -49,7 +49,7 @@ _SIGNIFICANCE = 0.05
 
 def tow_findings(
     tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit], designs: Mapping[str, Array]
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
 
     Parameters
@@ -77,7 +77,7 @@ def tow_findings(
         row = _worst_misfit(tows, speeds, len(fit.estimated))
         if row is not None:
             fast = speeds[row] - tows.mean_speed_mps[row]
-            yield (
+            yield Notice(
                 f"output_error: the equation does not follow the tows within their scatter: at {tows.time_s[row]:g} s "
                 f"it is {abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
                 f"{'' if fit.start_delay_s else 'a late start or '}a force that it lacks is likely."
@@ -101,11 +101,11 @@ def identifiable_terms(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> 
     return ()
 
 
-def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator[str]:
+def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator[Notice]:
     collinear = [fit for fit in fits if fit.condition_scaled > COLLINEAR**2]
     if collinear:
         numbers = " and ".join(f"{fit.condition_scaled:.2g} ({fit.method})" for fit in collinear)
-        yield (
+        yield Notice(
             f"{', '.join(collinear[-1].estimated)} cannot all be identified from these tows: the scaled condition "
             f"number is {numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
             f"(--terms {','.join(identifiable_terms(fits, designs)) or 'none'})."
@@ -119,37 +119,43 @@ def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> It
             if abs(fit.correlation[i, j]) > _CORRELATED
         ]
         if pairs:
-            yield f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known."
+            yield Notice(
+                f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known."
+            )
         uncertain = [
             f"{name} ({value:.3g}, standard error {error:.2g})"
             for name, value, error in zip(fit.unknowns, fit.values, fit.errors, strict=True)
             if _TWO_SIDED_95 * error > abs(value)
         ]
         if uncertain:
-            yield f"{fit.method}: not distinguishable from zero at 95 %: {', '.join(uncertain)}."
+            yield Notice(f"{fit.method}: not distinguishable from zero at 95 %: {', '.join(uncertain)}.")
 
 
-def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
+def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[Notice]:
     if fit.values[0] <= 0:
-        yield f"{fit.method}: the mass M is negative ({fit.values[0]:.4g} kg), which no body has; do not use this fit."
+        yield Notice(
+            f"{fit.method}: the mass M is negative ({fit.values[0]:.4g} kg), which no body has; do not use this fit."
+        )
     else:
         yield from _added_mass(fit)
     if not np.isfinite(fit.largest_speed_error_mps):
-        yield f"{fit.method}: the speed with these values grows without bound; do not use this fit."
+        yield Notice(f"{fit.method}: the speed with these values grows without bound; do not use this fit.")
     speeds = np.linspace(0.0, top_speed_mps, 401)[1:]
     drags = fit.drag_N(speeds)
     if drags.min() < 0:
-        yield (
+        yield Notice(
             f"{fit.method}: the drag is negative over {100 * np.mean(drags < 0):.0f} % of the speeds up to "
             f"{top_speed_mps:.3g} m/s reached, down to {drags.min():.2g} N at {speeds[drags.argmin()]:.2g} "
             "m/s; no hull has that."
         )
     minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
     if minus and drags.min() >= 0:
-        yield f"{fit.method}: the drag terms have opposite signs ({minus} negative) and largely cancel each other."
+        yield Notice(
+            f"{fit.method}: the drag terms have opposite signs ({minus} negative) and largely cancel each other."
+        )
 
 
-def _added_mass(fit: TowFit) -> Iterator[str]:
+def _added_mass(fit: TowFit) -> Iterator[Notice]:
     """An added mass that is none, or more than the mass, by more than its error."""
     mass_kg = fit.estimates["total_mass_kg"] - fit.added_mass_kg
     share = fit.added_mass_kg / mass_kg
@@ -157,7 +163,9 @@ def _added_mass(fit: TowFit) -> Iterator[str]:
     low, high = ADDED_SHARES
     if low - error <= share <= high + error:
         if share < 0:
-            yield f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
+            yield Notice(
+                f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
+            )
         return
     units = [
         f"{name} (then {(1 + share) * factor - 1:.2g})"
@@ -166,14 +174,16 @@ def _added_mass(fit: TowFit) -> Iterator[str]:
     ]
     likely = f"; it would fit a body if {' or if '.join(units)}" if units else ""
     yield (
-        f"{CHECK} {fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
-        f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."
+        caution(
+            f"{fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
+            f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."
+        )
     )
 
 
-def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[str]:
+def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[Notice]:
     if len(fit.estimated) > len(speed.coef):
-        yield (
+        yield Notice(
             f"{fit.method}: {len(fit.estimated)} unknowns are estimated from the {len(speed.coef)} coefficients of a "
             f"speed polynomial of degree {speed.degree()}; the standard errors then reflect the arithmetic, not the "
             "drag."
@@ -181,7 +191,7 @@ def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator
     speeds = speed(tows.time_s)
     row = _worst_misfit(tows, speeds, len(speed.coef))
     if row is not None:
-        yield (
+        yield Notice(
             f"{fit.method}: a speed polynomial of degree {speed.degree()} does not follow the tows within their "
             f"scatter: at {tows.time_s[row]:g} s it is off by {abs(speeds[row] - tows.mean_speed_mps[row]):.3g} m/s; "
             "prefer output_error, which needs no polynomial."
@@ -207,13 +217,13 @@ def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
     return int(np.flatnonzero(moving)[np.argmax(lack)])
 
 
-def _disagreement(fits: Sequence[TowFit]) -> Iterator[str]:
+def _disagreement(fits: Sequence[TowFit]) -> Iterator[Notice]:
     for first, second in combinations(fits, 2):
         if first.errors is None or second.errors is None:
             continue
         difference = abs(first.values[0] - second.values[0])
         if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
-            yield (
+            yield Notice(
                 f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
                 "errors explain; this is the accuracy of the mass."
             )

@@ -29,6 +29,7 @@ from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
 from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import SINGULAR_CONDITION, scaled_condition
+from tank2sim.notices import Notice
 
 TOW_METHODS = ("paper", "qr", "output_error")
 
@@ -61,7 +62,7 @@ class TowIdentification:
         Coefficients of v*(t) in rising powers of t, m/s over s (eq. 2.1).
     methods : dict
         Method to its estimates.
-    warnings : tuple of str
+    notices : tuple of Notice
         Messages for the user, in sentences.
     """
 
@@ -76,7 +77,7 @@ class TowIdentification:
     top_speed_mps: float
     speed_polynomial: tuple[float, ...]
     methods: dict[str, TowFit]
-    warnings: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
     @property
     def force(self) -> Polynomial:
@@ -148,7 +149,7 @@ def identify_tow(
         top_speed_mps=tows.top_speed_mps,
         speed_polynomial=tuple(speed.polynomial.coef.tolist()),
         methods=fits,
-        warnings=(*notes, *tow_findings(tows, pull, speed.polynomial, fits, designs)),
+        notices=(*notes, *tow_findings(tows, pull, speed.polynomial, fits, designs)),
     )
 
 
@@ -184,7 +185,7 @@ def _fit(
     return replace(fit, largest_speed_error_mps=error)
 
 
-def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> list[str]:
+def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> list[Notice]:
     notes = []
     used = force if isinstance(force, float | int) else tows.force_N
     for name, used_value, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
@@ -196,7 +197,7 @@ def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed:
         notes.append("The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed.")
     for method in failed:
         notes.append(f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3).")
-    return notes
+    return [Notice(text) for text in notes]
 
 
 def _force(tows: Tows, given: float | Polynomial | None) -> Polynomial:
@@ -250,7 +251,7 @@ def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
 def tow_card_text(
     result: TowIdentification, fit: TowFit, *, name: str, source: str, length_m: float | None = None
 ) -> str:
-    """TOML text of the card with the numbers of one method; its notes are the warnings of the result.
+    """TOML text of the card with the numbers of one method; its notes are the notices of the result.
 
     Parameters
     ----------
@@ -270,6 +271,6 @@ def tow_card_text(
             standard_errors={key: value for key, value in fit.standard_errors.items() if key in values},
             top_speed_mps=result.top_speed_mps,
             length_m=length_m,
-            notes=" ".join(result.warnings),
+            notes=" ".join(result.notices),
         )
     )

@@ -157,11 +157,6 @@ class TowResult(Result[TowStudy]):
         )
 
     @property
-    def notices(self) -> tuple[str, ...]:
-        """The warnings."""
-        return self.study.warnings
-
-    @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Total and added mass, the range of M, the worst condition number."""
         study, best, figures = self.study, self.study.best, []

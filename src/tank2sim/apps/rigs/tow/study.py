@@ -36,6 +36,7 @@ from tank2sim.apps.rigs.tow.theory import (
 from tank2sim.arrays import Array, Columns
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.notices import Notice
 from tank2sim.records.thinning import drawn_columns
 
 _LEVEL = 0.95
@@ -174,7 +175,7 @@ def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = N
         body=body,
         drag_coefficients=_drag_coefficients(result, body) if body else {},
     )
-    return replace(study, warnings=(*result.warnings, *_notes(study), *_continued(study, tows)))
+    return replace(study, notices=(*result.notices, *_notes(study), *_continued(study, tows)))
 
 
 def _drag_coefficients(result: TowIdentification, body: TowedBody) -> dict[str, DragCoefficients]:
@@ -270,7 +271,7 @@ def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
     return Ellipse(label=fitted.label, centre=(mass, drag), mass_kg=mass + outline[0], B3_kgpm=drag + outline[1])
 
 
-def _continued(study: TowStudy, tows: Tows) -> Iterator[str]:
+def _continued(study: TowStudy, tows: Tows) -> Iterator[Notice]:
     """Notes on tows that end early: the paper's estimate with their polynomial continued to the end."""
     published = next(iter(study.tow_by_tow.values()), None)
     for number, alone in enumerate(published.alone if published else ()):
@@ -279,24 +280,24 @@ def _continued(study: TowStudy, tows: Tows) -> Iterator[str]:
             continue
         speed = fit_mean_speed(single, len(study.speed_polynomial) - 1).polynomial
         problem = discretise(speed, tows.time_s, study.terms, study.force)
-        yield (
+        yield Notice(
             f"Tow {number + 1} ends at {single.time_s[-1]:g} s: over that time the published method gives M "
             f"{alone[0]:.0f} kg; with its polynomial continued to the {tows.time_s[-1]:g} s of the other tows, "
             f"{solve_by_qr(problem)[0]:.0f} kg."
         )
 
 
-def _notes(study: TowStudy) -> Iterator[str]:
+def _notes(study: TowStudy) -> Iterator[Notice]:
     span = study.mass_range_kg
     if span is not None:
         low, high = span
-        yield (
+        yield Notice(
             f"These tows determine M only within {low:.0f} to {high:.0f} kg (added mass {low - study.mass_kg:.0f} to "
             f"{high - study.mass_kg:.0f} kg): 95 % intervals of the plausible models that they determine."
         )
     best = min(study.models, key=lambda fitted: fitted.aic, default=None)
     if best is not None and not best.usable:
-        yield (
+        yield Notice(
             f"The model of lowest AIC is {best.label}, with "
             + (
                 "a drag that is negative at some speeds"
@@ -307,17 +308,19 @@ def _notes(study: TowStudy) -> Iterator[str]:
         )
     late = {model.unknowns: model.aic for model in study.models}
     if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
-        yield "A start delay explains these tows much better than none (--start-delay)."
+        yield Notice("A start delay explains these tows much better than none (--start-delay).")
     if any(fit.condition_scaled > COLLINEAR**2 for fit in study.methods.values()):
         theory = study.mass_by_theory[0].near_surface_kg if study.mass_by_theory else None
         known = f"{theory:.0f} by (2.5)" if theory is not None else "by theory"
         if theory is not None and span is not None and not span[0] <= theory <= span[1]:
             known += ", which these tows contradict"
-        yield f"Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, {known})."
+        yield Notice(
+            f"Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, {known})."
+        )
     if study.force.degree() > 0:
-        yield (
+        yield Notice(
             f"A card holds one force: the mean, {study.force_N:.4g} N; a simulation of these tows must be given the "
             "force over time (input tow.force)."
         )
     if study.start_delay:
-        yield "A card has no start delay: a simulation of these tows begins later by it."
+        yield Notice("A card has no start delay: a simulation of these tows begins later by it.")

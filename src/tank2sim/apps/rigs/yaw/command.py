@@ -12,6 +12,7 @@ from tank2sim.api.verbs import Output, verb
 from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument, checked
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD, write_together
+from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -311,7 +312,7 @@ def _similarity(record: YawRecord, text: str) -> str:
 
 
 def _with_notice(result: YawResult, text: str) -> YawResult:
-    return replace(result, study=replace(result.study, notes=(*result.study.notes, text)))
+    return replace(result, study=replace(result.study, notices=(*result.study.notices, Notice(text))))
 
 
 def _floating_body(text: str) -> FloatingBody:

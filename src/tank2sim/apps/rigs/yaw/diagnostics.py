@@ -11,7 +11,7 @@ from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawEstimate
 from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 
 _NOT_QUITE_MIRRORED = 0.03
 _FULL = 0.995
@@ -32,19 +32,18 @@ _APART = 3.0
 _SHARPER = 3.0
 
 
-def check_current(records: tuple[YawRecord, ...]) -> list[str]:
+def check_current(records: tuple[YawRecord, ...]) -> list[Notice]:
     """Notes on the files and their currents; InputError for a motor that is saturated or idle."""
     notes = []
     for record in records:
-        notes += [f"{record.path.name}: {note}" for note in record.notes]
+        notes += [note.of(record.path.name) for note in record.notes]
         largest = float(np.abs(record.current_A).max())
         if largest < _LEAST_A:
             problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
             raise InputError(record.path, "column current_A", problem, remedy)
         if largest > _STRONG_A:
-            notes.append(
-                f"{record.path.name}: the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
-            )
+            text = f"the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
+            notes.append(Notice(text).of(record.path.name))
         limit = record.constants.get("max_current_A")
         if limit is None:
             continue
@@ -62,8 +61,10 @@ def check_current(records: tuple[YawRecord, ...]) -> list[str]:
         if full.any():
             first = record.time_s[int(np.flatnonzero(full)[0])]
             notes.append(
-                f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
-                "evaluated."
+                Notice(
+                    f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
+                    "evaluated."
+                )
             )
     return notes
 
@@ -94,7 +95,7 @@ def check_sign(record: YawRecord, fit: EnergyFit) -> None:
         raise InputError(record.path, "column current_A", problem, "give current and angle the same positive sense")
 
 
-def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[str]:
+def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[Notice]:
     """Notes on intervals that are not quite mirror images; InputError beyond the limit."""
     place = 0
     for record in records:
@@ -112,8 +113,10 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
     worst = max(mirror)
     if worst > _NOT_QUITE_MIRRORED:
         return [
-            f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
-            "two-interval formulas are biased by the difference in dissipation."
+            Notice(
+                f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: "
+                "the two-interval formulas are biased by the difference in dissipation."
+            )
         ]
     return []
 
@@ -124,7 +127,7 @@ def _span(ends: tuple[float, float]) -> str:
 
 def check_added_inertia(
     record: YawRecord, inertia_kgm2: float, added: Mapping[str, tuple[float, float | None]]
-) -> list[str]:
+) -> list[Notice]:
     """Notes, marked, on an added inertia (kg m2, with its error, by method) that is uncertain or that few bodies have;
     InputError where all methods make it negative by more than its error: no body has that."""
     if not added:
@@ -142,18 +145,22 @@ def check_added_inertia(
         raise InputError(record.path, "", problem, remedy)
     if value < doubt:
         return [
-            f"{CHECK} the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
-            "kg m2; run a faster programme, more humps, or a body that carries more water."
+            caution(
+                f"the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
+                "kg m2; run a faster programme, more humps, or a body that carries more water."
+            )
         ]
     if not _LEAST_ADDED - doubt / inertia_kgm2 <= ratio <= _MOST_ADDED + doubt / inertia_kgm2:
         return [
-            f"{CHECK} the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
-            "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+            caution(
+                f"the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
+                "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+            )
         ]
     return []
 
 
-def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[str]:
+def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[Notice]:
     """Notes if (3) does not explain the record's motion, or a single hump cannot show it."""
     notes = []
     if misfit_rad is not None and misfit_rad > _PULSE_RAD:
@@ -167,10 +174,10 @@ def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) ->
             "One hump of part of a turn does not distinguish a moment of gravity from inertia: give two humps or more "
             "that begin at other angles."
         )
-    return notes
+    return [Notice(text) for text in notes]
 
 
-def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
+def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[Notice]:
     """Notes on the estimates."""
     best, two = estimates["energy_least_squares"], estimates["two_intervals"]
     notes = []
@@ -192,10 +199,10 @@ def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[st
     for term, (value, error) in best.friction.items():
         if error is not None and abs(value) < 2 * error:
             notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
-    return [*notes, *_comparison_notes(best, estimates.get("output_error"))]
+    return [*map(Notice, notes), *_comparison_notes(best, estimates.get("output_error"))]
 
 
-def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[str]:
+def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[Notice]:
     """Note on the nonlinear least squares, where they are more accurate or disagree with the energy least squares."""
     if nonlinear is None or not best.inertia_error_kgm2 or not nonlinear.inertia_error_kgm2:
         return []
@@ -203,13 +210,17 @@ def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[
     error = math.hypot(best.inertia_error_kgm2, nonlinear.inertia_error_kgm2)
     if difference > _APART * error:
         return [
-            f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, "
-            f"{difference / error:.2g} times their errors: an effect in the record is missing in the equations of "
-            "both, and in both errors."
+            Notice(
+                f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, "
+                f"{difference / error:.2g} times their errors: an effect in the record is missing in the equations of "
+                "both, and in both errors."
+            )
         ]
     if nonlinear.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
         return [
-            f"output_error is more accurate, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
-            f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; a card gets it with output_error as method."
+            Notice(
+                f"output_error is more accurate, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
+                f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; a card gets it with output_error as method."
+            )
         ]
     return []

@@ -143,7 +143,7 @@ def rig_card_text(result: YawIdentification, method: str, *, name: str, source: 
         YawRigResult(
             name=name,
             source=source,
-            notes=" ".join(result.notes),
+            notes=" ".join(result.notices),
             values=values,
             standard_errors=errors,
             programme={**motion, "rise_s": programme.rise_s, "settle_s": programme.settle_s, "humps": programme.humps},

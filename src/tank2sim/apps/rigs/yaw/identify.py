@@ -33,6 +33,7 @@ from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
 from tank2sim.apps.rigs.yaw.output_error import AngleFit, fit_angle
 from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, refuse_copied_records
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.notices import Notice
 
 YAW_METHODS = (
     "energy_least_squares",
@@ -114,7 +115,7 @@ class YawIdentification:
         The nonlinear least squares, where they converged.
     mirror : tuple of float
         Difference of the rates of each pair, over the largest.
-    notes : tuple of str
+    notices : tuple of Notice
         Messages for the user, in sentences.
     """
 
@@ -128,7 +129,7 @@ class YawIdentification:
     ideal: Interval
     angle: AngleFit | None
     mirror: tuple[float, ...]
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
     air: YawIdentification | None = field(default=None)
 
     def added_inertia(self, method: str) -> tuple[float, float | None] | None:
@@ -166,10 +167,10 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     alike = refuse_copied_records(records)
     if not wet:
         found = _result(dry, "air", options, None)
-        return replace(found, notes=(*alike, *found.notes))
+        return replace(found, notices=(*alike, *found.notices))
     air = _result(dry, "air", replace(options, terms=None), None) if dry else None
     found = _result(wet, "water", options, air)
-    return replace(found, notes=(*alike, *found.notes))
+    return replace(found, notices=(*alike, *found.notices))
 
 
 def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
@@ -256,18 +257,18 @@ def _result(
         ideal=ideal,
         angle=angle,
         mirror=mirror,
-        notes=(*notes, *remarks, *estimate_notes(fit, estimates)),
+        notices=(*notes, *remarks, *estimate_notes(fit, estimates)),
         air=air,
     )
     added = {name: value for name in estimates if (value := identified.added_inertia(name)) is not None}
     first = check_added_inertia(records[0], body.value_kgm2 if body else 0.0, added)
-    return replace(identified, notes=(*first, *identified.notes))
+    return replace(identified, notices=(*first, *identified.notices))
 
 
 Fits = tuple[EnergyFit, EnergyFit]
 
 
-def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> tuple[Fits, list[str]] | None:
+def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> tuple[Fits, list[Notice]] | None:
     """The fits with a moment of gravity, with a note, if the residual work varies with the angle.
 
     By the F test of the two terms at a thousandth, for a moment of at least a hundredth of the motor's mean: the test
@@ -290,21 +291,23 @@ def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> 
         f"The residual of (3) varies with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
         f"(--terms {','.join(fit.balance.terms[1:])} omits it). The two-interval formulas neglect it."
     )
-    return (extended, reference), [note]
+    return (extended, reference), [Notice(note)]
 
 
 def _angle(
     records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval
-) -> tuple[AngleFit | None, list[str]]:
+) -> tuple[AngleFit | None, list[Notice]]:
     """The nonlinear least squares, or None with the reason."""
     beyond = [term for term in first.friction if term not in (*WATER_TERMS, *GRAVITY)]
     if beyond:
         return None, [
-            f"output_error fits the terms of (3) and gravity and is left out, because {', '.join(beyond)} was "
-            "requested."
+            Notice(
+                f"output_error fits the terms of (3) and gravity and is left out, because {', '.join(beyond)} was "
+                "requested."
+            )
         ]
     angle = fit_angle(records, rig, first, ideal)
-    return angle, [] if angle else ["output_error: the fit of the angle did not converge and is left out."]
+    return angle, [] if angle else [Notice("output_error: the fit of the angle did not converge and is left out.")]
 
 
 def _rig(constant: float, known: YawRig | None) -> YawRig:
@@ -312,7 +315,7 @@ def _rig(constant: float, known: YawRig | None) -> YawRig:
     return (known or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
 
 
-def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tuple[float, list[str]]:
+def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tuple[float, list[Notice]]:
     constants = {record.constants.get("torque_constant_NmpA") for record in records}
     if options.torque_constant_NmpA is not None:
         return options.torque_constant_NmpA, []
@@ -328,12 +331,12 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
         return stated, []
     taken = f"the published rig's {TORQUE_CONSTANT_NMPA:g} N m/A is taken."
     note = f"No record states the torque constant: {taken}"
-    return TORQUE_CONSTANT_NMPA, [note]
+    return TORQUE_CONSTANT_NMPA, [Notice(note)]
 
 
 def _body(
     records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawIdentification | None
-) -> tuple[BodyInertia | None, list[str]]:
+) -> tuple[BodyInertia | None, list[Notice]]:
     if medium == "air":
         return None, []
     if options.inertia_kgm2 is not None:
@@ -354,15 +357,19 @@ def _body(
             inertia = BodyInertia(value_kgm2=stated, error_kgm2=error, source=f"comment of {record.path.name}")
             return inertia, _lacking(inertia)
     return None, [
-        "J_zz is unknown, so that the added inertia cannot be separated from the total: give a record in air as "
-        "well, or inertia_kgm2."
+        Notice(
+            "J_zz is unknown, so that the added inertia cannot be separated from the total: give a record in air as "
+            "well, or inertia_kgm2."
+        )
     ]
 
 
-def _lacking(body: BodyInertia) -> list[str]:
+def _lacking(body: BodyInertia) -> list[Notice]:
     if body.error_kgm2 is not None:
         return []
     return [
-        "J_zz has no standard error, and the error of the added inertia does not include one: give "
-        "inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
+        Notice(
+            "J_zz has no standard error, and the error of the added inertia does not include one: give "
+            "inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
+        )
     ]

@@ -13,7 +13,7 @@ import numpy as np
 from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 from tank2sim.units import to_si
@@ -57,7 +57,7 @@ class YawRecord:
         What else the comments state: ``torque_constant_NmpA``, ``inertia_kgm2`` (J_zz of the body with the rotor),
         its standard error ``inertia_error_kgm2``, ``max_current_A``, ``current_lag_s``, ``length_m``,
         ``water_density_kgpm3``.
-    notes : tuple of str
+    notes : tuple of Notice
         What the user should know of the file.
     """
 
@@ -69,7 +69,7 @@ class YawRecord:
     programme: YawProgramme
     stated: bool
     constants: dict[str, float]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Notice, ...] = ()
 
 
 def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
@@ -114,11 +114,11 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         programme=programme,
         stated=not missing,
         constants=constants,
-        notes=tuple(notes),
+        notes=tuple(map(Notice, notes)),
     )
 
 
-def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[str, ...]:
+def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[Notice, ...]:
     """Refuse a record that is another one again, also turned, cut, thinned or rounded; notices of mirror images.
 
     Raises
@@ -138,7 +138,7 @@ def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[str, ...]:
                 raise InputError(record.path, "", f"is the record of {name} again", remedy)
             if alike is Likeness.MIRROR and has_noise(seen[number]):
                 said = f"is the mirror image of {name}, noise included, not a second run"
-                notices.append(f"{CHECK} {record.path.name} {said}.")
+                notices.append(caution(f"{record.path.name} {said}."))
     return tuple(notices)
 
 

@@ -184,11 +184,6 @@ class YawResult(Result[YawStudy]):
         return f"{names}: in {study.medium}, k_t = {study.torque_constant_NmpA:.4g} N m/A{body}"
 
     @property
-    def notices(self) -> tuple[str, ...]:
-        """The notes."""
-        return self.study.notes
-
-    @property
     def headline(self) -> tuple[str, ...]:
         """The inertia by the energy least squares, and the records."""
         kind, inertia, error = self._best.inertia

@@ -15,6 +15,7 @@ from tank2sim.apps.rigs.yaw.output_error import AngleFit
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.apps.rigs.yaw.theory import TheoryValue
 from tank2sim.arrays import Array, Columns
+from tank2sim.notices import Notice
 from tank2sim.records.thinning import drawn_columns
 
 _HISTORY_SAMPLES = 900
@@ -117,7 +118,7 @@ class YawEstimates:
     energy_residuals : tuple of EnergyResidual
     angle_residual : dict, optional
         ``t_s`` and ``residual_rad`` of the nonlinear least squares, where they converged.
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     records: tuple[str, ...]
@@ -134,7 +135,7 @@ class YawEstimates:
     energy_balance: EnergyBalance
     energy_residuals: tuple[EnergyResidual, ...]
     angle_residual: Columns | None
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -178,7 +179,7 @@ def _estimates(identified: YawIdentification) -> dict[str, Any]:
         "energy_balance": energy_balance_means(identified.fit),
         "energy_residuals": _residuals(identified.fit),
         "angle_residual": _angle_residual(identified.angle),
-        "notes": identified.notes,
+        "notices": identified.notices,
     }
 
 

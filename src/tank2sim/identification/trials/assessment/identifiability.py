@@ -21,6 +21,7 @@ from tank2sim.identification.trials.methods.weak_form import WeakForm
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.notices import Notice
 
 CLOSE_CORRELATION = 0.95
 """Correlation of a reported pair of parameters: their difference has 39 times the variance of their sum."""
@@ -63,7 +64,7 @@ class Identifiability:
         Combinations of parameters that the trials do not determine.
     share : array (k,)
         Share of each parameter's information from the trials: 1 - (variance after / variance before).
-    notices : tuple of str
+    notices : tuple of Notice
         The same in words.
     """
 
@@ -74,7 +75,7 @@ class Identifiability:
     pairs: tuple[tuple[str, str, float], ...]
     unseen: tuple[tuple[str, ...], ...]
     share: Array
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
@@ -219,7 +220,7 @@ def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...]
     )
 
 
-def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[str]:
+def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[Notice]:
     """Messages on correlated pairs, one for each cause."""
     drifting: list[str] = []
     remaining: list[str] = []
@@ -233,7 +234,7 @@ def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[str]:
         messages.append(f"the estimates of {_listed(drifting)} are correlated, and drift together: {cause}")
     if remaining:
         messages.append(f"the estimates of {_listed(remaining)} are correlated: the trials hardly distinguish them")
-    return messages
+    return [Notice(text) for text in messages]
 
 
 def _drift(first: Term, second: Term) -> bool:
@@ -242,13 +243,13 @@ def _drift(first: Term, second: Term) -> bool:
     return same and not (first.acceleration or second.acceleration) and first.v + first.r == second.v + second.r
 
 
-def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> list[str]:
+def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> list[Notice]:
     single = [direction[0] for direction in unseen if len(direction) == 1]
     several = [_listed(list(direction)) for direction in unseen if len(direction) > 1]
     messages = [f"the trials show next to nothing of {_listed(single)}: the prior remains"] if single else []
     if several:
         messages.append(f"the trials determine only a combination of {'; of '.join(several)}")
-    return messages
+    return [Notice(text) for text in messages]
 
 
 def _listed(words: list[str]) -> str:

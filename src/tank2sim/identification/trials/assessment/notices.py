@@ -9,7 +9,7 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.evaluation import pooled
 from tank2sim.identification.trials.identify import Identification
-from tank2sim.marks import CHECK
+from tank2sim.notices import Level, Notice, caution
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
 
@@ -28,7 +28,7 @@ LACKING = 3.0
 standard errors are rare by chance)."""
 
 
-def remarks(result: Identification) -> tuple[str, ...]:
+def remarks(result: Identification) -> tuple[Notice, ...]:
     """All notices, as sentences."""
     return (
         *_recognised(result),
@@ -40,57 +40,64 @@ def remarks(result: Identification) -> tuple[str, ...]:
     )
 
 
-def _recognised(result: Identification) -> list[str]:
+def _recognised(result: Identification) -> list[Notice]:
     text = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
-    return [f"recognised, to starboard positive: {text}"] if text else []
+    return [Notice(f"recognised, to starboard positive: {text}")] if text else []
 
 
-def _chosen(result: Identification) -> list[str]:
+def _chosen(result: Identification) -> list[Notice]:
     if result.card.model.kind == "mmg":
         return []  # it has one structure
     if not result.structures and result.structure == "card":
         return [
-            "other structures were not tried: structure auto cross-validates them, cross_flow extrapolates to turns"
+            Notice(
+                "other structures were not tried: structure auto cross-validates them, cross_flow extrapolates to turns"
+            )
         ]
     if not result.structures:
         return []
     return [
-        f"cross-validation chose the structure {result.structure}: the simplest of those within one standard error "
-        "of the best"
+        Notice(
+            f"cross-validation chose the structure {result.structure}: the simplest of those within one standard error "
+            "of the best"
+        )
     ]
 
 
-def _widened(result: Identification) -> list[str]:
+def _widened(result: Identification) -> list[Notice]:
     scale = result.estimate.prior_scale
     wide = [f"{group} {factor:.3g} times" for group, factor in sorted(scale.items()) if factor > 1.05]
     if not wide:
         return []
     far = max(scale.values()) > LACKING
-    mark = f"{CHECK} " if far and result.started.uncertainty else ""  # assumed errors may be too small
-    found = [
-        f"{mark}the card's standard errors were widened as the trials demand: {', '.join(wide)}; trust_card keeps them"
-    ]
+    doubtful = far and result.started.uncertainty  # assumed errors may be too small
+    text = f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; trust_card keeps them"
+    found = [Notice(text, Level.CAUTION if doubtful else Level.INFO)]
     if far:
         found.append(
-            "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these trials "
-            "and the card as it was given, finds which"
+            Notice(
+                "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these "
+                "trials and the given card, finds which"
+            )
         )
     return found
 
 
-def _worse(result: Identification) -> list[str]:
+def _worse(result: Identification) -> list[Notice]:
     messages = []
     for words, before, after in result.comparisons:
         old, new = pooled(before.following, "motion.r"), pooled(after.following, "motion.r")
         if new > WORSE * old:
             messages.append(
-                f"{CHECK} WORSE than the card before on the trials {words}: "
-                f"yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
+                caution(
+                    f"WORSE than the card before on the trials {words}: "
+                    f"yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
+                )
             )
     return messages
 
 
-def _outside(result: Identification) -> list[str]:
+def _outside(result: Identification) -> list[Notice]:
     if result.holdout is None:
         return []
     missed = [
@@ -98,16 +105,16 @@ def _outside(result: Identification) -> list[str]:
         for figure in result.holdout.figures
         if figure.interval and not figure.interval[0] <= figure.measured <= figure.interval[1]
     ]
-    return [f"measured outside the 95 % interval: {', '.join(missed)}"] if missed else []
+    return [Notice(f"measured outside the 95 % interval: {', '.join(missed)}")] if missed else []
 
 
-def _stops(card: ManoeuvringCard) -> list[str]:
+def _stops(card: ManoeuvringCard) -> list[Notice]:
     """Trials seldom hold a full turn: simulate a turn to each side with the card."""
     gear = card.steering_gear
     largest = HARD_TURN if gear is None or gear.max_angle_rad is None else min(HARD_TURN, gear.max_angle_rad)
     messages = []
     for side, word in ((1, "starboard"), (-1, "port")):
-        words = f"{CHECK} in a {math.degrees(largest):.0f} deg turn to {word} the model found"
+        words = caution(f"in a {math.degrees(largest):.0f} deg turn to {word} the model found")
         try:
             speed = simulate(build(card), Turn(side * largest)).trajectory["motion.speed"]
         except InputError:
@@ -117,4 +124,4 @@ def _stops(card: ManoeuvringCard) -> list[str]:
             messages.append(
                 f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: it holds only near the trials"
             )
-    return messages
+    return [Notice(text) for text in messages]

@@ -23,7 +23,6 @@ from tank2sim.identification.trials.problem.estimation_problem import Estimate, 
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
-from tank2sim.marks import CHECK
 
 FACTOR = 2.0
 """Least ratio, either way, of the yaw acceleration by the rudder in all trials to the card's. It is 0.4 to 1.5 on
@@ -101,7 +100,7 @@ def evidence_of_other_ship(card: ManoeuvringCard, trials: Measured) -> tuple[str
 def not_of_ship(card: ManoeuvringCard, trials: Measured, evidence: Sequence[str], remedy: str) -> InputError:
     """The refusal of trials that are not of the card's ship by `evidence`; `remedy` says what to do."""
     names = ", ".join(trial.name for trial in trials.trials)
-    reasons = "; ".join((*evidence, *(doubt.removeprefix(f"{CHECK} ").rstrip(".") for doubt in doubts(card))))
+    reasons = "; ".join((*evidence, *(doubt.rstrip(".") for doubt in doubts(card))))
     return InputError(names, "", f"not trials of the ship of {card.source}: {reasons}", remedy)
 
 

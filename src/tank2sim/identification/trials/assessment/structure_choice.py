@@ -34,7 +34,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_correlations,
 )
 from tank2sim.identification.trials.problem.structures import STRUCTURES
-from tank2sim.marks import CHECK
+from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import RUDDERS, Trial
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
@@ -58,7 +58,7 @@ prediction)."""
 
 def structure_by_evidence(
     card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, holdout: Measured | None = None
-) -> tuple[str, tuple[str, ...]]:
+) -> tuple[str, tuple[Notice, ...]]:
     """Name of the structure, and a notice: cross-flow drag, or the card's own terms if the trials prefer them strongly.
 
     Both are fitted by equation error. Terms of the card are preferred if their Bayesian information criterion is less
@@ -100,7 +100,7 @@ def structure_by_evidence(
     )
     hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
     in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER
-    return taken, (chosen, *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
+    return taken, (Notice(chosen), *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
 
 
 def _predicts_better(of_card: Problem, drag: Problem) -> bool:
@@ -118,8 +118,8 @@ def _largest_rudder(trial: Trial) -> float:
     return max((float(np.nanmax(np.abs(values))) for values in known), default=0.0)
 
 
-def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[str]:
-    """A marked sentence if the turns of two structures that the trials do not distinguish are different ones."""
+def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[Notice]:
+    """A caution if the turns of two structures that the trials do not distinguish are different ones."""
     gear = drag.steering_gear
     rudder = min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
     sizes = [_tactical_diameter(each, rudder) for each in (of_card, drag)]
@@ -128,9 +128,11 @@ def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str)
     texts = [f"{size:.2f} L" if np.isfinite(size) else "none" for size in sizes]
     mine, other = (", taken", "") if taken == "card" else ("", ", taken")
     return (
-        f"{CHECK} the trials hardly distinguish two structures of the hull, whose turns with "
-        f"{math.degrees(rudder):.0f} deg of rudder have tactical diameters of {texts[1]} (cross-flow drag{other}) and "
-        f"{texts[0]} (the card's own terms{mine}): fit or hold out a turn with as much rudder",
+        caution(
+            "the trials hardly distinguish two structures of the hull, whose tactical diameters with "
+            f"{math.degrees(rudder):.0f} deg of rudder are {texts[1]} (cross-flow drag{other}) and {texts[0]} (the "
+            f"card's own terms{mine}): fit or hold out a turn with as much rudder"
+        ),
     )
 
 

@@ -20,6 +20,7 @@ from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_new
 from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
+from tank2sim.notices import Notice
 
 REPORTED_NOISE = 0.01
 """Share of noise in a regressor's variance from which a notice reports it: its coefficients may be too small by it."""
@@ -234,7 +235,7 @@ def _minimise(
     return best.values, best.windows, last or linearise(best)
 
 
-def _form_notices(form: WeakForm) -> list[str]:
+def _form_notices(form: WeakForm) -> list[Notice]:
     """Notices of regressors with remaining noise, and of parameters that no acceleration depends on."""
     messages = []
     spread = np.concatenate([run.motion.smooth[:, :3] for run in form.runs]).std(axis=0)
@@ -248,4 +249,4 @@ def _form_notices(form: WeakForm) -> list[str]:
     blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
     if blind:
         messages.append(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")
-    return messages
+    return [Notice(text) for text in messages]

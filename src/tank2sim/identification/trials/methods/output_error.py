@@ -25,11 +25,12 @@ from tank2sim.identification.trials.problem.estimation_problem import (
     SearchReport,
     silent,
 )
+from tank2sim.notices import Notice
 
 LONGEST_SEARCH = 25
 """Steps after which a search ends; it needs 3 to 10."""
 
-INTERRUPTED = "interrupted: the estimates are the best found so far"
+INTERRUPTED = Notice("interrupted: the estimates are the best found so far")
 
 
 @dataclass(frozen=True)
@@ -207,7 +208,7 @@ def _new_noise(
 
 
 def _estimate(
-    problem: Problem, search: _Search, normals: list[Normal], notices: tuple[str, ...], motion: FittedMotion
+    problem: Problem, search: _Search, normals: list[Normal], notices: tuple[Notice, ...], motion: FittedMotion
 ) -> Estimate:
     information = np.asarray(sum(normal.matrix for normal in normals))
     prior = scaled_prior(problem, search.scale)

@@ -29,6 +29,7 @@ from tank2sim.identification.trials.methods.shooting import Shooting, cut, white
 from tank2sim.identification.trials.options import DRAWS_OF_CHAIN, Sampler
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.notices import Notice, caution
 from tank2sim.simulation.rows import Chain
 from tank2sim.simulation.scheme import runge_kutta_step
 
@@ -56,10 +57,6 @@ LEAST_CURVATURE = 0.1
 
 LEAST_LIKELY = 1e8
 """Sum of squares in place of one that is infinite, which ends a Hamiltonian trajectory (project choice)."""
-
-
-NOT_CONVERGED = "NOT CONVERGED"
-"""Mark of chains that disagree or are too short."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,18 +105,18 @@ class PosteriorSamples:
         return bool(self.r_hat.max() < LARGEST_R_HAT and self.effective.min() >= FEWEST_EFFECTIVE)
 
     @property
-    def notices(self) -> list[str]:
+    def notices(self) -> list[Notice]:
         """How it was sampled; first of all, that the chains have not converged."""
         worst, least = int(np.argmax(self.r_hat)), int(np.argmin(self.effective))
         reached = (
             f"R-hat is {self.r_hat[worst]:.4f} or less (of {self.free[worst]}), the effective sample size "
             f"{self.effective[least]:.0f} or more (of {self.free[least]})"
         )
-        words = f"posterior of {len(self.free)} parameters by {self.sampler}, {len(self.flat)} draws: {reached}"
+        words = Notice(f"posterior of {len(self.free)} parameters by {self.sampler}, {len(self.flat)} draws: {reached}")
         if self.converged:
             return [words]
         wanted = f"below {LARGEST_R_HAT} and {FEWEST_EFFECTIVE} or more are wanted: give more draws"
-        return [f"{NOT_CONVERGED}: {words}; {wanted}"]
+        return [caution(f"NOT CONVERGED: {words}; {wanted}")]
 
 
 def check_sampler(name: Sampler) -> None:

@@ -24,6 +24,7 @@ from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, MeasuredMotion, measured_motion
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, rudder_at_start
+from tank2sim.notices import Notice
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -86,7 +87,7 @@ class WeakForm:
         self.runs = tuple(self._prepared(run) for run in problem.runs)
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """Notices of derived signals."""
         return tuple(notice for run in self.runs for notice in run.motion.notices)
 

@@ -12,6 +12,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.notices import Notice
 
 LITTLE_KNOWN = 0.25
 """A standard error of at least this share of the value is not widened (project choice)."""
@@ -156,7 +157,7 @@ class Estimate:
         Minimised function after each iteration.
     prior_scale : mapping
         Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`).
-    notices : tuple of str
+    notices : tuple of Notice
         Messages for the user.
     motion : FittedMotion, optional
         What output error fitted in addition to the parameters.
@@ -172,7 +173,7 @@ class Estimate:
     noise: Mapping[str, float] = field(default_factory=dict)
     cost: tuple[float, ...] = ()
     prior_scale: Mapping[str, float] = field(default_factory=dict)
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     motion: FittedMotion | None = None
     samples: Array | None = None
 

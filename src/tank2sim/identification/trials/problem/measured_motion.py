@@ -20,6 +20,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import LONGEST_GAP, SampledRun
+from tank2sim.notices import Notice
 from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
 
 VELOCITIES = ("motion.u", "motion.v", "motion.r")
@@ -51,7 +52,7 @@ class MeasuredMotion:
         Standard deviation of the measurement of u, v, r.
     remaining_noise : array (3,)
         The same after smoothing.
-    notices : tuple of str
+    notices : tuple of Notice
         One for each derived signal.
     """
 
@@ -59,7 +60,7 @@ class MeasuredMotion:
     smooth: Array
     noise: Array
     remaining_noise: Array
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
@@ -80,14 +81,14 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
         if "motion.psi" in missing:
             raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
         columns["motion.r"] = _slope(columns["motion.psi"], window, run.step_s)
-        notices.append(f"{run.name}: the yaw rate is the slope of the smoothed heading")
+        notices.append(Notice(f"{run.name}: the yaw rate is the slope of the smoothed heading"))
     if "motion.psi" in missing:
         columns["motion.psi"] = cumulative_trapezoid(_filled(columns["motion.r"]), dx=run.step_s, initial=0.0)
     derived = missing & {"motion.u", "motion.v"}
     if derived:
         derived_columns, source = _velocities(problem.model, run, columns, window)
         columns |= {name: derived_columns[name] for name in derived}
-        notices.append(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}")
+        notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
     _complete_positions(columns, missing, run.step_s)
     velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
     smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)

@@ -13,7 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
-from tank2sim.marks import CHECK
+from tank2sim.notices import Level, Notice
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies
@@ -43,7 +43,7 @@ class Measured:
     trials : tuple of Trial
     driven_by : str
         ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
-    notices : tuple of str
+    notices : tuple of Notice
         Repairs and scalings.
     captive : CaptiveRuns, optional
         Captive tests, at the size of their model.
@@ -51,7 +51,7 @@ class Measured:
 
     trials: tuple[Trial, ...]
     driven_by: str
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     captive: CaptiveRuns | None = None
 
 
@@ -89,7 +89,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         scaled, factor = at_size_of(trial, card)
         _refuse_other_revolutions(scaled, card)
         if factor != 1:
-            notices.append(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long")
+            notices.append(Notice(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
         trials.append(scaled)
     names = [trial.name for trial in trials]
     for trial in trials:
@@ -105,20 +105,20 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices))
 
 
-def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[str]:
+def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
     """Notices of an audit's findings by file names; faults of one column that were repaired alike are one."""
-    groups: dict[tuple[str, str, str, str], list[tuple[str, str]]] = {}
+    groups: dict[tuple[Level, str, str, str], list[tuple[str, str]]] = {}
     for name, findings in audited.items():
         for finding in findings:
             done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
-            mark = f"{CHECK} " if finding.kind == "fault" else ""
-            key = mark, finding.column, finding.what, done
+            level = Level.CAUTION if finding.kind == "fault" else Level.INFO
+            key = level, finding.column, finding.what, done
             groups.setdefault(key, []).append((name, finding.likely_truth))
     notices = []
-    for (mark, column, what, done), places in groups.items():
+    for (level, column, what, done), places in groups.items():
         (name, truth), others = places[0], [other for other, _ in places[1:]]
         again = f"; the same in {', '.join(others)}, each with its own values" if others else ""
-        notices.append(f"{mark}{name}: {column}: {what}; {done}: {truth}{again}")
+        notices.append(Notice(f"{name}: {column}: {what}; {done}: {truth}{again}", level))
     return notices
 
 
@@ -130,25 +130,25 @@ def _refuse_open(finding: Finding) -> None:
         raise InputError(finding.source, place, finding.what, remedy)
 
 
-def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
+def _unused(trial: Trial, card: ManoeuvringCard) -> list[Notice]:
     """Notices of the signals of a trial that are not used."""
     notices = []
     for name, effect in EFFECTS.items():
         signals = set(effect.measured_as.values())
         if signals and signals <= set(trial.signals) and all(entry.name != name for entry in card.effects):
             notices.append(
-                f"{trial.path.name}: {name} was measured, and the card has no effect {name!r} that would use it"
+                Notice(f"{trial.path.name}: {name} was measured, and the card has no effect {name!r} that would use it")
             )
     return notices
 
 
-def _gaps_of_rudder(trial: Trial) -> list[str]:
+def _gaps_of_rudder(trial: Trial) -> list[Notice]:
     """A notice of rows without a rudder."""
     rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
     empty = 0 if rudder is None else int(np.isnan(rudder).sum())
     if not empty:
         return []
-    return [f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings"]
+    return [Notice(f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings")]
 
 
 def _refuse_other_revolutions(trial: Trial, card: ManoeuvringCard) -> None:

@@ -31,6 +31,7 @@ from tank2sim.identification.trials.problem.estimation_problem import Estimate, 
 from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
+from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
 
@@ -84,7 +85,7 @@ def with_polynomial_down_to(card: ManoeuvringCard, speed_mps: float) -> Manoeuvr
     return revised(card, {}, {"model.low_speed_below_mps": speed_mps}, comment="slowest speed of the trials")
 
 
-def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[str, ...]:
+def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[Notice, ...]:
     """What :func:`polynomial_over_trials` changed of a card, as a notice; empty if nothing.
 
     Parameters
@@ -97,7 +98,7 @@ def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple
     text = (
         f"{given.source} states no range of speeds; its polynomial is used down to {card.model.low_speed_bound_mps:g}"
     )
-    return (f"{text} m/s, near the slowest of the trials (model.low_speed_below_mps)",)
+    return (Notice(f"{text} m/s, near the slowest of the trials (model.low_speed_below_mps)"),)
 
 
 def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
@@ -124,8 +125,11 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
         if len(below) and time[below[0]] - trial.time_s[0] >= SHORTEST_AHEAD * ship_time:
             end = float(time[below[0]])
             notices.append(
-                f"{trial.name}: compared up to {end:.0f} s; from then on the ship is slower than "
-                f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends (model.low_speed_below_mps)"
+                Notice(
+                    f"{trial.name}: compared up to {end:.0f} s, when the ship falls below "
+                    f"{card.model.low_speed_bound_mps:g} m/s, where the card's polynomial ends "
+                    "(model.low_speed_below_mps)"
+                )
             )
             trials.append(window(trial, trial.time_s[0], end))
         else:
