@@ -213,7 +213,7 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
             return [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
         usual = verb.default_ship or None
         card = "[CARD]" if usual else "CARD"
-        usually = {"default": usual} if usual else {}
+        usually: dict[str, Any] = {"default": usual} if usual else {}
         return [click.Argument([one.name], metavar=card, required=not usual, **usually), change]
     if written := _written(kind):
         output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
