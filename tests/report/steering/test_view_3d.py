@@ -48,7 +48,7 @@ def test_only_a_page_that_is_asked_for_it_has_the_view(mariner):
 
 
 def test_the_licence_of_three_js_is_in_the_package():
-    folder = bundled("models").parent / "src" / "tank2sim" / "report" / "steering"
+    folder = bundled("models").parent / "src" / "tank2sim" / "apps" / "steering"
     assert "three.js authors" in (folder / "three.LICENSE").read_text(encoding="utf-8")
 
 
