@@ -11,7 +11,7 @@ from tank2sim.cli.derived import command_of
 from tank2sim.errors import InputError
 from tests.records.motions import motion, trial
 
-COMMAND = command_of("audit", audit.verb)
+COMMAND = command_of(audit.verb)
 
 
 def run(*arguments):

@@ -23,7 +23,7 @@ def path(tmp_path_factory):
 
 
 def run(*arguments):
-    result = CliRunner().invoke(command_of("reduce", reduce.verb), [str(argument) for argument in arguments])
+    result = CliRunner().invoke(command_of(reduce.verb), [str(argument) for argument in arguments])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

@@ -79,6 +79,6 @@ def test_constants_leave_the_equations_as_they_are() -> None:
 
 def test_the_command_takes_the_option(tmp_path: Path) -> None:
     path = tmp_path / "closed.fmu"
-    done = CliRunner().invoke(command_of("export", make_fmu_file.verb), ["mariner", "-o", str(path), "--no-sources"])
+    done = CliRunner().invoke(command_of(make_fmu_file.verb), ["mariner", "-o", str(path), "--no-sources"])
     assert done.exit_code == 0
     assert not [name for name in zipfile.ZipFile(path).namelist() if name.startswith("sources/")]

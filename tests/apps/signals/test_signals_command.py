@@ -1,0 +1,162 @@
+"""``tank2sim signals``: table, JSON, page, and filtered trials that never replace the measured ones."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tank2sim.apps.signals.command import signals
+from tank2sim.cli.derived import command_of
+from tank2sim.errors import InputError
+from tank2sim.records.reading import read_trial_file
+
+COMMAND = command_of(signals.verb)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """300 s of a rudder in steps, a yaw rate of K 0.08 1/s and T 3 s with noise, a heading; written by hand."""
+    random = np.random.default_rng(8)
+    rudder = np.repeat(random.uniform(-20, 20, 400), random.integers(5, 40, 400))[:3000]
+    rate, a = np.zeros(3000), np.exp(-0.1 / 3.0)
+    for row in range(1, 3000):
+        rate[row] = a * rate[row - 1] + 0.08 * (1 - a) * rudder[row - 1]
+    heading = 100 + 0.1 * np.cumsum(rate)
+    noisy = rate + 0.05 * random.standard_normal(3000)
+    rows = np.column_stack([0.1 * np.arange(3000), rudder, np.full(3000, 84.0), noisy, heading])
+    file = tmp_path_factory.mktemp("signals") / "steps.csv"
+    lines = [",".join(f"{value:.6g}" for value in row) for row in rows]
+    comments = ["# scale: 45.714", "# noise: r_degps 0.05, psi_deg 0.1"]
+    file.write_text("\n".join([*comments, "t_s,delta_deg,n_rpm,r_degps,psi_deg", *lines]) + "\n")
+    return file
+
+
+def run(*arguments):
+    result = CliRunner(env={"COLUMNS": "160"}).invoke(COMMAND, [str(argument) for argument in arguments])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def test_table_and_json_have_each_column_in_the_units_of_the_file(path, tmp_path):
+    shown = run(path, "--json", tmp_path / "found.json")
+    assert shown.exit_code == 0
+    for word in ("delta_deg", "r_degps", "psi_deg", "constant", "stationary", "corr."):
+        assert word in shown.output
+    (trial,) = json.loads((tmp_path / "found.json").read_text())["trials"]
+    values = read_trial_file(path).signals
+    column = trial["columns"]["r_degps"]
+    assert column["unit"] == "deg/s"
+    assert column["standard_deviation"] == pytest.approx(np.rad2deg(np.std(values["r_radps"])))
+    spectrum = column["spectrum"]
+    area = np.sum(spectrum["density"]) * spectrum["frequency_hz"][0]
+    assert area == pytest.approx(column["standard_deviation"] ** 2, rel=0.2)
+    density = column["probability_density"]
+    assert np.trapezoid(density["density"], density["values"]) == pytest.approx(1.0, abs=0.01)
+    assert trial["columns"]["n_rpm"]["constant"] is True
+    assert trial["columns"]["n_rpm"]["mean"] == pytest.approx(84.0)
+    steering = trial["rudder_to_yaw_rate"]
+    assert np.hypot(*steering["transfer"]["response"][1]) == pytest.approx(0.08, rel=0.2)
+    assert steering["cross_correlation"]["lag_of_largest_s"] > 0
+
+
+@pytest.mark.parametrize("name", ["r_degps", "r_radps", "r"])
+def test_one_column_by_any_of_its_names(path, name):
+    shown = run(path, "--columns", name).output
+    assert "r_degps" in shown
+    assert "psi_deg" not in shown
+
+
+def test_a_column_that_is_not_there_is_refused(path):
+    with pytest.raises(InputError, match=r"column phi_deg: is not in the trial; give one of delta_deg"):
+        run(path, "--columns", "phi_deg")
+
+
+def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
+    out = tmp_path / "filtered.csv"
+    shown = run(path, "--columns", "r", "--filter", "lowpass:0.3,causal", "-o", out)
+    assert "delays 0.15 Hz by" in shown.output
+    before, after = read_trial_file(path), read_trial_file(out)
+    assert "r_degps filtered by lowpass:0.3,causal: delays 0.15 Hz" in out.read_text().splitlines()[1]
+    assert np.std(np.diff(after.signals["r_radps"])) < 0.4 * np.std(np.diff(before.signals["r_radps"]))
+    for name in ("delta_rad", "n_radps", "psi_rad"):
+        assert np.allclose(after.signals[name], before.signals[name], rtol=1e-9, atol=1e-12)
+    assert np.allclose(after.time_s, before.time_s)
+    assert after.scale == before.scale
+    assert dict(after.noise) == {"psi_rad": pytest.approx(np.deg2rad(0.1))}
+
+
+def test_detrending_and_smoothing_write_trials_too(path, tmp_path):
+    for text in ("detrend:1", "savgol:11,3", "spline:0.5", "bandpass:0.01,0.5"):
+        assert "no phase shift" in run(path, "--columns", "r", "--filter", text, "-o", tmp_path / "o.csv").output
+        assert read_trial_file(tmp_path / "o.csv").signals["r_radps"].shape == (3000,)
+
+
+def test_decimation_thins_the_whole_trial(path, tmp_path):
+    out = tmp_path / "thin.csv"
+    run(path, "--filter", "decimate:5", "-o", out)
+    before, after = read_trial_file(path), read_trial_file(out)
+    assert np.allclose(after.time_s, before.time_s[::5])
+    # What is left of the noise, 0.05 deg/s times the root of 0.8/5, makes up this difference.
+    error = np.rad2deg(np.std((after.signals["psi_rad"] - before.signals["psi_rad"][::5])[20:-20]))
+    assert error < 0.02
+    assert set(after.signals) == set(before.signals)
+
+
+def test_the_measured_trial_is_never_overwritten(path, tmp_path):
+    text = path.read_text()
+    for options, match in ((["-o", path], "would be overwritten"), (["--json", path], "ends in .csv")):
+        with pytest.raises(InputError, match=match):
+            run(path, "--columns", "r", "--filter", "lowpass:0.3", *options)
+    with pytest.raises(InputError, match="two outputs"):
+        run(path, "--columns", "r", "--filter", "lowpass:0.3", "-o", tmp_path / "a", "--json", tmp_path / "a")
+    assert path.read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["-o", "x.csv"], "needs a filter"), (["--filter", "lowpass:0.3"], "must be named"),
+     (["--columns", "r", "--filter", "lowpass:77"], "not between"),
+     (["--columns", "r", "--filter", "x"], "not a filter"),
+     (["--columns", "r", "--filter", "decimate:2"], "leave the column out"), (["--segment", "900"], "not a length")],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused_in_one_line(path, options, words):
+    with pytest.raises(InputError, match=words):
+        run(path, *options)
+
+
+def test_a_column_with_a_long_gap_is_left_out_with_a_notice_or_refused_by_name(path, tmp_path):
+    lines = path.read_text().splitlines()
+    gappy = tmp_path / "gappy.csv"
+    cut = [line if not 1000 <= n < 1100 else ",".join([*line.split(",")[:-1], ""]) for n, line in enumerate(lines)]
+    gappy.write_text("\n".join(cut) + "\n")
+    assert "psi_deg is left out: it has no value from" in run(gappy).output
+    with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it with --max-gap"):
+        run(gappy, "--columns", "psi")
+    assert "interpolated by straight lines" in run(gappy, "--columns", "psi", "--max-gap", "12").output
+
+
+@pytest.mark.slow
+def test_charts_and_a_page_that_fetches_nothing(path, tmp_path):
+    plots = tmp_path / "plots"
+    run(path, "--columns", "r", "--plot", plots)
+    pictures = {picture.name for picture in plots.glob("*.png")}
+    of_r = {f"steps_r_{name}.png" for name in ("density", "autocorrelation", "spectrum")}
+    assert pictures == {*of_r, "steps_histories.png"}
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
+    page = (plots / "report.html").read_text()
+    assert "yaw rate" in page
+    assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
+
+
+def test_measured_trials_of_every_kind(data, tmp_path):
+    files = [
+        data / "data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_20_10_S.dat",
+        *sorted((data / "data/esso_osaka/zigzag").glob("*.csv"))[:1],
+    ]
+    if not all(file.exists() for file in files):
+        pytest.skip("the measured trials are missing")
+    shown = run(*files, "--columns", "r", "--columns", "delta").output
+    assert shown.count("rudder angle to yaw rate: correlation") == 2
