@@ -1,7 +1,8 @@
 """How many modules a trial, a campaign and a card enter on their way to a card or an FMU, and a gap on its way out.
 
 Each command runs in this process under a profile of calls; what is counted are the modules of tank2sim in which a
-function was called, without the command line and the pages, and the rooms (packages) in which they are.
+function was called, other than by an import, without the command line and the presentation of results, and the rooms
+(packages) in which they are.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 
 ROOT = Path(__file__).resolve().parents[1]
-OUTSIDE = ("cli", "report")  # how a result is shown is another walk
+OUTSIDE = ("cli", "answer", "results")  # how a result is shown is another walk
 WALKS = {
     "trial to card": "identify mariner trials/zigzag.csv --method equation_error -o identified.toml",
     "campaign to card": "reduce campaign/campaign.toml -o reduced.toml",
@@ -30,9 +31,13 @@ def entered(package: Path) -> Iterator[set[str]]:
     """The modules below the folder `package` in which a function is called, by their path below it."""
     modules: set[str] = set()
     start = f"{package}/"
+    imports = 0  # that have begun and not ended
 
     def profile(frame: FrameType, event: str, _: object) -> None:
-        if event == "call" and frame.f_code.co_filename.startswith(start) and frame.f_code.co_name != "<module>":
+        nonlocal imports
+        if frame.f_code.co_name == "<module>":
+            imports += {"call": 1, "return": -1}.get(event, 0)
+        elif event == "call" and not imports and frame.f_code.co_filename.startswith(start):
             modules.add(frame.f_code.co_filename.removeprefix(start))
 
     sys.setprofile(profile)

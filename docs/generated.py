@@ -13,6 +13,7 @@ import json
 import math
 import pkgutil
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -27,6 +28,9 @@ from sphinx.util import logging
 import tank2sim
 from tank2sim.api.results import commands_with_results, json_schema
 from tank2sim.apps.design import tank_form
+from tank2sim.apps.rigs.glider import card as glider_card
+from tank2sim.apps.rigs.tow import card as tow_card
+from tank2sim.apps.rigs.yaw import card as yaw_card
 from tank2sim.cards import form, read_card
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as program
@@ -37,6 +41,9 @@ from tank2sim.fmu.interface import FmuVariable, interface
 from tank2sim.records import campaign_form
 
 SOURCES = Path(tank2sim.__file__).parent
+
+FORMS = (form, campaign_form, tank_form, glider_card, tow_card, yaw_card)
+"""Modules with the sections and keys of cards and campaigns."""
 
 _CHOICE = re.compile(r"project\s+choice", re.IGNORECASE)
 
@@ -219,9 +226,7 @@ def schemas() -> str:
 
 def keys(name: str) -> str:
     """The keys of a section of a card or campaign, with the default where the file gives none."""
-    section: type[BaseModel] = next(
-        vars(module)[name] for module in (form, campaign_form, tank_form) if name in vars(module)
-    )
+    section: type[BaseModel] = next(vars(module)[name] for module in FORMS if name in vars(module))
     lines = ["| key | where the file gives none |", "|---|---|"]
     for key, field in section.model_fields.items():
         absent = "required" if field.is_required() else _absent(field.default)
@@ -261,7 +266,7 @@ def _variable(one: FmuVariable) -> str:
 
 
 def modules(package: str) -> list[str]:
-    """Public modules of a package: those that commands and Python API import, and those that the theory names."""
+    """Public modules of a package: commands, what they and the Python API import, and what the theory names."""
     path = importlib.import_module(f"tank2sim.{package}").__path__
     there = [f"tank2sim.{package}", *(one.name for one in pkgutil.walk_packages(path, f"tank2sim.{package}."))]
     return sorted(name for name in there if name in _imported_by_interfaces() or name in _named_by_theory())
@@ -269,11 +274,15 @@ def modules(package: str) -> list[str]:
 
 @cache
 def _imported_by_interfaces() -> frozenset[str]:
-    package = Path(tank2sim.__file__).parent
-    files = [*package.glob("cli/*.py"), *package.glob("api/*.py")]
+    files = [*SOURCES.glob("cli/*.py"), *SOURCES.glob("api/*.py"), *_commands_of_apps()]
     return frozenset(
         name for file in files for name in re.findall(r"from (tank2sim[\w.]+) import", file.read_text("utf-8"))
     )
+
+
+def _commands_of_apps() -> Iterator[Path]:
+    """The modules of apps that declare commands."""
+    return (path for path in SOURCES.glob("apps/**/*.py") if "\n@verb" in path.read_text("utf-8"))
 
 
 @cache

@@ -64,10 +64,15 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("cards/examination.py", "cards/plausibility.py"),
         ("tests/cards/test_examination.py", "tests/identification/captive/test_warnings.py"),
     ),
-    "guess": (("analysis/guess/*.py",), ("tests/analysis/guess",)),
+    "guess": (("apps/guess/*.py",), ("tests/apps/guess",)),
     "logs": (
-        ("logs/clock.py", "logs/current.py", "logs/delays.py", "logs/quantities.py"),
-        ("tests/logs/test_clock.py", "tests/logs/test_current.py", "tests/logs/test_delays.py", "tests/logs"),
+        ("apps/logs/clock.py", "apps/logs/current.py", "apps/logs/delays.py", "apps/logs/quantities.py"),
+        (
+            "tests/apps/logs/test_clock.py",
+            "tests/apps/logs/test_current.py",
+            "tests/apps/logs/test_delays.py",
+            "tests/apps/logs",
+        ),
     ),
     "gap judge": (
         ("gap/proof/judge.py", "gap/proof/improvement.py", "gap/diagnosis/error_intervals.py"),

@@ -471,6 +471,15 @@ def test_reserved_names_are_refused_and_listed_once(monkeypatch: pytest.MonkeyPa
     assert registry.names() == ("built_in", "late")
 
 
+def test_a_package_does_not_take_the_name_of_an_app(monkeypatch: pytest.MonkeyPatch) -> None:
+    app, other = "tank2sim.errors:InputError", f"{__name__}:LATE"
+    entries(monkeypatch, ("one", "late", other), ("tank2sim", "late", app))
+    registry = Registry("things", (), Thing)
+    with pytest.warns(PluginWarning, match="one 1: entry point things: late: its name is built in"):
+        assert list(registry) == ["late"] and "late" in registry and registry.names() == ("late",)
+    assert registry["late"] is InputError and registry.origin("late") is None
+
+
 def test_who_asks_for_a_faulty_one_is_not_warned_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     entries(monkeypatch, ("one", "late", f"{__name__}:NOT_LATE"))
     with warnings.catch_warnings(), pytest.raises(InputError, match="with the name 'other'"):
@@ -555,6 +564,35 @@ def test_a_command_of_a_package_has_help_page_json_and_schema(site: Path, work: 
     refused(bad, "--rudder", "400")
     code = "import tank2sim as t2s, json; print(json.dumps(t2s.json_schema('turns')))"
     assert "turns" in json.loads(done(python(site, code, cwd=work)))["properties"]
+
+
+@pytest.mark.slow
+@pytest.mark.essential
+def test_a_variant_of_a_package_is_a_flag_of_a_command_of_the_core(site: Path, work: Path) -> None:
+    """Pivot point: v + x r = 0 in the steady turn."""
+    helped, ran, plain, read, idle = tank2sim(
+        site,
+        "stability --help",
+        "stability mariner.toml --pivot --rudder -20 --json pivot.json",
+        "stability mariner.toml --no-spirals --json plain.json",
+        "report pivot.json -o pivot.html",
+        "stability mariner.toml --rudder 20",
+        cwd=work,
+    )
+    assert "Instead: pivot point in the steady turn." in " ".join(done(helped).split())
+    done(ran)
+    done(read)
+    found = json.loads((work / "pivot.json").read_text())
+    motion = simulate(build(parse_card(mariner_text(), "ship.toml")), Turn(math.radians(-20))).trajectory
+    v, r = (motion[name][-1] for name in ("motion.v", "motion.r"))
+    assert found["pivot_m"] == pytest.approx(-v / r, rel=1e-4) and 0 < found["pivot_m"] < L / 2
+    assert "Pivot point" in (work / "pivot.html").read_text()
+    done(plain)
+    assert "pivot_m" not in json.loads((work / "plain.json").read_text())
+    refused(idle, "--rudder", "needs --pivot")
+    code = "import tank2sim as t2s, json; print(json.dumps(t2s.json_schema('stability')))"
+    shapes = json.loads(done(python(site, code, cwd=work)))["oneOf"]
+    assert ["pivot_m" in shape["properties"] for shape in shapes].count(True) == 1 < len(shapes)
 
 
 DRIFTER = """format = "tank2sim-ship/1"

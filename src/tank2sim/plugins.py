@@ -136,33 +136,35 @@ class Registry(Mapping[str, _Value]):
         self._warned: set[str] = set()
 
     def __getitem__(self, name: str) -> _Value:
-        if name in self._builtin:
-            value = self._builtin[name]
-            if isinstance(value, str):
-                module, _, attribute = value.partition(":")
-                value = self._builtin[name] = self.value_of(getattr(importlib.import_module(module), attribute))
-            return value
-        self._warned.add(name)  # the error says it
-        found = self._plugins()[name]
-        if isinstance(found, InputError):
-            raise found
-        return found
+        if name not in self._builtin:
+            self._warned.add(name)  # the error says it
+            plugins = self._plugins()
+            if name not in self._builtin:
+                found = plugins[name]
+                if isinstance(found, InputError):
+                    raise found
+                return found
+        value = self._builtin[name]
+        if isinstance(value, str):
+            module, _, attribute = value.partition(":")
+            value = self._builtin[name] = self.value_of(getattr(importlib.import_module(module), attribute))
+        return value
 
     def __contains__(self, name: object) -> bool:
-        return name in self._builtin or isinstance(self._plugins().get(str(name)), self.kind)
+        return name in self._builtin or any(name == each for each in self)
 
     def __iter__(self) -> Iterator[str]:
+        plugins = self._plugins()
         yield from self._builtin
-        for name, found in self._plugins().items():
-            if not isinstance(found, InputError):
-                yield name
+        yield from (name for name, found in plugins.items() if not isinstance(found, InputError))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
     def names(self) -> tuple[str, ...]:
         """All names, with those of entry points that cannot be used: asking for such a value says why."""
-        return (*self._builtin, *(name for name in self._plugins() if name not in self.reserved))
+        plugins = self._plugins()
+        return (*self._builtin, *(name for name in plugins if name not in self.reserved))
 
     def remedy(self, name: str) -> str:
         """What to do about a name that is not there: the nearest one, or all that there are."""
@@ -172,24 +174,21 @@ class Registry(Mapping[str, _Value]):
 
     def origin(self, name: str) -> Origin | None:
         """The package that a value is from; None if it is built in."""
-        return self._origins.get(name)
+        return None if name in self._builtin else self._origins.get(name)
 
     def _plugins(self) -> Mapping[str, _Value | InputError]:
-        """Values of packages by name, or why they cannot be used; tank2sim's own apps come first."""
+        """Values of packages by name, or why they cannot be used; values of tank2sim's own apps become built in."""
         if self._found is None:
             found: dict[str, _Value | InputError] = {}
             entries = list(entry_points(self.group))
-            for entry in filter(_is_own, entries):
-                found[entry.name] = self.value_of(entry.load())
-            taken = self.reserved | set(found)
+            self._builtin |= {entry.name: entry.value for entry in entries if _is_own(entry)}
+            self.reserved |= set(self._builtin)
             for entry in (entry for entry in entries if not _is_own(entry)):
                 distribution = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
                 origin = Origin(distribution, f"entry point {self.group}: {entry.name}")
                 other = self._origins.setdefault(entry.name, origin)
-                if entry.name in taken:
-                    found.setdefault(
-                        entry.name, origin.fault("its name is built in, and that one is used", "give it another")
-                    )
+                if entry.name in self.reserved:
+                    found[entry.name] = origin.fault("its name is built in, and that one is used", "give it another")
                 elif other != origin:
                     problem = f"{other.distribution} has an entry point of this name, too"
                     found[entry.name] = origin.fault(problem, "uninstall one of the two")

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tests.apps.logs.made_logs import candump_lines, frame, nmea_lines
 from tests.corpus.mutations import Files
 from tests.identification.captive.generator import Campaign, write
 from tests.identification.captive.rotating_arm import HEEL, TRUTH, write_arm
 from tests.identification.captive_mmg.tank import KVLCC2, STATED, write_campaign
-from tests.logs.made_logs import candump_lines, frame, nmea_lines
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 

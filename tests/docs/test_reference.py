@@ -1,7 +1,7 @@
 """Every argument of a public function is documented: by its docstring, its type, its unit, or the manual's list.
 
-Public is what the reference shows: modules that ``tank2sim.cli`` and ``tank2sim.api`` import, and those that the theory
-names.
+Public is what the reference shows: modules that ``tank2sim.cli``, ``tank2sim.api`` and the commands of apps import, and
+those that the theory names.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ def everywhere() -> frozenset[str]:
 def public_modules() -> tuple[Path, ...]:
     """The files of the modules that the commands or the Python API import or the theory names."""
     files = [path for room in ("cli", "api") for path in (SOURCES / room).glob("*.py")]
+    files += [path for path in (SOURCES / "apps").rglob("*.py") if "\n@verb" in path.read_text(encoding="utf-8")]
     imported = (one for path in files for one in ast.walk(tree(path)))
     names = {one.module for one in imported if isinstance(one, ast.ImportFrom) and one.module}
     theory = "".join(page.read_text(encoding="utf-8") for page in (MANUAL / "theory").glob("*.md"))

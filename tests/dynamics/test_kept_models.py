@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +46,7 @@ def test_an_effect_of_the_same_name_in_place_of_another_has_its_own(mariner_card
     card = parse_card(mariner_card.text + SHALLOW, "shallow.toml")
     one = build(card)
     same = replace(EFFECTS["shallow_water"], description="another one")
-    monkeypatch.setattr(EFFECTS, "builtin", {**EFFECTS.builtin, "shallow_water": same})
+    monkeypatch.setattr(sys.modules[build.__module__], "EFFECTS", {**EFFECTS, "shallow_water": same})
     assert build(card) is not one and build(card) is build(card)
     monkeypatch.undo()
     assert build(card) is one

@@ -138,6 +138,20 @@ def test_renames_are_of_what_is_in_the_inventory() -> None:
     assert [old for kind, table in RENAMES.items() for old in _unused(kind, table)] == []
 
 
+WORDS = {"json": "JSON", "python": "Python"}
+
+
+def test_every_rename_is_in_the_changelog() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    rows = [
+        f"| {WORDS.get(kind, kind.removesuffix('s'))} | {f'`{command}`'.replace('`*`', '')} | `{old}` | `{new}` |"
+        for kind, table in RENAMES.items()
+        for command, names in table.items()
+        for old, new in names.items()
+    ]
+    assert [row for row in rows if row not in text] == []
+
+
 def _unused(kind: str, table: dict[str, dict[str, str]]) -> Iterable[str]:
     known = json.dumps({key: part for key, part in INVENTORY.items() if key != "renames"})
     for command, names in table.items():

@@ -9,7 +9,7 @@ from tank2sim.analysis.heading.margins import LargestSteps, LoopMargins, LoopRes
 from tank2sim.analysis.heading.runs import CourseChange, CourseKeeping
 from tank2sim.analysis.heading.study import AutopilotStudy, ClosedLoop, ShipAlone
 from tank2sim.results.autopilot import AutopilotResult
-from tests.report.drawn import line, panels
+from tests.answer.drawn import line, panels
 
 OMEGA = np.logspace(-3, 1, 60)
 LOOP = 0.1 / (1j * OMEGA * (1 + 10j * OMEGA))

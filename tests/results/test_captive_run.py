@@ -9,9 +9,9 @@ import pytest
 import tank2sim as t2s
 from tank2sim.answer.parts import Verdict
 from tank2sim.results.captive_run import CaptiveRunResult
+from tests.answer.drawn import line, panels
 from tests.identification.captive.generator import Campaign, write
 from tests.identification.captive.made_runs import oscillation
-from tests.report.drawn import line, panels
 
 
 @pytest.fixture(scope="module")

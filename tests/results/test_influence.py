@@ -16,7 +16,7 @@ from tank2sim.answer.parts import Table, Verdict
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 from tank2sim.results.influence import InfluenceResult, TuningResult
-from tests.report.drawn import rows_of
+from tests.answer.drawn import rows_of
 
 TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degpmin@20", "K_per_s", "T_prime")
 TARGET = "steady_radius_m@20=640"

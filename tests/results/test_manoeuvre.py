@@ -14,7 +14,7 @@ from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.results.manoeuvre import ManoeuvreResult
 from tank2sim.simulation.bands import Band, BandOverTime, TrackBand
-from tests.report.drawn import panels, rows_of
+from tests.answer.drawn import panels, rows_of
 
 TIMES = np.arange(4.0)
 NORTH, EAST = np.array([0.0, 7.0, 14.0, 21.0]), np.array([0.0, 0.1, 0.3, 0.6])

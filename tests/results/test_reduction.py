@@ -7,9 +7,9 @@ import pytest
 import tank2sim as t2s
 from tank2sim.results.mmg_reduction import MmgReductionResult
 from tank2sim.results.reduction import ReductionResult
+from tests.answer.drawn import line, rows_of
 from tests.identification.captive.generator import Campaign, write
 from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
-from tests.report.drawn import line, rows_of
 
 
 @pytest.fixture(scope="module")

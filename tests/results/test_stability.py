@@ -19,7 +19,7 @@ from tank2sim.dynamics import build
 from tank2sim.results.imo import BEYOND_THE_CARD, imo_section
 from tank2sim.results.stability import StabilityResult
 from tank2sim.results.stability_charts import DIRECT, STABLE, UNSTABLE, steering_diagram
-from tests.report.drawn import rows_of
+from tests.answer.drawn import rows_of
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.notices import Notice
 from tank2sim.results.validation import CardValue, TrialReplay, ValidationResult, ValidationStudy
-from tests.report.browser import measured_in_browser
-from tests.report.drawn import panels
+from tests.answer.browser import measured_in_browser
+from tests.answer.drawn import panels
 
 FIGURES = (
     Validated("turn", "turn 35", "advance_m", 500.0, 510.0, 0.001, 8.0, 3.0),

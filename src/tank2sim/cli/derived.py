@@ -269,7 +269,7 @@ def _type(kind: Any, several: Any) -> Any:
             return click.Choice(choices)
     if Path in parts:
         return click.Path(path_type=Path)
-    return next((part for part in parts if part in (int, float)), str)
+    return str if str in parts else next((part for part in parts if part in (int, float)), str)
 
 
 def _number(limits: arguments.ArgumentBounds) -> Any:

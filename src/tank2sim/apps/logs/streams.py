@@ -95,7 +95,7 @@ class VesselLog:
 
 
 def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
-    """A note of the kinds of sentences or messages of a log that are not used, each with its number; none of none."""
+    """A note that counts unused sentences or messages by kind, which it calls `words`; none if there are none."""
     if not kinds:
         return []
     listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
@@ -124,7 +124,7 @@ def wrapped_angle(angle_rad: Array) -> Array:
 
 
 def heading_of_quaternion(w: Array, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Roll, pitch and yaw (n,), rad, of unit quaternions in the order of rotations z, y, x (Diebel 2006, eq. 290)."""
+    """Roll, pitch, yaw (n,), rad, of quaternions ``w + xi + yj + zk``: rotations z, y, x (Diebel 2006, eq. 290)."""
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
     yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))

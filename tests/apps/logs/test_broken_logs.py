@@ -1,0 +1,296 @@
+"""Broken logs end in a refusal of one line, or are marked; never in a traceback or a wrong file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.result import LogResult
+from tank2sim.errors import InputError
+from tank2sim.records.reading import read_trial_file
+from tests.apps.logs.made_logs import frame, nmea_lines, rmc, sentence, voyage
+from tests.marks import first_fast
+
+
+@pytest.fixture
+def written(tmp_path: Path):
+    def write(table: pd.DataFrame, name: str = "voyage.csv") -> Path:
+        table.to_csv(tmp_path / name, index=False)
+        return tmp_path / name
+
+    return write
+
+
+@pytest.fixture
+def nmea(tmp_path: Path):
+    pytest.importorskip("pynmea2")
+
+    def write(lines: list[str]) -> Path:
+        path = tmp_path / "voyage.nmea"
+        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        return path
+
+    return write
+
+
+def used(result: LogResult) -> dict[str, str]:
+    return {channel.quantity: channel.stream for channel in result.voyage.channels.channels if channel.use}
+
+
+def signals_of(result: LogResult) -> set[str]:
+    return {name for cut in result.cuts for name in cut.trial.signals}
+
+
+def test_a_good_log_has_no_mark(written) -> None:
+    result = log(written(frame()))
+    assert result.cautions == () and {"heading", "rudder_angle", "yaw_rate", "sog", "latitude"} <= set(used(result))
+
+
+def test_a_heading_that_is_off_by_90_deg_is_marked_and_left_out(written) -> None:
+    table = frame()
+    table["heading_deg"] = (table["heading_deg"] + 90) % 360
+    result = log(written(table))
+    assert "off by 9" in result.cautions[0] and result.cautions[0].startswith("UNCONFIRMED")
+    assert "heading" not in used(result) and "psi_rad" not in signals_of(result)
+    assert all(cut.text.startswith("# UNCONFIRMED") for cut in result.cuts)
+
+
+def test_a_mirrored_heading_is_left_out(written) -> None:
+    table = frame()
+    table["heading_deg"] = -table["heading_deg"] % 360
+    result = log(written(table))
+    assert result.cautions and "heading" not in used(result)
+
+
+def test_exchanged_latitude_and_longitude_are_marked_and_left_out(written) -> None:
+    table = frame()
+    table[["latitude", "longitude"]] = table[["longitude", "latitude"]].to_numpy()
+    result = log(written(table))
+    assert result.cautions and not {"latitude", "longitude"} & set(used(result)) and "x_m" not in signals_of(result)
+    assert "heading" in used(result)
+
+
+def test_a_rate_of_turn_in_another_unit_than_it_states_is_left_out(written) -> None:
+    table = frame()
+    table["rot_deg_min"] /= 60
+    result = log(written(table))
+    assert any("deg/s" in mark for mark in result.cautions) and "yaw_rate" not in used(result)
+
+
+def test_a_speed_in_another_unit_than_it_states_is_left_out(written) -> None:
+    table = frame()
+    table["sog_kn"] *= 1852 / 3600
+    result = log(written(table))
+    assert any("m/s" in mark for mark in result.cautions) and "sog" not in used(result)
+
+
+def test_a_rudder_that_is_positive_to_port_is_turned(written) -> None:
+    table = frame()
+    table["rudder_deg"] = -table["rudder_deg"]
+    result = log(written(table))
+    assert any("positive to port" in notice for notice in result.notices)
+    rudder = result.voyage.series["rudder_angle"]
+    made = voyage()
+    at = np.interp(rudder.time_s - rudder.time_s[0], made.time, made.rudder)
+    assert np.degrees(np.abs(rudder.values - at)).max() < 1.0
+
+
+def test_a_name_with_a_sign_that_the_turn_contradicts_is_left_out(written) -> None:
+    table = frame().rename(columns={"rudder_deg": "rudder (port +) [deg]"})
+    result = log(written(table))
+    assert any("contradicts the sign" in mark for mark in result.cautions) and "rudder_angle" not in used(result)
+
+
+@pytest.mark.parametrize("back_s", [30.0, 3600.0])
+def test_a_clock_set_back_is_marked_and_runs_on(written, back_s) -> None:
+    table = frame()
+    moments = pd.to_datetime(table["utc"])
+    moments[1000:] -= pd.Timedelta(seconds=back_s)
+    table["utc"] = moments.dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    result = log(written(table))
+    assert any("clock falls" in mark for mark in result.cautions)
+    assert result.voyage.end_s - result.voyage.begin_s == pytest.approx(voyage().time[-1], abs=1.0)
+    assert [stretch.kind.value for stretch in result.found if stretch.kind.excites] == ["zigzag", "turn"]
+
+
+def test_a_receiver_whose_clock_is_set_back_is_marked(nmea) -> None:
+    lines = nmea_lines()
+    table, made = frame(), voyage()
+    kept = []
+    second = -1
+    for line in lines:
+        if "RMC" in line:
+            second += 1
+            place = table.latitude[2 * second], table.longitude[2 * second]
+            kept.append(rmc(made.time[2 * second] - (60.0 if second > 500 else 0.0), *place))
+        else:
+            kept.append(line)
+    result = log(nmea(kept))
+    assert any("clock falls by 59" in mark for mark in result.cautions)
+    assert result.voyage.end_s - result.voyage.begin_s == pytest.approx(made.time[-1], abs=2.0)
+
+
+def test_half_a_sentence_and_spoilt_ones_are_counted(nmea) -> None:
+    lines = nmea_lines()
+    lines[100] = lines[100].replace("HDT", "HDX") if "HDT" in lines[100] else lines[100][:-1] + "Z"
+    path = nmea([*lines, "$HEHDT,12"])
+    found = read_log(path)
+    assert found.counts["corrupted"] == 2 and found.counts["lines"] == len(lines) + 1
+    assert any("2 of" in finding.text for finding in found.findings)
+
+
+def test_two_receivers_are_two_and_the_result_is_marked(nmea) -> None:
+    table, made = frame(), voyage()
+    lines = []
+    second = -1
+    for line in nmea_lines():
+        lines.append(line)
+        if "RMC" in line:
+            second += 1
+            row = 2 * second
+            lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row], talker="GL"))
+    result = log(nmea(lines))
+    assert any("two receivers" in mark for mark in result.cautions)
+    x = result.voyage.series["x"].values
+    assert np.abs(np.diff(x)).max() < 20  # no leaps between the two, which are 56 m apart
+
+
+def test_two_receivers_of_one_talker_are_marked(nmea) -> None:
+    table, made = frame(), voyage()
+    lines = []
+    second = -1
+    for line in nmea_lines():
+        lines.append(line)
+        if "RMC" in line:
+            second += 1
+            row = 2 * second
+            lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row]))
+    result = log(nmea(lines))
+    assert any("two instruments in one" in mark for mark in result.cautions)
+
+
+def test_a_pause_of_the_recorder_is_reported_and_nothing_is_bridged(written) -> None:
+    table = frame().drop(range(300, 420))
+    result = log(written(table))
+    assert any("60.5 s" in notice for notice in result.notices)
+    for cut in result.cuts:
+        columns = read_values(cut.text)
+        clock = columns["t_s"] + cut.begins_s - result.voyage.begin_s
+        inside = (clock > 150.5) & (clock < 209.5)
+        assert np.isnan(columns["psi_deg"][inside]).all()
+
+
+def read_values(text: str) -> dict[str, np.ndarray]:
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    rows = [[float(cell) if cell else math.nan for cell in line.split(",")] for line in lines[1:]]
+    return dict(zip(lines[0].split(","), np.array(rows).T, strict=True))
+
+
+def test_repeated_rows_are_counted_and_left_out(written) -> None:
+    table = frame()
+    doubled = pd.concat([table.iloc[:500], table.iloc[480:]])
+    result = log(written(doubled))
+    assert result.voyage.counts["voyage.csv"]["repeated_rows"] == 20 and result.cautions == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("empty.csv", b"", "is empty"),
+        ("words.txt", b"hello\nworld\nagain\n", "no column of time"),
+        ("noise.bin", bytes(range(256)) * 20, "of no known format"),
+        ("cut.bag", b"#ROSBAG V2.0\nnothing", "cut off"),
+        ("cut.mcap", b"\x89MCAP0\r\nnothing at all", "cut off"),
+        ("cut.ulg", b"ULog\x01\x12\x35\x01" + bytes(8), "no topic of it is understood"),
+        ("rows.csv", b"1,2,3\n4,5,6\n7,8,9\n", "no channel of it is understood"),
+    ],
+)
+def test_what_is_no_log_is_refused(tmp_path, name, content, problem) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    for library, ending in (("rosbags", (".bag", ".mcap")), ("pyulog", (".ulg",))):
+        if name.endswith(ending):
+            pytest.importorskip(library)
+    with pytest.raises(InputError, match=problem) as refusal:
+        log(path)
+    assert "\n" not in str(refusal.value) and refusal.value.source == str(path)
+
+
+@pytest.mark.parametrize("name", ["voyage.bag", "voyage.mcap", "voyage.bin", "voyage.ulg", "voyage.nmea", "voyage.csv"])
+@first_fast("share", [0.35, 0.02, 0.8])
+def test_a_file_that_is_cut_off_is_refused_or_read_to_its_end(data, tmp_path, name, share) -> None:
+    source = data / "data" / "logs" / "ship_21" / name
+    if not source.is_file():
+        pytest.skip(f"made-up logs are missing: no {source}")
+    content = source.read_bytes()
+    path = tmp_path / name
+    path.write_bytes(content[: int(share * len(content))])
+    try:
+        result = log(path)
+    except InputError as refusal:
+        assert refusal.source == str(path) and "\n" not in str(refusal)
+        return
+    assert result.voyage.end_s - result.voyage.begin_s < 1200 * share * 1.3 + 60
+    for cut in result.cuts:
+        target = tmp_path / cut.trial.path.name
+        target.write_text(cut.text, encoding="utf-8")
+        read_trial_file(target)
+
+
+def test_a_missing_library_is_asked_for_in_one_line(nmea, monkeypatch) -> None:
+    import builtins
+    import sys
+
+    path = nmea([sentence("HEHDT,12.0,T"), sentence("HEHDT,12.0,T")])
+    monkeypatch.delitem(sys.modules, "pynmea2", raising=False)
+    original = builtins.__import__
+
+    def refuse(name, *arguments, **more):
+        if name == "pynmea2":
+            raise ImportError(name)
+        return original(name, *arguments, **more)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    monkeypatch.setattr("importlib.import_module", refuse)
+    with pytest.raises(InputError, match=r"pip install 'tank2sim\[logs\]'"):
+        read_log(path)
+
+
+def test_an_exchanged_heading_and_course_are_left_out(written) -> None:
+    table = frame()
+    table["cog_deg"] += np.random.default_rng(1).normal(0, 1.0, len(table))
+    table[["heading_deg", "cog_deg"]] = table[["cog_deg", "heading_deg"]].to_numpy()
+    result = log(written(table))
+    assert any("exchanged" in mark for mark in result.cautions) and not {"heading", "cog"} & set(used(result))
+
+
+def test_a_longitude_with_the_wrong_sign_is_left_out(written) -> None:
+    table = frame()
+    table["longitude"] = -table["longitude"]
+    result = log(written(table))
+    assert any("wrong sign of the second" in mark for mark in result.cautions)
+    assert "longitude" not in used(result) and "heading" in used(result)
+
+
+def test_an_exchanged_order_and_angle_of_the_rudder_are_left_out(written) -> None:
+    table = frame()
+    table["rudder_order_deg"] = table["rudder_deg"]
+    table["rudder_deg"] = np.degrees(voyage().rudder).round(0)
+    result = log(written(table))
+    assert any("as an order does" in mark for mark in result.cautions)
+    assert not {"rudder_angle", "rudder_order"} & set(used(result))
+
+
+def test_a_log_that_was_encoded_twice_is_refused_without_a_warning(tmp_path, recwarn) -> None:
+    path = tmp_path / "voyage.csv"
+    text = "\n".join(nmea_lines())
+    path.write_bytes(text.encode("utf-16").decode("latin-1").encode("utf-16"))
+    with pytest.raises(InputError):
+        read_log(path)
+    assert not [warning for warning in recwarn if issubclass(warning.category, pd.errors.ParserWarning)]

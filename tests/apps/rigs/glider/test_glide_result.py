@@ -1,0 +1,109 @@
+"""Result of glides: tables and charts hold the numbers of the study."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.apps.rigs.glider.charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
+from tank2sim.apps.rigs.glider.programme import read_programme
+from tank2sim.apps.rigs.glider.result import GlideResult
+from tank2sim.apps.rigs.glider.study import GlideQuestion, study_glider
+from tank2sim.bundled import bundled
+from tank2sim.cards import read_card
+from tests.answer.drawn import line
+
+PROBE = read_card("kulikovsky-velikanov")
+
+
+@pytest.fixture(scope="module")
+def result():
+    programme = read_programme(bundled("models", "kulikovsky-velikanov", "programme.csv"))
+    asked = GlideQuestion(
+        angles_rad=(math.radians(-30),),
+        roll_rad=0.1,
+        programme=programme,
+        as_printed=True,
+        budget_kg=50.0,
+        depth_m=200.0,
+        views=True,
+    )
+    return GlideResult(study_glider(PROBE, asked))
+
+
+def lines(chart, layer=0):
+    specification = chart_specification(chart)
+    # Altair lifts the data of a chart with one layer.
+    source = specification["layer"][layer].get("data") or specification["data"]
+    return specification["datasets"][source["name"]]
+
+
+def test_the_result_has_the_figures_and_every_chart(result) -> None:
+    assert result.key_figures[0].value == pytest.approx(23.385, abs=5e-4)
+    assert list(result.charts()) == [
+        "glide_polar",
+        "path_from_above",
+        "path_from_the_side_rolled_out",
+        "path_in_isometric_projection",
+        "programme_and_motion",
+        "error_of_the_quasi_steady_motion_swings",
+        "error_of_the_quasi_steady_path_steps",
+    ]
+    assert "12.8 kg" in result.notices[0]
+
+
+def test_tables_hold_the_glides_the_path_and_the_ranges(result) -> None:
+    study = result.study
+    design, ranges, glides, printed, path, printed_path = (each.df for each in result.tables)
+    assert design["speed (m/s)"].to_list() == [study.design.best_glide.speed_mps, study.design.fastest_glide.speed_mps]
+    assert ranges["range (km)"].to_list() == pytest.approx([each.range_m / 1000 for each in study.design.ranges])
+    (state,) = study.states
+    assert glides.iloc[0].to_dict() == {
+        "path angle (deg)": pytest.approx(-30),
+        "α (deg)": state.incidence_deg,
+        "pitch (deg)": state.pitch_deg,
+        "speed (m/s)": state.speed_mps,
+        "C_L": state.lift_coefficient,
+        "C_D": state.drag_coefficient,
+        "turning radius (m)": state.turning_radius_m,
+        "radius with added mass (m)": state.turning_radius_with_added_mass_m,
+    }
+    assert state.turning_radius_with_added_mass_m > state.turning_radius_m
+    assert printed["speed over that above"][0] == study.as_printed[0].speed_mps / state.speed_mps
+    assert path["height (m)"].to_list() == [place.height_m for place in study.path]
+    assert len(printed_path) == len(study.path_as_printed) == len(study.steps) + 1
+
+
+def test_the_error_sweep_is_in_a_study_with_views(result) -> None:
+    errors = result.study.quasi_steady_error
+    assert [one.duration_s[0] for one in errors.steps] == [10, 10, 10]
+    assert len(errors.swings) == 3
+
+
+def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
+    path = SpacePath(label="p", north_m=[0, 0], east_m=[0, 40], height_m=[0, 30])
+    (_, plan), (_, side) = lines(plan_chart([path])), lines(elevation_chart([path]))
+    assert (plan["a"], plan["b"]) == (40, 0) and (side["a"], side["b"]) == (40, 30)
+    rows = lines(isometric_chart(path, path))
+    assert (rows[1]["a"], rows[1]["b"]) == pytest.approx((40 * math.cos(math.pi / 6), -20 + 30), rel=1e-5)
+    shadow = rows[3]
+    assert shadow["b"] == pytest.approx(-20)
+
+
+def test_the_polar_marks_the_glides_it_is_given(result) -> None:
+    study = result.study
+    chart = polar_chart(study.polar, {"best": study.design.best_glide})
+    marked = lines(chart, 2)
+    assert math.degrees(math.atan2(marked[0]["y"], marked[0]["x"])) == pytest.approx(23.385, abs=1e-3)
+    speeds = np.array([row["x"] for row in lines(chart)])
+    assert speeds.max() == pytest.approx(study.design.fastest_glide.horizontal_speed_mps, rel=1e-3)
+    assert line(chart, "y") == pytest.approx(-study.polar["climb_mps"], rel=1e-5)
+
+
+@pytest.mark.slow
+def test_a_result_read_from_its_json_has_the_same_page(result) -> None:
+    again = GlideResult.read(result.to_dict(), "g.json")
+    assert again.page() == result.page() and again.to_dict() == result.to_dict()
