@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import (
@@ -26,6 +28,7 @@ from tank2sim.analysis.stability.straight_line import answering_states
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, study_model
 from tank2sim.errors import InputError
 from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, band_of, figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, Draws, Ensemble, Question, ensemble
@@ -52,15 +55,47 @@ class EnsembleRequest:
     seed: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnShips:
+    """The ships of an ensemble, to be listed one by one. They are drawn again for it, not stored.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    draws : Draws
+    figures : mapping
+        Name to the figure of each of the n ships (n,); nan where a ship does not show it.
+    usable : array (n,)
+        False for a ship that cannot be simulated.
+    """
+
+    card: ManoeuvringCard
+    draws: Draws
+    figures: Mapping[str, Array]
+    usable: NDArray[np.bool_]
+
+    def coefficients(self) -> dict[str, Array]:
+        """Drawn numbers (n,) by the dotted keys of the card, in the conventions of its file."""
+        numbers = {parameter.name: parameter for parameter in card_parameters(self.card, study_model(self.card))}
+        values = self.draws.members(0, len(self.usable)).values
+        drawn = (numbers[name] for name in self.draws.names)
+        return {number.key: number.factor * column for number, column in zip(drawn, values.T, strict=True)}
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Members:
-    """Members of an ensemble: number, seed, usable ones, unusable ones by their reason, and notices."""
+    """Members of an ensemble: number, seed, usable ones, unusable ones by their reason, and notices.
+
+    `drawn` are the ships themselves (:class:`DrawnShips`). They are not part of the JSON: a result that was read from
+    its JSON has none.
+    """
 
     members: int
     seed: int
     usable: int
     unusable: dict[str, int]
     notices: tuple[str, ...]
+    drawn: Annotated[Any, Field(exclude=True)] = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -183,7 +218,7 @@ def manoeuvre_bands(
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it")
     return ManoeuvreBands(
-        **_members(found, notices),
+        **_members(card, draws, found, notices),
         figures=figure_bands(found),
         t_s=shown,
         histories=histories,
@@ -236,7 +271,7 @@ def stability_bands(
         drawn, about = steering_bands(ShipText.of(card), draws, request.members, curves, executor)
         messages += about
     return StabilityBands(
-        **_members(trials, messages),
+        **_members(card, draws, trials, messages, straight.figures),
         figures=bands,
         probability_stable=stable,
         probability_stable_interval_95=between,
@@ -257,7 +292,7 @@ def named_bands(
     for name, band in bands.items():
         if band.shown_by < found.usable:
             notices.append(f"{name}: {found.usable - band.shown_by} of {request.members} members do not show it")
-    return FigureBands(**_members(found, notices), figures=bands)
+    return FigureBands(**_members(card, draws, found, notices), figures=bands)
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
@@ -353,12 +388,19 @@ def _ensemble(
     return found
 
 
-def _members(found: Ensemble, messages: Sequence[str]) -> dict[str, Any]:
-    """Fields of :class:`Members`."""
+def _members(
+    card: ManoeuvringCard,
+    draws: Draws,
+    found: Ensemble,
+    messages: Sequence[str],
+    further: Mapping[str, Array] | None = None,
+) -> dict[str, Any]:
+    """Fields of :class:`Members`; `further` are figures of the same members from another evaluation."""
     return {
         "members": found.members,
         "seed": found.seed,
         "usable": found.members - sum(found.unusable.values()),
         "unusable": dict(found.unusable),
         "notices": (*messages, *found.notices),
+        "drawn": DrawnShips(card, draws, {**found.figures, **(further or {})}, ~found.bad),
     }
