@@ -40,7 +40,7 @@ def _circle(card: ManoeuvringCard, rudder_deg: float, seconds: float) -> str:
     found = manoeuvre_bands(card, Turn(math.radians(rudder_deg)), (seconds, seconds), EnsembleRequest(MEMBERS))
     track = found.track
     assert track is not None
-    low, middle, high = (line[: track.count] for line in (track.low, track.middle, track.high))
+    low, middle, high = (line[: track.count] for line in (track.low_m, track.middle_m, track.high_m))
     band = np.concatenate([low, high[::-1]])
     east, south = _chart(middle[-1:])[0]
     text = f'<text x="{east:.0f}" y="{south + 16:.0f}" text-anchor="middle">{abs(rudder_deg):g}°</text>'
