@@ -16,6 +16,7 @@ from tank2sim.answer.charts.parts import (
     ChartRecord,
     data,
     extent,
+    panel_title,
     plain,
     series_look,
     with_unit,
@@ -25,7 +26,7 @@ from tank2sim.arrays import Array
 from tank2sim.gap.outcome.export import joined
 from tank2sim.gap.outcome.lacking import NORMAL
 from tank2sim.gap.outcome.study import DecidingTest, GapStudy, Lacking, TrialEstimate
-from tank2sim.results.gap_charts import SETS, small
+from tank2sim.results.gap_charts import SETS
 from tank2sim.results.gap_text import as_percent, trial_name
 from tank2sim.units import in_words
 
@@ -290,7 +291,7 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
         estimated = Chart(data([span]))
         shade = estimated.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
         layers = [shade, estimated.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
-    title = small(f"{effect.replace('_', ' ')}: {words}")
+    title = panel_title(f"{effect.replace('_', ' ')}: {words}")
     return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
 
 

@@ -168,6 +168,11 @@ def extent(values: Array) -> tuple[float, float]:
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
+def panel_title(text: str) -> alt.Title:
+    """Return the title of one panel among several."""
+    return alt.Title(text, fontSize=11, offset=22, limit=240)
+
+
 def axis_above(title: str, **options: Any) -> alt.Axis:
     """Return a vertical axis with a horizontal title above it."""
     return alt.Axis(
