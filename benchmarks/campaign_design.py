@@ -22,10 +22,11 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.apps.design.captive_runs import PlannedRun
 from tank2sim.apps.design.command import design_campaign
-from tank2sim.apps.design.figure_slopes import both_sides, figure_of_text
+from tank2sim.apps.design.figure_slopes import both_sides
 from tank2sim.apps.design.tank_form import TankFile
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.errors import InputError
@@ -33,7 +34,7 @@ from tank2sim.identification.captive.reduction import ReductionOptions, reduce_c
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import DENSITY, GRAVITY, NOISE_SHARE, Campaign, Run, Ship, ship, write
 
-FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
+FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_1_deg@20/20")
 BUNDLED = ("mariner", "kvlcc2-captive", "kvlcc2", "esso-osaka", "container")
 FIRST_SEED = 401
 RATE_HZ = 5.0
@@ -93,7 +94,7 @@ def _one_ship(seed: int, seeds: int) -> tuple[float, float, Sequence[np.ndarray]
     draw = np.random.default_rng([seed, 9])
     known = {name: value * (1 + PRIOR_ERROR * draw.standard_normal()) for name, value in model.derivatives.items()}
     try:
-        sides = [side for text in FIGURES for side in both_sides(figure_of_text(text))]
+        sides = [side for text in FIGURES for side in both_sides(parse_figure(text))]
         truth = Study(_card(model, model.derivatives), sides)
         usual = design_campaign(_card(model, known), figures=FIGURES, tank=_tank(model))
     except InputError as error:

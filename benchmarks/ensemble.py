@@ -255,7 +255,7 @@ def users(rounds: int, together: int = 256, alone: int = 4) -> None:
         "the same with a stop (Esso Osaka)": (tanker, OfCriteria(other_ship)),
         "influence --members, advance and overshoot": (
             mariner,
-            OfFigures(ship, ("advance_m@35", "overshoot1_deg@10/10")),
+            OfFigures(ship, ("advance_m@35", "overshoot_1_deg@10/10")),
         ),
     }
     usual = questions.lanes_of

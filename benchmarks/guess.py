@@ -19,7 +19,6 @@ import numpy as np
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.apps.guess.conditioning import (
     FIGURE_KEYS,
-    FIGURES,
     POSTER_MANOEUVRES,
     GivenFigure,
     PosterFigures,
@@ -41,17 +40,17 @@ FORMS = {
     "cargo": ShipDimensions(length_m=160, beam_m=23.2, draught_m=7.5, block=0.60, speed_kn=15),
     "ferry": ShipDimensions(length_m=150, beam_m=25, draught_m=6.5, block=0.56, speed_kn=18),
 }
-GIVEN = ("advance@turn35", "tactical_diameter@turn35", "overshoot_1@zigzag10", "overshoot_2@zigzag10")
+GIVEN = ("advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_2_deg@10/10")
 BUNDLED = {"kvlcc2": 0.81, "mariner": 0.60, "esso-osaka-ship": 0.83}
 
 
 def given_of(truth: dict[str, float], stream: np.random.Generator | None) -> list[GivenFigure]:
     found = []
     for key in GIVEN:
-        manoeuvre, word = FIGURE_KEYS[key]
-        error = default_error(word, truth[key])
+        manoeuvre, name = FIGURE_KEYS[key]
+        error = default_error(name, truth[key])
         noise = 0.0 if stream is None else float(stream.normal()) * error
-        found.append(GivenFigure(manoeuvre, word, max(truth[key] + noise, 0.2 * truth[key]), error))
+        found.append(GivenFigure(manoeuvre, name, max(truth[key] + noise, 0.2 * truth[key]), error))
     return found
 
 
@@ -69,9 +68,9 @@ def bundled(name: str) -> tuple[ShipDimensions, dict[str, float]]:
     model, figures = build(card), {}
     for manoeuvre, driven in POSTER_MANOEUVRES.items():
         run = single_figures(simulate(model, driven).figures)
-        for key, (of, word) in FIGURE_KEYS.items():
+        for key, (of, figure) in FIGURE_KEYS.items():
             if of == manoeuvre:
-                figures[key] = run[FIGURES[of][word]]
+                figures[key] = run[figure]
     size = {key: float(getattr(card.ship, key)) for key in ("length_m", "beam_m", "draught_m")}
     return ShipDimensions(**size, block=BUNDLED[name], speed_kn=card.model.speed_mps / KNOT_MPS), figures
 

@@ -18,7 +18,7 @@ from tank2sim.analysis.tuning.targets import parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 
-FIGURES = ("criterion_C", "steady_radius_m@20", "advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@20/20")
+FIGURES = ("criterion_C", "steady_radius_m@20", "advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@20/20")
 
 MORE = """
 [propulsion]
@@ -58,7 +58,7 @@ name = "rudder_bias"
 angle_deg = 0.5
 """
 
-WISHES = ("steady_radius_m@20=620", "overshoot1_deg@20/20<=7.7", "advance_m@35=575")
+WISHES = ("steady_radius_m@20=620", "overshoot_1_deg@20/20<=7.7", "advance_m@35=575")
 
 
 def ship() -> ManoeuvringCard:

@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 
 import tank2sim as t2s
+from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
-from tank2sim.apps.design.figure_slopes import both_sides, figure_of_text
+from tank2sim.apps.design.figure_slopes import both_sides
 from tank2sim.apps.design.trial_design import TrialManoeuvre
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import not_referring
@@ -30,7 +31,7 @@ from tank2sim.cards.reading import revised
 from tank2sim.errors import InputError
 
 SHIPS = ("mariner", "esso-osaka", "kvlcc2-captive")
-FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
+FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_1_deg@20/20")
 OFF = 0.05
 NOISE = {"u_mps": 0.05, "v_mps": 0.05, "r_degps": 0.02, "psi_deg": 0.2, "x_m": 1.0, "y_m": 1.0}
 """Of a ship; a model of a few metres has a hundredth of the lengths, a tenth of the speeds and ten times
@@ -118,7 +119,7 @@ def _errors(
             np.savetxt(files[-1], table, fmt="%.8g", delimiter=",", header=",".join(rows), comments="")
         found = t2s.identify(card, files, structure="card", members=0, trust_card=True).card
     assert isinstance(found, ManoeuvringCard)
-    sides = [side for text in FIGURES for side in both_sides(figure_of_text(text))]
+    sides = [side for text in FIGURES for side in both_sides(parse_figure(text))]
     difference = Study(found, sides).base - Study(true, sides).base
     mean: np.ndarray = difference.reshape(len(FIGURES), 2).mean(axis=1)
     return mean

@@ -117,7 +117,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
         draught_m=7.5,
         block=0.6,
         speed_kn=15.0,
-        turn35="advance=560",
+        turn35="advance_m=560",
         members=120,
     ),
     "log": lambda folder: t2s.log(_trials(folder)),

@@ -28,7 +28,7 @@ def main() -> None:
     tank2sim("autopilot", "mariner", "--design", "pid", "--wave-filter", "0.6", "--track", "track.csv", "-o", "ap.html")
     tank2sim("autopilot", "mariner", "--design", "pid", "--export", "ap.fmu", "--verify")
 
-    tank2sim("influence", "mariner", "--figures", "K_per_s", "T_s", "overshoot1_deg@20/20")
+    tank2sim("influence", "mariner", "--figures", "K_per_s", "T_s", "overshoot_1_deg@20/20")
     tank2sim("influence", "mariner", "--tune", "steady_radius_m=640@20", "--by", "fewest", "-o", "tuned.toml")
 
     # The KVLCC2 is unstable on a straight course.

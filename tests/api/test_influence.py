@@ -21,7 +21,7 @@ def mariner() -> t2s.Ship:
 
 @pytest.fixture(scope="module")
 def found(mariner: t2s.Ship) -> t2s.InfluenceResult:
-    return mariner.influence(["advance_m@35", "overshoot1_deg@20/20"], joint_variation={"Nd": 0.1, "Nr": -0.1})
+    return mariner.influence(["advance_m@35", "overshoot_1_deg@20/20"], joint_variation={"Nd": 0.1, "Nr": -0.1})
 
 
 def test_a_coefficient_is_the_change_of_the_simulated_figure(mariner: t2s.Ship, found: t2s.InfluenceResult) -> None:
@@ -29,7 +29,7 @@ def test_a_coefficient_is_the_change_of_the_simulated_figure(mariner: t2s.Ship, 
     more, less = (mariner.replace({"derivatives.Nd": share * value}) for share in (1.005, 0.995))
     pairs = {
         "advance_m@35": [ship.turn(35).figures["advance_m"] for ship in (less, more)],
-        "overshoot1_deg@20/20": [ship.zigzag(20, 20).figures["overshoot_1_deg"] for ship in (less, more)],
+        "overshoot_1_deg@20/20": [ship.zigzag(20, 20).figures["overshoot_1_deg"] for ship in (less, more)],
     }
     for figure, (low, high) in pairs.items():
         change = 10 * 100 * (high - low) / found.figures.loc[figure, "value"]
@@ -39,7 +39,7 @@ def test_a_coefficient_is_the_change_of_the_simulated_figure(mariner: t2s.Ship, 
 def test_figures_of_the_api_are_those_of_a_simulation(mariner: t2s.Ship, found: t2s.InfluenceResult) -> None:
     assert found.figures.loc["advance_m@35", "value"] == pytest.approx(mariner.turn(35).figures["advance_m"], rel=1e-4)
     first = mariner.zigzag(20, 20).figures["overshoot_1_deg"]
-    assert found.figures.loc["overshoot1_deg@20/20", "value"] == pytest.approx(first, rel=1e-3)
+    assert found.figures.loc["overshoot_1_deg@20/20", "value"] == pytest.approx(first, rel=1e-3)
 
 
 def test_shares_of_independent_errors_make_up_the_variance(found: t2s.InfluenceResult) -> None:

@@ -197,7 +197,7 @@ def test_lines_on_the_screen_are_not_broken_and_what_is_no_number_is_a_dash(
     result = tank2sim("gap", "mariner", long, "-o", "out", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     (row,) = (line for line in result.stdout.splitlines() if long.removesuffix(".csv") in line)
-    assert [cell.strip() for cell in row.strip("│ ").split("│")][1:4] == ["fitting", "8", "1"]
+    assert row.split()[1:4] == ["fitting", "8", "1"]
     assert "nan" not in result.stdout
 
 

@@ -30,6 +30,8 @@ _EXAMPLE = re.compile(
     r"(?:\n?```text\n(?P<output>.*?)```\n)?",
     re.DOTALL,
 )
+_TERMINAL = {"TTY_COMPATIBLE": "1", "TERM": "dumb"}
+"""The manual shows tables as a terminal does, without its colours."""
 _WITH_PYTHON = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _FRAME = str.maketrans(dict.fromkeys("┃│┏┓┗┛└┘┡┩╇┳━─┴┬┼├┤", " "))
@@ -74,7 +76,7 @@ def run(example: Example, folder: Path) -> str:
             words = subprocess.run(
                 ["/bin/sh", "-c", f"printf '%s\\n' {line}"], cwd=folder, capture_output=True, text=True, check=False
             )
-            done = tank2sim(*words.stdout.splitlines()[1:], cwd=folder)
+            done = tank2sim(*words.stdout.splitlines()[1:], cwd=folder, **_TERMINAL)
         elif line.strip():
             done = subprocess.run(
                 ["/bin/sh", "-c", line], cwd=folder, env=_WITH_PYTHON, capture_output=True, text=True, check=False

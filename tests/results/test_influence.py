@@ -18,7 +18,7 @@ from tank2sim.errors import InputError
 from tank2sim.results.influence import InfluenceResult, TuningResult
 from tests.answer.drawn import rows_of
 
-TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degpmin@20", "K_per_s", "T_prime")
+TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degps@20", "K_per_s", "T_prime")
 TARGET = "steady_radius_m@20=640"
 
 
@@ -55,7 +55,7 @@ def test_the_most_influential_parameters_stand_first(study: InfluenceStudy) -> N
     assert set(order[:2]) == {"Nr", "Yv"}
     assert "by Nd" in result.headline[0]
     assert [(one.label, one.unit) for one in result.key_figures][2:4] == [
-        ("steady rate, 20 deg", "deg/min"),
+        ("steady rate, 20 deg", "deg/s"),
         ("K", "1/s"),
     ]
 

@@ -29,7 +29,7 @@ DEFAULT_FIGURES = (
     "steady_radius_m@20",
     "advance_m@35",
     "tactical_diameter_m@35",
-    "overshoot1_deg@20/20",
+    "overshoot_1_deg@20/20",
 )
 """Figures where none is given. Project choice: one of each kind that is looked at most."""
 
@@ -117,7 +117,7 @@ def tune_ship(
     ----------
     ship : Vessel
     targets : str or sequence of str
-        Change the card until figures have these values: ``steady_radius_m@20=424``, ``overshoot1_deg@20/20<=25``,
+        Change the card until figures have these values: ``steady_radius_m@20=424``, ``overshoot_1_deg@20/20<=25``,
         ``>=``.
     figures : str or sequence of str
         Further figures to compute, as of :func:`find_influence`.
@@ -202,13 +202,14 @@ def find_influence(
     figures : str or sequence of str
         Figures to examine; by default one of each kind. On a straight course K_per_s, T_s, T1_s, T2_s, T3_s, K_prime,
         T_prime and criterion_C; in a steady turn with ``@20``, the rudder in deg, positive to starboard,
-        steady_radius_m, steady_diameter_m, steady_rate_degpmin, steady_drift_deg, steady_speed_mps and
+        steady_radius_m, steady_diameter_m, steady_rate_degps, steady_drift_deg, steady_speed_mps and
         speed_loss_percent; in a turning circle with ``@35`` advance_m, transfer_m, tactical_diameter_m,
         advance_lengths, tactical_diameter_lengths, time_90_s and time_180_s; in a zigzag with ``@20/20``
-        overshoot1_deg, overshoot2_deg, overshoot3_deg, overshoot4_deg, initial_turning_m, initial_turning_lengths and
-        initial_turning_s. For a craft with thrusters, in rpm: final_speed_mps@straight:600; with ``@difference:200``
-        advance_m, transfer_m, tactical_diameter_m, time_90_s, time_180_s, steady_diameter_m, steady_rate_degps and
-        steady_speed_mps; with ``@spin:400`` time_180_s, time_360_s and final_rate_degps.
+        overshoot_1_deg, overshoot_2_deg, overshoot_3_deg, overshoot_4_deg, initial_turning_distance_m,
+        initial_turning_lengths and initial_turning_time_s. For a craft with thrusters, in rpm:
+        final_speed_mps@straight:600; with ``@difference:200`` advance_m, transfer_m, tactical_diameter_m, time_90_s,
+        time_180_s, steady_diameter_m, steady_rate_degps and steady_speed_mps; with ``@spin:400`` time_180_s,
+        time_360_s and final_rate_degps.
     joint_variation : mapping, optional
         Changes in per cent of numbers that change together (Kc), by name: ``{"Yv": 0.62, "Nv": 1.7}``, on the command
         line ``Yv=0.62 Nv=1.7`` or a TOML file of them.

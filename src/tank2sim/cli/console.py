@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from rich.box import HEAVY_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.measure import Measurement
@@ -19,15 +20,18 @@ from tank2sim.files import PICTURE, STANDARD_OUTPUT, writable_folder, write_toge
 from tank2sim.notices import Notice
 
 screen = Console(highlight=False)
-"""Where summaries go."""
+"""Where summaries go. There are colours on a terminal, unless ``NO_COLOR`` is set."""
 
 _WIDEST = 1000
 """Characters in which every table has room. Project choice."""
 
 
 def show_table(shown: Table) -> None:
-    """Print a table with its notes; numbers are aligned right. A wide one breaks no cell."""
-    grid = Grid(header_style="bold", pad_edge=False)
+    """Print a table with its notes; numbers are aligned right. A wide one breaks no cell.
+
+    Frames are drawn on a terminal; a pipe and a file get columns with spaces between them.
+    """
+    grid = Grid(header_style="bold", pad_edge=False, box=HEAVY_HEAD if screen.is_terminal else None)
     for place, head in enumerate(shown.heads):
         numeric = all(isinstance(row[place], int | float) or row[place] is None for row in shown.rows)
         justify: Literal["left", "right"] = "right" if numeric else "left"

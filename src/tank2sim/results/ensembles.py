@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from tank2sim.analysis.ensemble.results import ChanceOfAll, FigureBands, Members, StabilityBands
 from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.parts import Cell, Section, Table, table
+from tank2sim.errors import ArgumentError
+from tank2sim.memory import refuse_beyond_memory
 from tank2sim.results.ensemble_charts import curve_charts
 from tank2sim.results.imo import BEYOND_THE_CARD
 from tank2sim.simulation.bands import Band
 from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MEMBERS_TEXT = (
     "Members of the ensemble are this ship with numbers drawn from the standard errors of its card, and from their "
@@ -41,6 +47,31 @@ def ensemble_heading(found: Members) -> str:
     found : Members
     """
     return f"Ensemble of {found.members}{', standard errors assumed' * found.assumed_errors}"
+
+
+def members_frame(found: Members | None) -> pd.DataFrame:
+    """The members of an ensemble, one row each: numbers drawn, by the dotted keys of the card; figures; ``usable``.
+
+    Parameters
+    ----------
+    found : Members or None
+
+    Raises
+    ------
+    InputError
+        There is no ensemble, the result was read from its JSON, or the frame does not fit into the memory.
+    """
+    import pandas as pd
+
+    if found is None:
+        raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
+    if found.drawn is None:
+        remedy = "compute the result again with the same members and seed"
+        raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
+    columns = len(found.drawn.draws.names) + len(found.drawn.figures)
+    refuse_beyond_memory("members", found.members, 2 * 8 * columns)
+    values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
+    return pd.DataFrame(values).rename_axis("member")
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:

@@ -16,6 +16,7 @@ from tank2sim.answer.charts.parts import (
     ChartRecord,
     data,
     extent,
+    panel_title,
     plain,
     series_look,
     with_unit,
@@ -25,7 +26,7 @@ from tank2sim.arrays import Array
 from tank2sim.gap.outcome.export import joined
 from tank2sim.gap.outcome.lacking import NORMAL
 from tank2sim.gap.outcome.study import DecidingTest, GapStudy, Lacking, TrialEstimate
-from tank2sim.results.gap_charts import SETS, small
+from tank2sim.results.gap_charts import SETS
 from tank2sim.results.gap_text import as_percent, trial_name
 from tank2sim.units import in_words
 
@@ -161,7 +162,7 @@ def _explained(lacking: Lacking) -> alt.LayerChart:
         {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
         for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
     ]
-    return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
+    return _bars(rows, "share of it that each state explains (%)", width=150, percent=True)
 
 
 _LINES = r"split(replace(datum.label, / \+ /g, '|+ '), '|')"
@@ -169,16 +170,16 @@ _LINES = r"split(replace(datum.label, / \+ /g, '|+ '), '|')"
 
 
 def _bars(
-    rows: Sequence[ChartRecord], across: str, *, width: int, kind: str = "linear", domain: Sequence[float] | None = None
+    rows: Sequence[ChartRecord], across: str, *, width: int, kind: str = "linear", percent: bool = False
 ) -> alt.LayerChart:
     names = [row["name"] for row in rows]
     farthest = max((row["v"] for row in rows if row["v"] is not None), default=0.0) or 1.0
     # Room on the right for the number at the end of the longest bar.
-    ends = list(domain) if domain else [0, farthest * (12 if kind == "symlog" else 1.25)]
+    ends = [0, 140 if percent else farthest * (12 if kind == "symlog" else 1.25)]
     scale_options = {"constant": 10} if kind == "symlog" else {}
     x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **scale_options))
-    ticks = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
-    x = x.axis(**({"values": ticks} if kind == "symlog" else {"tickCount": 4}))
+    ticks = [0, 50, 100] if percent else [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
+    x = x.axis(**({"values": ticks} if percent or kind == "symlog" else {"tickCount": 4}))
     y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelExpr=_LINES, labelLimit=150, ticks=False))
     base = Chart(data(rows)).encode(x=x, y=y)
     bars = base.mark_bar(height=11, opacity=0.75, clip=True)
@@ -290,7 +291,7 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
         estimated = Chart(data([span]))
         shade = estimated.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
         layers = [shade, estimated.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
-    title = small(f"{effect.replace('_', ' ')}: {words}")
+    title = panel_title(f"{effect.replace('_', ' ')}: {words}")
     return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
 
 

@@ -17,6 +17,7 @@ from tank2sim.answer.charts.parts import (
     axis_above,
     data,
     extent,
+    panel_title,
     plain,
     records,
     series_look,
@@ -185,7 +186,7 @@ def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> alt.VC
         alt.layer(*behind, *above).properties(width=200, height=86),
         alt.layer(*behind, noise.encode(y="low:Q", y2="high:Q"), *below).properties(width=200, height=66),
         spacing=16,
-    ).properties(title=small(f"{trial_name(place.trial)} · {name.words}"))
+    ).properties(title=panel_title(f"{trial_name(place.trial)} · {name.words}"))
 
 
 def _over_time(
@@ -233,8 +234,3 @@ def misfit_chart(study: GapStudy, *, title: str = "") -> alt.VConcatChart:
         for model in shown_models(study)
     ]
     return misfit_maps(rows, shown_models(study), title=title)
-
-
-def small(text: str) -> alt.Title:
-    """Title of one panel among several."""
-    return alt.Title(text, fontSize=11, offset=22, limit=260)

@@ -19,7 +19,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
-from tank2sim.results.ensembles import figures_section
+from tank2sim.results.ensembles import figures_section, members_frame
 from tank2sim.results.influence_charts import (
     InfluenceData,
     figure_label,
@@ -120,6 +120,18 @@ class InfluenceResult(Result[InfluenceStudy]):
     def variance_shares(self) -> pd.DataFrame:
         """Share of the variance of each figure (columns) that would go if a number (rows) were known exactly."""
         return self._frame(self._data.shares)
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; the figures asked for; and whether the ship is ``usable``.
+
+        Raises
+        ------
+        InputError
+            The result has no ensemble, or was read from its JSON, which has only the bands.
+        """
+        return members_frame(self.study.ensemble)
 
     def _frame(self, values: Array) -> pd.DataFrame:
         import pandas as pd

@@ -58,7 +58,7 @@ _ORDINALS = ("first", "second", "third", "fourth")
 def figure_label(text: str) -> str:
     """Words for a figure, without its unit: ``advance_m@35`` is ``advance, 35 deg``."""
     kind, _, argument = text.partition("@")
-    words = re.sub(r"^overshoot(\d)$", lambda found: f"{_ORDINALS[int(found[1]) - 1]} overshoot", in_words(kind)[0])
+    words = re.sub(r"^overshoot (\d)$", lambda found: f"{_ORDINALS[int(found[1]) - 1]} overshoot", in_words(kind)[0])
     return f"{words}, {argument} deg" if argument else words
 
 

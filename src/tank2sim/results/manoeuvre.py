@@ -15,7 +15,7 @@ from tank2sim.answer.result import Result
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.notices import Notice
-from tank2sim.results.ensembles import band_table
+from tank2sim.results.ensembles import band_table, members_frame
 from tank2sim.results.manoeuvre_charts import (
     SIDE_NAMES,
     history_charts,
@@ -128,6 +128,18 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         import pandas as pd
 
         return pd.DataFrame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; the figures of its run; and whether the ship is ``usable``.
+
+        Raises
+        ------
+        InputError
+            The result has no ensemble, or was read from its JSON, which has only the bands.
+        """
+        return members_frame(self.study.ensemble)
 
     def to_csv(self, path: str | Path | None = None) -> str:
         """The motion as text of a trial CSV, also written to `path`: readable wherever a measured trial is.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.analysis.stability.study import StabilityStudy
@@ -11,7 +12,7 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.notices import Notice
-from tank2sim.results.ensembles import chance_sentences, stability_section
+from tank2sim.results.ensembles import chance_sentences, members_frame, stability_section
 from tank2sim.results.imo import imo_section
 from tank2sim.results.stability_charts import (
     characteristic_chart,
@@ -117,6 +118,20 @@ class StabilityResult(Result[StabilityStudy]):
         names = {"name": "criterion", "passed": "met"}
         columns = ["name", "found", "allowed", "unit", "passed", "margin_percent"]
         return pd.DataFrame(list(self.study.imo))[columns].rename(columns=names).set_index("criterion")
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; the value of each IMO criterion; figures of the straight course; and whether the ship is ``usable``.
+
+        A column "...: beyond the card" is 1 where the trial of a criterion left the card's range before its value.
+
+        Raises
+        ------
+        InputError
+            The result has no ensemble, or was read from its JSON, which has only the bands.
+        """
+        return members_frame(self.study.ensemble)
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import altair as alt
 import numpy as np
 
 from tank2sim.answer.charts.before_after import before_after_switch, switch
+from tank2sim.answer.charts.matrix import ROW_PX, matrix_layers
 from tank2sim.answer.charts.parts import (
     NUMBER,
     STACKS,
@@ -19,6 +20,7 @@ from tank2sim.answer.charts.parts import (
     data,
     equal_frame,
     extent,
+    panel_title,
     plain,
     records,
     series_look,
@@ -100,7 +102,7 @@ def track_grid(trials: Sequence[TrialMotions], *, title: str = "") -> alt.Concat
         name = trial.trial
         rows_of[name] = rows
         layers = alt.layer(*_marks(position, tooltip), data=alt.NamedData(name))
-        panels.append(layers.properties(title=_small(name), width=frame.width_px, height=frame.height_px))
+        panels.append(layers.properties(title=panel_title(name), width=frame.width_px, height=frame.height_px))
     if not panels:
         return None
     text = f"Tracks of {', '.join(rows_of)}, measured and simulated; north is up."
@@ -145,7 +147,7 @@ def _histories(trial: TrialMotions, signals: Mapping[str, str]) -> tuple[alt.VCo
         ]
         panels.append(alt.layer(*_marks(position, tooltip)).properties(width=200, height=66))
     chart = alt.vconcat(*panels, data=alt.NamedData(trial.trial), spacing=12).resolve_scale(x="shared", **_SHARED)
-    return chart.properties(title=_small(trial.trial)), rows
+    return chart.properties(title=panel_title(trial.trial)), rows
 
 
 def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
@@ -196,23 +198,16 @@ def _window_map(
                 | {"text": _in_three(share), "error": f"{error:.3g} {in_words(name)[1]}".strip()}
             )
     side = alt.Axis(title=None, labelLimit=230) if named else alt.Axis(title=None, labels=False, ticks=False)
-    y = alt.Y("trial:N", sort=[trial.trial for trial in trials], axis=side)
-    x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
-    x = x.axis(title="signal", orient="bottom", labelAngle=0)
-    colours = alt.Scale(type="log", domain=[1, 100], scheme="blues", clamp=True)
-    legend = alt.Legend(gradientLength=180)  # of all maps alike, which makes it one
-    tooltip = [
-        alt.Tooltip("trial:N"),
-        alt.Tooltip("signal:N"),
-        alt.Tooltip("text:N", title="share (%)"),
-        alt.Tooltip("error:N", title="rms error"),
-    ]
-    base = Chart(data(rows)).encode(x=x, y=y, tooltip=tooltip)
-    cells = base.mark_rect().encode(color=alt.Color("share:Q", scale=colours, legend=legend))
-    ink = alt.condition("datum.share > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
-    numbers = base.mark_text(fontSize=10.5).encode(text="text:N", color=ink)
-    size = {"width": 38 * len(signals), "height": 21 * len(trials)}
-    return alt.layer(cells, numbers).properties(title=_small(title), **size)
+    layers = matrix_layers(
+        "share",
+        [trial.trial for trial in trials],
+        signals,
+        side=side,
+        legend=alt.Legend(gradientLength=180),  # of all maps alike, which makes it one
+        tooltip=[alt.Tooltip("text:N", title="share (%)"), alt.Tooltip("error:N", title="rms error")],
+    )
+    size = {"width": 38 * len(signals), "height": ROW_PX * len(trials)}
+    return alt.layer(*layers, data=data(rows)).properties(title=panel_title(title), **size)
 
 
 def figure_chart(sets: Mapping[str, Sequence[PredictedFigure]], *, title: str = "") -> alt.VConcatChart | None:
@@ -371,10 +366,6 @@ def _with_rows(chart: alt.ConcatChart, rows: Mapping[str, list[ChartRecord]]) ->
     # Data by name, put in at last: Altair copies those of a panel whenever the panel is put into another.
     chart["datasets"] = dict(rows)
     return chart
-
-
-def _small(text: str) -> alt.Title:
-    return alt.Title(text, fontSize=11, offset=22, limit=240)
 
 
 def _in_three(percent: float) -> str:

@@ -16,13 +16,13 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tests.analysis.symmetric_ship import SYMMETRIC
 
-LINEAR_FIGURES = ("criterion_C", "K_prime", "steady_radius_m@10", "steady_rate_degpmin@10", "steady_drift_deg@-10")
+LINEAR_FIGURES = ("criterion_C", "K_prime", "steady_radius_m@10", "steady_rate_degps@10", "steady_drift_deg@-10")
 SIMULATED = (
     "advance_m@35",
     "tactical_diameter_m@35",
     "time_180_s@35",
-    "overshoot1_deg@20/20",
-    "initial_turning_m@10/10",
+    "overshoot_1_deg@20/20",
+    "initial_turning_distance_m@10/10",
 )
 
 
@@ -51,13 +51,12 @@ def closed_form(d: dict[str, float], rudder_deg: float) -> dict[str, float]:
     r = (d["Nv"] * d["Yd"] - d["Yv"] * d["Nd"]) / C * delta
     v = (d["Yr"] * d["Nd"] - d["Nr"] * d["Yd"]) / C * delta
     U = u0 * math.hypot(1.0, v)
-    side = math.copysign(1.0, delta)
     return {
         "criterion_C": C,
         "K_prime": r / delta,
         "steady_radius_m": U / abs(r * u0 / L),
-        "steady_rate_degpmin": math.degrees(r * u0 / L) * 60 * side,
-        "steady_drift_deg": -side * math.degrees(math.asin(v * u0 / U)),
+        "steady_rate_degps": math.degrees(r * u0 / L),
+        "steady_drift_deg": -math.degrees(math.asin(v * u0 / U)),
     }
 
 
@@ -141,7 +140,7 @@ def test_slopes_do_not_depend_on_where_a_kink_falls_between_the_steps(monkeypatc
             return replace(model, step_s=share * model.step_s)
 
         monkeypatch.setattr(influence_study, "study_model", finer)
-        study = study_of(read_card("mariner"), "overshoot2_deg@10/10")
+        study = study_of(read_card("mariner"), "overshoot_2_deg@10/10")
         values, slopes = study.slopes_at(study.values)
         both.append(10 * slopes[0] * study.values / values[0])
     assert both[0] == pytest.approx(both[1], rel=1e-3, abs=1e-3)
@@ -203,7 +202,7 @@ def test_no_turn_is_steady_in_wind() -> None:
     ("changes", "text", "words"),
     [
         ({"derivatives.Nd": 0.0, "derivatives.Yd": 0.0}, "steady_radius_m@1", "does not turn"),
-        ({"derivatives.Nd": -1e-6, "derivatives.Yd": 0.0}, "overshoot1_deg@10/80", "does not show"),
+        ({"derivatives.Nd": -1e-6, "derivatives.Yd": 0.0}, "overshoot_1_deg@10/80", "does not show"),
         ({"derivatives.Nd": 139e-5}, "advance_m@35", "does not show"),
     ],
 )

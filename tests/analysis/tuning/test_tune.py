@@ -125,7 +125,12 @@ def test_what_has_no_influence_stays_and_the_rest_moves_as_little_as_it_can(card
     "text",
     [
         *("steady_radius_m@20=-5", "steady_diameter_m@20<=0", "advance_m@35=-1", "time_90_s@35=0"),
-        *("speed_loss_percent@20=120", "speed_loss_percent@20=-1", "overshoot1_deg@20/20=-2", "steady_drift_deg@20=95"),
+        *(
+            "speed_loss_percent@20=120",
+            "speed_loss_percent@20=-1",
+            "overshoot_1_deg@20/20=-2",
+            "steady_drift_deg@20=95",
+        ),
     ],
 )
 def test_a_target_that_no_ship_can_meet_is_refused(text) -> None:
@@ -167,7 +172,7 @@ def test_means_that_cannot_be_are_refused(card, means, words) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("by", [FEWEST, UNCERTAIN])
 def test_figures_of_manoeuvres_are_reached_too(by) -> None:
-    targets = ["steady_radius_m=640@20", "overshoot1_deg@20/20<=7.5", "advance_m@35=580"]
+    targets = ["steady_radius_m=640@20", "overshoot_1_deg@20/20<=7.5", "advance_m@35=580"]
     _, found = tuned_to(read_card("mariner"), targets, by=by)
     assert found.reached
     assert found.after[[0, 2]] == pytest.approx([640.0, 580.0], rel=1e-5)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.apps.design.command import design_campaign
 from tank2sim.apps.design.figure_slopes import (
     both_sides,
-    figure_of_text,
     figure_slopes,
     hydrodynamic_derivatives,
     range_of_figures,
@@ -100,7 +100,7 @@ def test_ranges_of_the_gauges_leave_out_what_is_too_strong(tmp_path):
 @pytest.mark.slow
 def test_errors_of_a_symmetric_zero_cancel_in_the_mean_of_both_sides():
     card = read_card("kvlcc2-captive")
-    asked = [figure_of_text("overshoot1_deg@10/10")]
+    asked = [parse_figure("overshoot_1_deg@10/10")]
     mean, one = (figure_slopes(card, asked, ["N0"], draws=0, seed=0, one_side=one_side) for one_side in (False, True))
     # The ship is not quite symmetric.
     assert abs(mean.of(["N0"], mean.at_card)[0, 0]) < 0.25 * abs(one.of(["N0"], one.at_card)[0, 0])
@@ -110,10 +110,10 @@ def test_the_range_of_the_tests_is_that_of_the_manoeuvres():
     card = read_card("mariner")
     turn = t2s.load("mariner").turn(35).df
     rate = (turn["r_degps"].abs() * np.pi / 180 * 160.93 / np.hypot(turn["u_mps"], turn["v_mps"])).max()
-    found = range_of_figures(card, [figure_of_text("advance_m@35")])
+    found = range_of_figures(card, [parse_figure("advance_m@35")])
     assert np.degrees(found.drift_rad) == pytest.approx(9.0) and np.degrees(found.rudder_rad) == pytest.approx(35.0)
     assert rate <= found.yaw_rate_prime < rate + 0.05
-    assert range_of_figures(card, [figure_of_text("criterion_C")]).yaw_rate_prime == pytest.approx(0.2)
+    assert range_of_figures(card, [parse_figure("criterion_C")]).yaw_rate_prime == pytest.approx(0.2)
 
 
 def test_inertia_in_the_terms_of_a_card_is_taken_out():
@@ -127,20 +127,21 @@ def test_inertia_in_the_terms_of_a_card_is_taken_out():
     ("text", "name"),
     [
         ("advance@35", "advance_m"),
-        ("overshoot_1_deg@10/10", "overshoot1_deg"),
+        ("overshoot1_deg@10/10", "overshoot_1_deg"),
         ("tactical_diameter@35", "tactical_diameter_m"),
-        ("steady_radius_m@20", "steady_radius_m"),
+        ("steady_radius@20", "steady_radius_m"),
     ],
 )
-def test_figures_may_be_written_without_units(text, name):
-    assert figure_of_text(text).kind.name == name
-    assert figure_of_text(text).angles == pytest.approx(np.radians([float(n) for n in text.split("@")[1].split("/")]))
+def test_a_figure_has_its_one_name(text, name):
+    with pytest.raises(InputError, match=f"did you mean {name}") as raised:
+        design_campaign("mariner", figures=text, hours=2, draws=0)
+    assert (raised.value.source, raised.value.place) == ("figures", text)
 
 
 def test_the_other_side_of_a_figure_has_the_opposite_rudder():
-    here, there = both_sides(figure_of_text("overshoot1_deg@10/10"))
+    here, there = both_sides(parse_figure("overshoot_1_deg@10/10"))
     assert there.angles == pytest.approx((-here.angles[0], here.angles[1]))
-    assert len(both_sides(figure_of_text("criterion_C"))) == 1
+    assert len(both_sides(parse_figure("criterion_C"))) == 1
 
 
 @pytest.mark.parametrize(

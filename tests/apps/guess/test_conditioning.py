@@ -20,7 +20,7 @@ TANKER = ShipDimensions(length_m=320.0, beam_m=58.0, draught_m=20.8, block=0.81,
 CARD = prior_card(TANKER, "tanker")
 DRAWS, _ = draws_of(CARD, 1)
 SPREAD = np.sqrt(np.diag(DRAWS.root @ DRAWS.root.T))
-ADVANCE, TACTICAL = "advance@turn35", "tactical_diameter@turn35"
+ADVANCE, TACTICAL = "advance_m@35", "tactical_diameter_m@35"
 MEMBERS = 2000
 
 
@@ -138,7 +138,7 @@ def test_errors_that_were_not_given_and_ships_that_were_left_out_are_said(value,
     members = np.zeros((180, len(SPREAD)))
     shown = {ADVANCE: 1000.0 + np.linspace(-80.0, 80.0, 180)}
     found = GuessMembers(DRAWS, members, members, shown, shown)
-    figures = [GivenFigure("turn35", "advance", value, error)]
+    figures = [GivenFigure("turn35", "advance_m", value, error)]
     notices = study_members(TANKER, "tanker", figures, found, 200, 1).notices
     assert any(notice.startswith("20 of 200") for notice in notices)
     assert any("5 % of distances, 1 deg" in notice for notice in notices) == words
@@ -156,7 +156,7 @@ def test_a_figure_outside_nine_of_ten_ships_by_more_than_its_error_is_marked(val
     narrow, wide = np.linspace(900.0, 1100.0, 181), np.linspace(0.0, 2000.0, 181)
     figures = {"before": {ADVANCE: wide}, "after": {ADVANCE: wide}, place: {ADVANCE: narrow}}
     found = GuessMembers(DRAWS, members, members, figures["before"], figures["after"])
-    study = study_members(TANKER, "tanker", [GivenFigure("turn35", "advance", value, 51.0)], found, 181, 1)
+    study = study_members(TANKER, "tanker", [GivenFigure("turn35", "advance_m", value, 51.0)], found, 181, 1)
     assert any(notice.leads for notice in study.notices) == marked
 
 
@@ -182,7 +182,7 @@ def test_the_next_figure_is_the_one_that_takes_most_variance_away() -> None:
     """Two figures that are one number tell of each other by v/(v + e^2); one that is alone tells of itself."""
     stream, count = np.random.default_rng(3), 40_000
     logs = {key: 0.3 * stream.standard_normal(count) for key in FIGURE_KEYS}
-    logs["transfer@turn35"] = logs[TACTICAL] = 0.1 * stream.standard_normal(count)
+    logs["transfer_m@35"] = logs[TACTICAL] = 0.1 * stream.standard_normal(count)
     after = {key: (30.0 if "zigzag" in key else 1000.0) * np.exp(values) for key, values in logs.items()}
     draws = DRAWS
     members = np.column_stack([draws.mean + SPREAD * stream.standard_normal(len(SPREAD)) for _ in range(50)]).T
@@ -192,10 +192,10 @@ def test_the_next_figure_is_the_one_that_takes_most_variance_away() -> None:
     open_figures = len(FIGURE_KEYS) - 1
     gains = study.next_figures
     share = 0.01 / (0.01 + 0.05**2)
-    assert gains[TACTICAL] == gains["transfer@turn35"] == pytest.approx(2 * share / open_figures, rel=0.02)
+    assert gains[TACTICAL] == gains["transfer_m@35"] == pytest.approx(2 * share / open_figures, rel=0.02)
     error = 1.0 / 30.0
-    assert gains["overshoot_1@zigzag10"] == pytest.approx(0.09 / (0.09 + error**2) / open_figures, rel=0.02)
-    assert list(gains)[:2] == ["transfer@turn35", TACTICAL] or list(gains)[:2] == [TACTICAL, "transfer@turn35"]
+    assert gains["overshoot_1_deg@10/10"] == pytest.approx(0.09 / (0.09 + error**2) / open_figures, rel=0.02)
+    assert list(gains)[:2] == ["transfer_m@35", TACTICAL] or list(gains)[:2] == [TACTICAL, "transfer_m@35"]
     settled = [number.settled for number in study.parameters.values()]
     assert settled == [True] + [False] * (len(SPREAD) - 1)  # below 0.7 of before
     assert study.figures[TACTICAL].found.p50 == pytest.approx(1000.0, rel=0.01)

@@ -25,7 +25,7 @@ from tank2sim.simulation.run import simulate
 pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
 
 TANKER = ShipDimensions(length_m=320.0, beam_m=58.0, draught_m=20.8, block=0.81, speed_kn=15.5)
-GIVEN = ("advance@turn35", "tactical_diameter@turn35", "overshoot_1@zigzag10", "overshoot_2@zigzag10")
+GIVEN = ("advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_2_deg@10/10")
 
 
 def figure(key: str, value: float, error: float) -> GivenFigure:
@@ -106,7 +106,10 @@ def test_intervals_hold_made_up_ships() -> None:
 
 @pytest.mark.slow
 def test_the_card_written_gives_the_figures_again(tmp_path) -> None:
-    given = [*parse_figures("turn35", "advance=970 tactical=980+-20"), *parse_figures("zigzag10", "first=9.4")]
+    given = [
+        *parse_figures("turn35", "advance_m=970 tactical_diameter_m=980+-20"),
+        *parse_figures("zigzag10", "overshoot_1_deg=9.4"),
+    ]
     study, found = guess_ship(TANKER, given, "tanker", 300, 0)
     path = tmp_path / "ship.toml"
     found.save(path)
@@ -118,17 +121,25 @@ def test_the_card_written_gives_the_figures_again(tmp_path) -> None:
     assert run["tactical_diameter_m"] == pytest.approx(980.0, rel=0.06)
     numbers = study.parameters
     assert numbers["Nd"].standard_error < numbers["Nd"].by_dimensions_standard_error
-    assert study.figures["advance@turn35"].given == 970.0
-    assert list(study.next_figures) and "advance@turn35" not in study.next_figures
+    assert study.figures["advance_m@35"].given == 970.0
+    assert list(study.next_figures) and "advance_m@35" not in study.next_figures
 
 
 def test_figures_of_an_option_are_read_with_their_errors() -> None:
-    advance, tactical = parse_figures("turn35", "advance=970 tactical=980+-30")
+    advance, tactical = parse_figures("turn35", "advance_m=970 tactical_diameter_m=980+-30")
     assert (advance.value, advance.standard_error) == (970.0, pytest.approx(48.5))
-    assert (tactical.key, tactical.standard_error) == ("tactical_diameter@turn35", 30.0)
-    (first,) = parse_figures("zigzag10", "first=9.4±2")
-    assert (first.value, first.standard_error, first.key) == (9.4, 2.0, "overshoot_1@zigzag10")
-    for text in ("advance", "advance=x", "advance=-4", "diameter=900", "advance=0", "advance=9 advance=8", "first=3"):
+    assert (tactical.key, tactical.standard_error) == ("tactical_diameter_m@35", 30.0)
+    (first,) = parse_figures("zigzag10", "overshoot_1_deg=9.4±2")
+    assert (first.value, first.standard_error, first.key) == (9.4, 2.0, "overshoot_1_deg@10/10")
+    for text in (
+        "advance",
+        "advance_m=x",
+        "advance_m=-4",
+        "diameter=900",
+        "advance_m=0",
+        "advance_m=9 advance_m=8",
+        "overshoot_1_deg=3",
+    ):
         with pytest.raises(InputError):
             parse_figures("turn35", text)
 
@@ -137,9 +148,9 @@ def test_figures_of_an_option_are_read_with_their_errors() -> None:
 @pytest.mark.parametrize(
     ("values", "named"),
     [
-        ({"advance@turn35": 97.0}, "advance=97"),
-        pytest.param({"advance@turn35": 970.0, "tactical_diameter@turn35": 400.0}, "400", marks=pytest.mark.slow),
-        pytest.param({"overshoot_1@zigzag10": 9.4, "overshoot_2@zigzag10": 90.0}, "90", marks=pytest.mark.slow),
+        ({"advance_m@35": 97.0}, "advance_m=97"),
+        pytest.param({"advance_m@35": 970.0, "tactical_diameter_m@35": 400.0}, "400", marks=pytest.mark.slow),
+        pytest.param({"overshoot_1_deg@10/10": 9.4, "overshoot_2_deg@10/10": 90.0}, "90", marks=pytest.mark.slow),
     ],
 )
 def test_impossible_and_contradictory_figures_are_named(values, named) -> None:
@@ -161,8 +172,8 @@ def test_dimensions_of_no_ship_are_refused(changed) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "error", "word"),
     [
-        ("tactical_diameter@turn35", 320.0, 16.0, "320 m"),  # a diameter of one length
-        ("overshoot_1@zigzag10", 0.16, 1.0, "rad"),
+        ("tactical_diameter_m@35", 320.0, 16.0, "320 m"),  # a diameter of one length
+        ("overshoot_1_deg@10/10", 0.16, 1.0, "rad"),
     ],
 )
 def test_a_figure_outside_nine_of_ten_ships_is_marked_with_its_likely_unit(key, value, error, word) -> None:
@@ -173,6 +184,8 @@ def test_a_figure_outside_nine_of_ten_ships_is_marked_with_its_likely_unit(key, 
 
 @pytest.mark.slow
 def test_usual_figures_are_not_marked() -> None:
-    given = parse_figures("turn35", "advance=970 tactical=980") + parse_figures("zigzag10", "first=9.4 second=18")
+    given = parse_figures("turn35", "advance_m=970 tactical_diameter_m=980") + parse_figures(
+        "zigzag10", "overshoot_1_deg=9.4 overshoot_2_deg=18"
+    )
     study, _ = guess_ship(TANKER, given, "tanker", 150, 1)
     assert not foremost(study.notices)

@@ -15,14 +15,14 @@ STUDY = GuessStudy(
     members=200,
     seed=0,
     figures={
-        "tactical_diameter@turn35": GuessedFigure(
+        "tactical_diameter_m@35": GuessedFigure(
             unit="m",
             given=980.0,
             standard_error=49.0,
             by_dimensions=Band(700.0, 1000.0, 1400.0, 200.0, 200),
             found=Band(900.0, 980.0, 1060.0, 50.0, 200),
         ),
-        "overshoot_1@zigzag10": GuessedFigure(
+        "overshoot_1_deg@10/10": GuessedFigure(
             unit="deg",
             given=None,
             standard_error=None,
@@ -35,7 +35,7 @@ STUDY = GuessStudy(
             by_dimensions=-1e-3, by_dimensions_standard_error=2e-4, value=-1.1e-3, standard_error=1e-4, settled=True
         )
     },
-    next_figures={"overshoot_1@zigzag10": 0.6},
+    next_figures={"overshoot_1_deg@10/10": 0.6},
     notices=(Notice("a guess"),),
 )
 
@@ -58,7 +58,7 @@ def test_the_tables_hold_figures_numbers_and_the_next_figure() -> None:
     assert prior["95 %"].to_list() == [1400.0, 16.0]
     assert figures["given"].to_list()[0] == 980.0 and figures["50 %"].to_list() == [980.0, 9.0]
     assert numbers["found"].to_list() == [-1.1e-3] and further["variance removed (%)"].to_list() == [60.0]
-    assert result.figures.loc["overshoot_1@zigzag10", "by_dimensions_p95"] == 16.0
+    assert result.figures.loc["overshoot_1_deg@10/10", "by_dimensions_p95"] == 16.0
 
 
 def test_the_headline_says_how_much_narrower_the_other_intervals_are() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -283,10 +282,7 @@ def lanes_of(model: Model) -> LaneManoeuvres | None:
 
 def _lane_figure(figure: InfluenceFigure) -> str:
     """Name of a figure of a turning circle or zigzag among those of runs; empty for others."""
-    if figure.kind.family not in (TURN, ZIGZAG):
-        return ""
-    spelt = {"initial_turning_m": "initial_turning_distance_m", "initial_turning_s": "initial_turning_time_s"}
-    return re.sub(r"^overshoot(\d)", r"overshoot_\1", spelt.get(figure.kind.name, figure.kind.name))
+    return figure.kind.name if figure.kind.family in (TURN, ZIGZAG) else ""
 
 
 def _members_of(count: int, values: Mapping[str, Array]) -> list[dict[str, float]]:

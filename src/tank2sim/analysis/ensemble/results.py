@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import (
@@ -26,6 +28,7 @@ from tank2sim.analysis.stability.straight_line import answering_states
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, study_model
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, band_of, figure_bands, history_bands
@@ -53,10 +56,41 @@ class EnsembleRequest:
     seed: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnShips:
+    """The ships of an ensemble, to be listed one by one. They are drawn again for it, not stored.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    draws : Draws
+    figures : mapping
+        Name to the figure of each of the n ships (n,); nan where a ship does not show it.
+    usable : array (n,)
+        False for a ship that cannot be simulated.
+    """
+
+    card: ManoeuvringCard
+    draws: Draws
+    figures: Mapping[str, Array]
+    usable: NDArray[np.bool_]
+
+    def coefficients(self) -> dict[str, Array]:
+        """Drawn numbers (n,) by the dotted keys of the card, in the conventions of its file."""
+        numbers = {parameter.name: parameter for parameter in card_parameters(self.card, study_model(self.card))}
+        values = self.draws.members(0, len(self.usable)).values
+        drawn = (numbers[name] for name in self.draws.names)
+        return {number.key: number.factor * column for number, column in zip(drawn, values.T, strict=True)}
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Members:
     """Members of an ensemble: number, seed, usable ones, unusable ones by their reason, notices, and whether all
-    standard errors are assumed."""
+    standard errors are assumed.
+
+    `drawn` are the ships themselves (:class:`DrawnShips`). They are not part of the JSON: a result that was read from
+    its JSON has none.
+    """
 
     members: int
     seed: int
@@ -64,6 +98,7 @@ class Members:
     unusable: dict[str, int]
     notices: tuple[Notice, ...]
     assumed_errors: bool = False
+    drawn: Annotated[Any, Field(exclude=True)] = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -188,7 +223,7 @@ def manoeuvre_bands(
         share = f"{100 * STILL_RUNNING:g} % of the members"
         notices.append(Notice(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it"))
     return ManoeuvreBands(
-        **_members(found, draws, notices),
+        **_members(card, draws, found, notices),
         figures=figure_bands(found),
         t_s=shown,
         histories=histories,
@@ -245,7 +280,7 @@ def stability_bands(
         drawn, about = steering_bands(ShipText.of(card), draws, request.members, curves, executor)
         messages += about
     return StabilityBands(
-        **_members(trials, draws, messages),
+        **_members(card, draws, trials, messages, straight.figures),
         figures=bands,
         probability_stable=stable,
         probability_stable_interval_95=between,
@@ -268,7 +303,7 @@ def named_bands(
             notices.append(
                 Notice(f"{name}: {found.usable - band.shown_by} of {request.members} members do not show it")
             )
-    return FigureBands(**_members(found, draws, notices), figures=bands)
+    return FigureBands(**_members(card, draws, found, notices), figures=bands)
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[Notice]]:
@@ -364,8 +399,14 @@ def _ensemble(
     return found
 
 
-def _members(found: Ensemble, draws: Draws, messages: Sequence[Notice]) -> dict[str, Any]:
-    """Fields of :class:`Members`."""
+def _members(
+    card: ManoeuvringCard,
+    draws: Draws,
+    found: Ensemble,
+    messages: Sequence[Notice],
+    further: Mapping[str, Array] | None = None,
+) -> dict[str, Any]:
+    """Fields of :class:`Members`; `further` are figures of the same members from another evaluation."""
     return {
         "members": found.members,
         "seed": found.seed,
@@ -373,4 +414,5 @@ def _members(found: Ensemble, draws: Draws, messages: Sequence[Notice]) -> dict[
         "unusable": dict(found.unusable),
         "notices": (*messages, *found.notices),
         "assumed_errors": draws.assumed,
+        "drawn": DrawnShips(card, draws, {**found.figures, **(further or {})}, ~found.bad),
     }

@@ -115,20 +115,19 @@ def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> 
     """
     U2 = u * u + v * v
     U = math.sqrt(U2)
-    per_minute = 60 * 180 / math.pi
-    radius, drift = U / (side * r), -side * math.degrees(math.asin(v / U))
+    radius, drift = U / (side * r), -math.degrees(math.asin(v / U))
     by_radius = np.array([u / (U * side * r), v / (U * side * r), -radius / r])
-    by_drift = -side * math.degrees(1.0) * np.array([-v / U2, u / U2, 0.0])
+    by_drift = -math.degrees(1.0) * np.array([-v / U2, u / U2, 0.0])
     by_speed = np.array([u / U, v / U, 0.0])
     figures = {
         "steady_radius_m": radius,
         "steady_diameter_m": 2 * radius,
-        "steady_rate_degpmin": per_minute * side * r,
+        "steady_rate_degps": math.degrees(r),
         "steady_drift_deg": drift,
         "steady_speed_mps": U,
         "speed_loss_percent": 100 * (1 - U / approach),
     }
-    by_rate = np.array([0.0, 0.0, per_minute * side])
+    by_rate = np.array([0.0, 0.0, math.degrees(1.0)])
     return figures, np.array([by_radius, 2 * by_radius, by_rate, by_drift, by_speed, -100 / approach * by_speed])
 
 

@@ -41,8 +41,10 @@ FIGURE_KINDS: dict[str, FigureKind] = {
         FigureKind("criterion_C", STRAIGHT, "criterion of straight-line stability, prime system"),
         FigureKind("steady_radius_m", STEADY, "radius of the steady turn, U/|r|"),
         FigureKind("steady_diameter_m", STEADY, "its diameter"),
-        FigureKind("steady_rate_degpmin", STEADY, "yaw rate of the steady turn, positive to the side of the rudder"),
-        FigureKind("steady_drift_deg", STEADY, "drift angle of the steady turn, positive when the bow points inwards"),
+        FigureKind("steady_rate_degps", STEADY, "yaw rate of the steady turn, positive to starboard"),
+        FigureKind(
+            "steady_drift_deg", STEADY, "drift angle of the steady turn, positive when the bow points to starboard"
+        ),
         FigureKind("steady_speed_mps", STEADY, "speed in the steady turn"),
         FigureKind("speed_loss_percent", STEADY, "loss of speed in the steady turn"),
         FigureKind("advance_m", TURN, "advance at 90 deg"),
@@ -52,10 +54,10 @@ FIGURE_KINDS: dict[str, FigureKind] = {
         FigureKind("tactical_diameter_lengths", TURN, "tactical diameter over L"),
         FigureKind("time_90_s", TURN, "time to 90 deg"),
         FigureKind("time_180_s", TURN, "time to 180 deg"),
-        *(FigureKind(f"overshoot{n}_deg", ZIGZAG, f"overshoot {n}") for n in (1, 2, 3, 4)),
-        FigureKind("initial_turning_m", ZIGZAG, "distance to the second execute"),
+        *(FigureKind(f"overshoot_{n}_deg", ZIGZAG, f"overshoot {n}") for n in (1, 2, 3, 4)),
+        FigureKind("initial_turning_distance_m", ZIGZAG, "distance to the second execute"),
         FigureKind("initial_turning_lengths", ZIGZAG, "the same over L"),
-        FigureKind("initial_turning_s", ZIGZAG, "time to the second execute"),
+        FigureKind("initial_turning_time_s", ZIGZAG, "time to the second execute"),
     )
 }
 """All kinds of figures by name."""
@@ -136,7 +138,7 @@ class InfluenceFigure:
 
 
 def parse_figure(text: str, argument: str = "figures") -> InfluenceFigure:
-    """Parse a figure: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
+    """Parse a figure: ``criterion_C``, ``steady_radius_m@20``, ``overshoot_1_deg@20/20``.
 
     A craft with thrusters: ``final_speed_mps@straight:600``, ``steady_diameter_m@difference:200``, in rpm.
 

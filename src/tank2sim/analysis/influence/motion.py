@@ -47,8 +47,8 @@ _CHUNK = 1000  # steps whose tangents are held at a time
 
 
 def overshoots_in(names: Collection[str]) -> int:
-    """Number of the last named overshoot (``overshoot2_deg``); 0 without any."""
-    return max((int(name.removeprefix("overshoot")[0]) for name in names if name.startswith("overshoot")), default=0)
+    """Number of the last named overshoot (``overshoot_2_deg``); 0 without any."""
+    return max((int(name.split("_")[1]) for name in names if name.startswith("overshoot_")), default=0)
 
 
 @dataclass(frozen=True)
@@ -170,15 +170,15 @@ class MotionSlopes:
         first = events[0]
         distance = axes.distance(first)
         found: dict[str, Sloped] = {
-            "initial_turning_m": distance,
+            "initial_turning_distance_m": distance,
             "initial_turning_lengths": axes.over_length(distance),
-            "initial_turning_s": (first.time, first.time_by),
+            "initial_turning_time_s": (first.time, first.time_by),
         }
         psi = self.model.state_names.index("motion.psi")
         for number, event in enumerate(events[1:]):
             to_side = axes.side * (-1) ** number
             beyond = to_side * (float(event.x[psi]) - axes.heading) - zigzag.heading
-            found[f"overshoot{number + 1}_deg"] = (math.degrees(beyond), to_side * np.degrees(event.x_by[psi]))
+            found[f"overshoot_{number + 1}_deg"] = (math.degrees(beyond), to_side * np.degrees(event.x_by[psi]))
         return found
 
     def events(self, run: Trajectory, places: Sequence[tuple[str, float]], p: Array) -> list[Event]:

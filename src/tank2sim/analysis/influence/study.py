@@ -22,6 +22,7 @@ from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
+from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -206,14 +207,7 @@ class Study:
 
 def named_figures(given: Figures) -> dict[str, float]:
     """Figures of a manoeuvre by the names of :mod:`tank2sim.analysis.influence.figures`, where the run shows them."""
-    overshoots = given.get("overshoots_deg", [])
-    assert isinstance(overshoots, list)
-    spelt = {
-        "initial_turning_m": given.get("initial_turning_distance_m"),
-        "initial_turning_s": given.get("initial_turning_time_s"),
-        **{f"overshoot{number}_deg": value for number, value in enumerate(overshoots, start=1)},
-    }
-    return {name: value for name, value in {**given, **spelt}.items() if isinstance(value, float)}
+    return {name: value for name, value in single_figures(given).items() if isinstance(value, float)}
 
 
 def last_event(given: Figures, names: Collection[str]) -> float:

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from tank2sim.analysis.influence.figures import STRAIGHT, FigureKind, InfluenceFigure, parse_figure
+from tank2sim.analysis.influence.figures import STRAIGHT, InfluenceFigure, parse_figure
 from tank2sim.errors import ArgumentError
 
 EQUAL, AT_MOST, AT_LEAST = "=", "<=", ">="
@@ -40,7 +40,7 @@ def parse_target(text: str) -> Target:
     """
     found = _TARGET.fullmatch(text.strip())
     if found is None or (found["at"] and found["behind"]):
-        remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot1_deg@20/20<=25'"
+        remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot_1_deg@20/20<=25'"
         raise ArgumentError("targets", text, "is not a target", remedy)
     try:
         value = float(found["value"])
@@ -51,14 +51,18 @@ def parse_target(text: str) -> Target:
             "targets", text, f"{found['value'].strip()} is not a number", "give a value in the figure's unit"
         )
     figure = parse_figure(found["name"].strip() + (found["at"] or found["behind"] or "").strip(), "targets")
-    if not _possible(figure.kind, value):
+    if not _possible(figure, value):
         problem = f"no ship has {figure.kind.description} of {value:g}"
         raise ArgumentError("targets", text, problem, "give a value that a ship can have")
     return Target(figure, found["relation"], value)
 
 
-def _possible(kind: FigureKind, value: float) -> bool:
-    """True for a possible value of a figure: sizes, times and rates are positive; a ship keeps some speed in a turn."""
+def _possible(figure: InfluenceFigure, value: float) -> bool:
+    """True for a possible value of a figure: sizes and times are positive; a ship turns to the side of the order
+    and keeps some speed."""
+    kind = figure.kind
+    if kind.name in ("steady_rate_degps", "final_rate_degps"):
+        return value * figure.angles[0] > 0
     if kind.family == STRAIGHT or kind.name == "transfer_m":
         return True
     if kind.name == "steady_drift_deg":

@@ -8,13 +8,11 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.answer.charts.parts import STACKS, Chart, ChartRecord, data
+from tank2sim.answer.charts.matrix import DARKEST, ROW_PX, matrix_layers
+from tank2sim.answer.charts.parts import STACKS, ChartRecord, data
 
 BOTH, ALL = "both", "all"
 """The first setting of a switch, and that on paper: two series together, or more of them."""
-
-MISFIT_SHOWN = 100.0
-"""Misfit in noise units at which the darkest colour begins (project choice): far from any doubt."""
 
 _NAME = "shown"
 
@@ -71,23 +69,20 @@ def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[
     heads = {model: f"{rows[0]['group']}, {model}".removeprefix(", ") for model in models}
     cells = [
         {"trial": row["trial"], "signal": row["signal"], "model": row["model"], "head": heads[row["model"]]}
-        | {"misfit": min(row["misfit"], MISFIT_SHOWN), "text": in_noise(row["misfit"])}
+        | {"misfit": min(row["misfit"], DARKEST), "text": in_noise(row["misfit"])}
         for row in rows
     ]
     trials = list(dict.fromkeys(row["trial"] for row in rows))
-    y = alt.Y("trial:N", sort=trials, axis=alt.Axis(title=None, labelLimit=230))
-    x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
-    x = x.axis(title="signal", orient="bottom", labelAngle=0)
-    colours = alt.Scale(type="log", domain=[1, MISFIT_SHOWN], scheme="blues", clamp=True)
-    bar = alt.Legend(title="misfit (noise units)", gradientLength=180)  # of all maps alike, which makes it one
-    tooltip = [alt.Tooltip("trial:N"), alt.Tooltip("signal:N"), alt.Tooltip("text:N", title="misfit (noise units)")]
-    base = Chart().encode(x=x, y=y, tooltip=tooltip)
-    ink = alt.condition("datum.misfit > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
-    both = alt.layer(
-        base.mark_rect().encode(color=alt.Color("misfit:Q", scale=colours, legend=bar)),
-        base.mark_text(fontSize=10.5).encode(text="text:N", color=ink),
-        data=data(cells),
-    ).properties(width=_cell_width(signals) * len(signals), height=21 * len(trials))
+    layers = matrix_layers(
+        "misfit",
+        trials,
+        signals,
+        side=alt.Axis(title=None, labelLimit=230),
+        legend=alt.Legend(title="misfit (noise units)", gradientLength=180),  # of all maps alike, which makes it one
+        tooltip=[alt.Tooltip("text:N", title="misfit (noise units)")],
+    )
+    both = alt.layer(*layers, data=data(cells))
+    both = both.properties(width=_cell_width(signals) * len(signals), height=ROW_PX * len(trials))
     head = alt.Header(title=None, labelFontSize=11, labelAnchor="start", labelLimit=260)
     columns = alt.Column("head:N", sort=list(heads.values()), header=head)
     return both.transform_filter(before_after_switch({model: model for model in models}, "model")).facet(

@@ -9,21 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.answer.charts.labels import label_layers, spots_about, spots_along
 from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
     NUMBER,
     Chart,
     ChartRecord,
+    Frame,
     axis_above,
     data,
     equal_frame,
     every,
+    free_frame,
     pan_zoom,
     plain,
     records,
@@ -136,8 +139,7 @@ def along_course(columns: Mapping[str, Any], points_m: Array) -> Array:
 class Dimension:
     """A figure drawn on a track: a line from `begin` to `end`, each (to starboard, ahead) in m, with its words.
 
-    `low` and `high` are the ends of a bar on the same line, of the 5 and 95 % quantiles over an ensemble. The words are
-    at `place`, by default the middle of the line, and lie to the side of it that `align` says.
+    `low` and `high` are the ends of a bar on the same line, of the 5 and 95 % quantiles over an ensemble.
     """
 
     text: str
@@ -145,8 +147,6 @@ class Dimension:
     end: tuple[float, float]
     low: tuple[float, float] | None = None
     high: tuple[float, float] | None = None
-    place: tuple[float, float] | None = None
-    align: Literal["left", "center", "right"] = "center"
 
 
 NamedBands = Mapping[str, Band]
@@ -169,7 +169,6 @@ def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: 
                 end=(across, advance),
                 low=low,
                 high=high,
-                place=(across, 0.12 * advance),
             )
         )
         low, high = _ends(bands.get("transfer_m"), lambda size: (side * size, advance))
@@ -180,8 +179,6 @@ def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: 
                 end=(across, advance),
                 low=low,
                 high=high,
-                place=(0.0, advance),
-                align="left" if side > 0 else "right",
             )
         )
     if tactical is not None and half is not None:
@@ -279,7 +276,8 @@ def way_chart(
     if outlines:
         hull = Chart(data(outlines)).mark_line(style="hull", interpolate="linear-closed", clip=True)
         layers.append(hull.encode(**position, order="i:Q", detail="hull:N"))
-    layers += [*_dimension_layers(dimensions, position), hover.encode(**position, tooltip=tooltip)]
+    lines = [(motion.starboard_m, motion.ahead_m), *_outline_lines(outlines)]
+    layers += [*_dimension_layers(dimensions, position, frame, lines), hover.encode(**position, tooltip=tooltip)]
     described = "; ".join(dimension.text for dimension in dimensions)
     outlined = f" The ship every {step:g} s." if outlines else ""
     return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
@@ -320,8 +318,15 @@ def zigzag_chart(
     for label, values in (("heading", motion.heading_deg), ("rudder", motion.rudder_deg)):
         kept = thin_line([values], LINE_SAMPLES)
         rows += records(label, {"t": motion.time_s[kept], "v": values[kept]})
-    x = alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False))
-    y = alt.Y("v:Q", title="heading and rudder, + to starboard (deg)", scale=alt.Scale(zero=True))
+    peaks = overshoot_marks(motion, figures, heading_deg, bands or {})
+    beyond = [peak[name] for peak in peaks for name in ("v", "low", "high") if name in peak]
+    edges = [vector(edge) for edge in edges_deg[1:]] if edges_deg is not None else []
+    angles = [motion.heading_deg, motion.rudder_deg, np.array([-heading_deg, heading_deg]), vector(beyond), *edges]
+    times = motion.time_s if edges_deg is None else np.concatenate([motion.time_s, vector(edges_deg[0])])
+    frame = free_frame(times, np.concatenate(angles), width_px=680, height_px=340, margins_px=(0.0, 22.0))
+    x = alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False, domain=list(frame.across)))
+    scale = alt.Scale(nice=False, domain=list(frame.up))
+    y = alt.Y("v:Q", title="heading and rudder, + to starboard (deg)", scale=scale)
     tooltip = [
         alt.Tooltip("run:N", title=""),
         alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
@@ -330,7 +335,6 @@ def zigzag_chart(
     base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
     lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
     targets = Chart(data([{"v": heading_deg}, {"v": -heading_deg}])).mark_rule(style="dimension").encode(y="v:Q")
-    peaks = overshoot_marks(motion, figures, heading_deg, bands or {})
     layers = [lines, targets]
     if edges_deg is not None:
         columns = dict(zip(("t", "low", "high"), (vector(part) for part in edges_deg), strict=True))
@@ -343,15 +347,15 @@ def zigzag_chart(
             interval = Chart(data(intervals)).mark_rule(style="interval", clip=True)
             layers.append(interval.encode(x="t:Q", y="low:Q", y2="high:Q"))
         layers.append(marked.mark_rule(style="overshoot", clip=True).encode(y="from:Q", y2="v:Q"))
-        for up in (True, False):
-            words = [peak for peak in peaks if (peak["v"] > 0) is up]
-            layers += _written(words, {"x": alt.X("t:Q"), "y": alt.Y("v:Q")}, dy=-9 if up else 11)
+        labels = [(str(peak["text"]), spots_about((peak["t"], peak["v"]), up=peak["v"] > 0)) for peak in peaks]
+        drawn = [(motion.time_s, motion.heading_deg), (motion.time_s, motion.rudder_deg)]
+        layers += label_layers(labels, frame, {"x": alt.X("t:Q"), "y": alt.Y("v:Q")}, ("t", "v"), drawn)
     layers.append(base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip))
     sizes = ", ".join(str(peak["text"]) for peak in peaks)
     return alt.layer(*layers, params=[pan_zoom("x", views=["plot"])]).properties(
         title=title,
-        width=680,
-        height=340,
+        width=frame.width_px,
+        height=frame.height_px,
         description=f"Heading and rudder over time. Overshoots: {sizes or 'none'}.",
     )
 
@@ -456,7 +460,7 @@ def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list
         _sized(name, abs(size), motion.length_m) for name, size in (("head reach", head), ("side reach", side))
     )
     return [
-        Dimension(text=head_words, begin=(0.0, 0.0), end=(0.0, head), place=(side / 2, head / 2)),
+        Dimension(text=head_words, begin=(0.0, 0.0), end=(0.0, head)),
         Dimension(text=side_words, begin=(0.0, head), end=(side, head)),
     ]
 
@@ -507,39 +511,35 @@ def _polygon(edges: tuple[Array, Array]) -> Array:
     return np.concatenate([low[known], high[known][::-1]])
 
 
-def _dimension_layers(dimensions: Sequence[Dimension], position: Mapping[str, object]) -> list[alt.Chart]:
-    lines, bars = [], []
-    words: dict[str, list[ChartRecord]] = {}
+def _dimension_layers(
+    dimensions: Sequence[Dimension],
+    position: Mapping[str, object],
+    frame: Frame,
+    lines: Sequence[tuple[Array, Array]],
+) -> list[alt.Chart]:
+    rules, bars = [], []
     for dimension in dimensions:
         (y, x), (y2, x2) = dimension.begin, dimension.end
-        lines.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2), "text": dimension.text})
+        rules.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2), "text": dimension.text})
         if dimension.low and dimension.high:
             (y, x), (y2, x2) = dimension.low, dimension.high
             bars.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2)})
-        middle = dimension.place or tuple((a + b) / 2 for a, b in zip(dimension.begin, dimension.end, strict=True))
-        words.setdefault(dimension.align, []).append(
-            {"y": plain(middle[0]), "x": plain(middle[1]), "text": dimension.text}
-        )
-    layers = []
-    if bars:
-        layers.append(_rules(bars, "interval", position))
-    if lines:
-        layers.append(_rules(lines, "dimension", position))
-        for align, rows in words.items():
-            layers += _written(rows, position, dy=-8, align=align)
-    return layers
+    labels = [(one.text, spots_along(one.begin, one.end, frame)) for one in dimensions]
+    ends = [np.array([one.begin, one.end]).T for one in dimensions]
+    return [
+        *([_rules(bars, "interval", position)] if bars else []),
+        *([_rules(rules, "dimension", position)] if rules else []),
+        *label_layers(labels, frame, position, ("y", "x"), [*lines, *((end[0], end[1]) for end in ends)]),
+    ]
+
+
+def _outline_lines(outlines: Sequence[ChartRecord]) -> list[tuple[Array, Array]]:
+    """The outlines of the ship as lines, to starboard and ahead."""
+    corners: dict[int, list[tuple[float, float]]] = {}
+    for row in outlines:
+        corners.setdefault(row["hull"], []).append((row["y"], row["x"]))
+    return [(closed[:, 0], closed[:, 1]) for hull in corners.values() if len(closed := np.array([*hull, hull[0]]))]
 
 
 def _rules(rows: Sequence[ChartRecord], style: str, position: Mapping[str, object]) -> alt.Chart:
     return Chart(data(rows)).mark_rule(style=style, clip=True).encode(**position, x2="y2:Q", y2="x2:Q")
-
-
-def _written(
-    rows: Sequence[ChartRecord], position: Mapping[str, object], dy: float, align: str = "center"
-) -> list[alt.Chart]:
-    """Words on a chart, over a rim in the colour of the paper that keeps them legible."""
-    if not rows:
-        return []
-    base = Chart(data(rows)).encode(**position, text="text:N")
-    aside = {"left": 6, "right": -6}.get(align, 0)
-    return [base.mark_text(style=style, dy=dy, dx=aside, align=align) for style in ("rim", "words")]

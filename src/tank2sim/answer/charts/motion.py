@@ -9,6 +9,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.answer.charts.labels import label_layers, spots_along
 from tank2sim.answer.charts.parts import (
     HOVER_SAMPLES,
     LINE_SAMPLES,
@@ -16,12 +17,14 @@ from tank2sim.answer.charts.parts import (
     POINT_SAMPLES,
     Chart,
     ChartRecord,
+    Frame,
     Position,
     SeriesLook,
     axis_above,
     data,
     equal_frame,
     every,
+    free_frame,
     pan_zoom,
     plain,
     records,
@@ -249,8 +252,12 @@ def spiral_chart(
     for spiral in spirals:
         rudder, rate = degree * vector(spiral.rudder_rad), degree * vector(spiral.yaw_rate_radps)
         rows += records(spiral.label, {"d": rudder, "r": rate})
-    x = alt.X("d:Q", title="rudder angle, starboard positive (deg)", scale=alt.Scale(padding=12))
-    y = alt.Y("r:Q", title="yaw rate, starboard positive (deg/s)")
+    drawn = [(degree * vector(spiral.rudder_rad), degree * vector(spiral.yaw_rate_radps)) for spiral in spirals]
+    across, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
+    frame = free_frame(across, up, width_px=width_px, height_px=height_px, margins_px=(24.0, 24.0))
+    scales = [alt.Scale(nice=False, domain=list(domain)) for domain in (frame.across, frame.up)]
+    x = alt.X("d:Q", title="rudder angle, starboard positive (deg)", scale=scales[0])
+    y = alt.Y("r:Q", title="yaw rate, starboard positive (deg/s)", scale=scales[1])
     tooltip = [
         alt.Tooltip("run:N", title="run"),
         alt.Tooltip("d:Q", title="rudder (deg)", format=NUMBER),
@@ -263,7 +270,7 @@ def spiral_chart(
     ]
     lines = base.mark_line(clip=True).properties(name="plot")
     points = base.mark_point(clip=True).encode(shape=look.shape, tooltip=tooltip)
-    loop = _loop_layers(degree * vector(loop_rad), x, y) if loop_rad else []
+    loop = _loop_layers(degree * vector(loop_rad), {"x": x, "y": y}, frame, drawn) if loop_rad else []
     return _in_window(
         [*zero, lines, points, *loop],
         title=title,
@@ -273,14 +280,17 @@ def spiral_chart(
     )
 
 
-def _loop_layers(rudders: Array, x: alt.X, y: alt.Y) -> list[alt.Chart]:
+def _loop_layers(
+    rudders: Array, position: Position, frame: Frame, lines: Sequence[tuple[Array, Array]]
+) -> list[alt.Chart]:
     """The width of a loop along the line of zero yaw rate, in deg."""
     low, high = sorted(rudders.tolist())
-    row = {"d": plain(low), "to": plain(high), "r": 0.0, "middle": plain((low + high) / 2)}
-    base = Chart(data([row | {"text": f"loop {format_number(high - low, 3)}°"}]))
-    width = base.mark_rule(style="overshoot", clip=True).encode(x=x, x2="to:Q", y=y)
-    words = base.encode(x=alt.X("middle:Q"), y=y, text="text:N")
-    return [width, *(words.mark_text(style=style, dy=-11) for style in ("rim", "words"))]
+    text = f"loop {format_number(high - low, 3)}°"
+    row = {"d": plain(low), "to": plain(high), "r": 0.0, "text": text}
+    width = Chart(data([row])).mark_rule(style="overshoot", clip=True).encode(**position, x2="to:Q")
+    label = text, spots_along((low, 0.0), (high, 0.0), frame)
+    zero = [(vector(frame.across), np.zeros(2)), (np.zeros(2), vector(frame.up))]
+    return [width, *label_layers([label], frame, position, ("d", "r"), [*lines, *zero])]
 
 
 def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[Tow] | Sequence[SpiralData]) -> str:

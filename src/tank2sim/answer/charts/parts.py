@@ -168,6 +168,11 @@ def extent(values: Array) -> tuple[float, float]:
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
+def panel_title(text: str) -> alt.Title:
+    """Return the title of one panel among several."""
+    return alt.Title(text, fontSize=11, offset=22, limit=240)
+
+
 def axis_above(title: str, **options: Any) -> alt.Axis:
     """Return a vertical axis with a horizontal title above it."""
     return alt.Axis(
@@ -184,12 +189,17 @@ def axis_above(title: str, **options: Any) -> alt.Axis:
 
 @dataclass(frozen=True)
 class Frame:
-    """A plot whose two axes have one scale: domains in units of the data, sizes in px."""
+    """A plot with given axes: domains in units of the data, sizes in px."""
 
     across: tuple[float, float]
     up: tuple[float, float]
     width_px: int
     height_px: int
+
+    def pixels(self, across: Any, up: Any) -> tuple[Any, Any]:
+        """Place in the plot, px from its left and from its top."""
+        (left, right), (bottom, top) = self.across, self.up
+        return self.width_px * (across - left) / (right - left), self.height_px * (top - up) / (top - bottom)
 
     def axes(self, *, across: tuple[str, str], up: tuple[str, str]) -> Position:
         """The two axes, each given by its field and title; their ticks have one step."""
@@ -202,6 +212,23 @@ class Frame:
             "x": alt.X(across[0], **axis(self.across, self.width_px, across[1])),
             "y": alt.Y(up[0], **axis(self.up, self.height_px, up[1])),
         }
+
+
+def free_frame(
+    across: Array, up: Array, *, width_px: int, height_px: int, margins_px: tuple[float, float] = (0.0, 0.0)
+) -> Frame:
+    """The frame of `width_px` x `height_px` that shows all values, each axis in a scale of its own.
+
+    `margins_px` are left free at the sides, and above and below.
+    """
+
+    def domain(values: Array, size_px: int, margin_px: float) -> tuple[float, float]:
+        low, high = extent(values)
+        margin = margin_px * ((high - low) or 1.0) / (size_px - 2 * margin_px)
+        return (low - margin, high + margin) if high > low or margin_px else (low - 0.5, high + 0.5)
+
+    sides, ends = margins_px
+    return Frame(domain(across, width_px, sides), domain(up, height_px, ends), width_px, height_px)
 
 
 def equal_frame(across: Array, up: Array, *, width_px: int, height_px: int) -> Frame:

@@ -30,6 +30,9 @@ CROSS = "M-.8,-.8L.8,.8M-.8,.8L.8,-.8"
 BAND_OPACITY = 0.16
 """Opacity of a shaded band. Project choice: lines and the grid are seen through it."""
 
+LABEL_PX = 12.0
+"""Size of the type of labels on a chart."""
+
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', 'Liberation Sans', Arial, sans-serif"
 
 
@@ -122,8 +125,8 @@ def _styles(tone: Tone) -> Config:
         "band": {"fill": tone.palette[0], "fillOpacity": BAND_OPACITY, "strokeWidth": 0},
         "uncertainty": {"fill": tone.palette[0], "fillOpacity": 0.25, "stroke": tone.palette[0], "strokeWidth": 1},
         "hull": {"fill": tone.muted, "fillOpacity": 0.35, "stroke": tone.muted, "strokeWidth": 0.75},
-        "words": {"color": tone.ink, "fontSize": 12, "fontWeight": 600},
-        "rim": {"color": tone.paper, "stroke": tone.paper, "strokeWidth": 4, "fontSize": 12, "fontWeight": 600},
+        "words": {"color": tone.ink, "fontSize": LABEL_PX, "fontWeight": 600},
+        "rim": {"color": tone.paper, "stroke": tone.paper, "strokeWidth": 4, "fontSize": LABEL_PX, "fontWeight": 600},
     }
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tank2sim.apps.design.tank_form import TankFile
     from tank2sim.dynamics.vessel import Vessel
 
-DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@10/10", "overshoot1_deg@20/20")
+DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_1_deg@20/20")
 """Figures where none is given: those of IMO MSC.137(76) that have slopes."""
 
 Hours = Annotated[float, ArgumentBounds(0, 1000, above=True)]
@@ -153,7 +153,7 @@ def design_campaign(
         Its coefficients are the prior mean, their errors the spread of ships for which the plan is to be good. An MMG
         ship is converted to a polynomial.
     figures : str or sequence of str
-        As of :meth:`.Ship.influence`; units may be left out (``advance@35``).
+        As of :meth:`.Ship.influence`.
     hours : float, optional
         Time in the tank; by default that of the usual matrix once.
     tank : path or TankFile, optional
@@ -185,7 +185,7 @@ def design_campaign(
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("mariner", figures="overshoot1_deg@10/10", hours=2, draws=0)
+    >>> plan = t2s.design_campaign("mariner", figures="overshoot_1_deg@10/10", hours=2, draws=0)
     >>> float(plan.runs["tank_min"].sum()) < 2 * 60
     True
     """

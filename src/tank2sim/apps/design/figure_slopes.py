@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.influence.figures import FIGURE_KINDS, InfluenceFigure, parse_figure
+from tank2sim.analysis.influence.figures import InfluenceFigure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -29,25 +28,6 @@ measure well."""
 
 _UNLISTED = 1e-12
 """Standard error by which a coefficient that the card lacks is among the parameters of a study; it is not used."""
-
-
-def figure_of_text(text: str) -> InfluenceFigure:
-    """A figure of a command line; units and underlines may be left out: ``advance@35``, ``overshoot_1_deg@10/10``.
-
-    Raises
-    ------
-    InputError
-        The figure does not exist, or its argument is missing or out of bounds.
-    """
-    name, at, argument = text.strip().partition("@")
-    plain = {kind.replace("_", ""): kind for kind in FIGURE_KINDS}
-    spelt = name.replace("_", "").lower()
-    for key in (spelt, f"{spelt}m", f"{spelt}deg"):
-        if name not in FIGURE_KINDS and key in plain:
-            name = plain[key]
-    if name not in FIGURE_KINDS and (close := difflib.get_close_matches(name, FIGURE_KINDS, n=1)):
-        raise ArgumentError("figures", text, "is not a figure", f"did you mean {close[0]}?")
-    return parse_figure(f"{name}{at}{argument}", "figures")
 
 
 @dataclass(frozen=True, eq=False)

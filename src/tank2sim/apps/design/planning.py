@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from tank2sim.analysis.influence.figures import InfluenceFigure
+from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.apps.design.captive_design import CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
-from tank2sim.apps.design.figure_slopes import figure_of_text, range_of_figures
+from tank2sim.apps.design.figure_slopes import range_of_figures
 from tank2sim.apps.design.plan_files import run_rows, runs_of_campaign
 from tank2sim.apps.design.study import (
     CampaignStudy,
@@ -264,7 +264,7 @@ def _sensors(given: Mapping[str, float]) -> dict[str, float]:
 
 def _figures_of(figures: str | Sequence[str]) -> list[InfluenceFigure]:
     texts = [figures] if isinstance(figures, str) else list(figures)
-    asked = [figure_of_text(text) for given in texts for text in given.split(",") if text.strip()]
+    asked = [parse_figure(text) for given in texts for text in given.split(",") if text.strip()]
     if not asked:
         raise ArgumentError("figures", "", "has no figure", "give at least one, as advance_m@35")
     return list(dict.fromkeys(asked))

@@ -54,12 +54,12 @@ def guess(
     speed_kn : float
         Speed at which the manoeuvres begin, knots.
     turn35 : str, optional
-        Figures of a turn at 35 deg of rudder, m: ``"advance=970 transfer=400 tactical=980+-30"``, each if known, with
-        its standard error after ``+-``.
+        Figures of a turn at 35 deg of rudder: ``"advance_m=970 transfer_m=400 tactical_diameter_m=980+-30"``, each if
+        known, with its standard error after ``+-``.
     zigzag10 : str, optional
-        Overshoots of a 10/10 zigzag, deg: ``"first=9.4 second=15"``.
+        Overshoots of a 10/10 zigzag: ``"overshoot_1_deg=9.4 overshoot_2_deg=15"``.
     zigzag20 : str, optional
-        Overshoots of a 20/20 zigzag, deg: ``"first=14"``.
+        Overshoots of a 20/20 zigzag: ``"overshoot_1_deg=14"``.
     name : str
         Name of the ship on the card.
     members : int
@@ -76,8 +76,8 @@ def guess(
     --------
     >>> import tank2sim as t2s
     >>> dimensions = dict(length_m=320, beam_m=58, draught_m=20.8, block=0.81, speed_kn=15.5)
-    >>> found = t2s.guess(**dimensions, turn35="advance=970 tactical=980", members=200)
-    >>> bool(found.figures.loc["tactical_diameter@turn35", "p5"] < 980)
+    >>> found = t2s.guess(**dimensions, turn35="advance_m=970 tactical_diameter_m=980", members=200)
+    >>> bool(found.figures.loc["tactical_diameter_m@35", "p5"] < 980)
     True
     """
     from tank2sim.apps.guess.prior import ShipDimensions

@@ -23,7 +23,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.dynamics.card_parameters import study_model
 from tank2sim.dynamics.ship import mass_faults
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.native.compiler import require_compiler
 from tank2sim.simulation.ensemble import Draws
 from tank2sim.simulation.lane_figures import LaneManoeuvres
@@ -52,19 +52,21 @@ POSTER_MANOEUVRES: Mapping[str, Turn | Zigzag] = {
 }
 """Manoeuvres of a poster, by the name of their option; to starboard, for a guessed ship has no asymmetry."""
 
-FIGURES: Mapping[str, Mapping[str, str]] = {
-    "turn35": {"advance": "advance_m", "transfer": "transfer_m", "tactical": "tactical_diameter_m"},
-    "zigzag10": {"first": "overshoot_1_deg", "second": "overshoot_2_deg"},
-    "zigzag20": {"first": "overshoot_1_deg", "second": "overshoot_2_deg"},
+FIGURES: Mapping[str, tuple[str, ...]] = {
+    "turn35": ("advance_m", "transfer_m", "tactical_diameter_m"),
+    "zigzag10": ("overshoot_1_deg", "overshoot_2_deg"),
+    "zigzag20": ("overshoot_1_deg", "overshoot_2_deg"),
 }
-"""Figures of each by the words of the option, to their names in a run."""
+"""Names of the figures of each."""
 
 FIGURE_KEYS: Mapping[str, tuple[str, str]] = {
-    f"{name.rpartition('_')[0]}@{manoeuvre}": (manoeuvre, word)
-    for manoeuvre, words in FIGURES.items()
-    for word, name in words.items()
+    f"{name}@{POSTER_MANOEUVRES[manoeuvre].words.partition(':')[2]}": (manoeuvre, name)
+    for manoeuvre, names in FIGURES.items()
+    for name in names
 }
-"""Every figure by a short key, ``advance@turn35``, to its manoeuvre and word."""
+"""Every figure as in :mod:`tank2sim.analysis.influence.figures`, ``advance_m@35``, to its manoeuvre and name."""
+
+_KEYS = {figure: key for key, figure in FIGURE_KEYS.items()}
 
 
 @dataclass(frozen=True)
@@ -72,19 +74,19 @@ class GivenFigure:
     """A figure of a poster, in m or deg, with its standard error."""
 
     manoeuvre: str
-    word: str
+    name: str
     value: float
     standard_error: float
 
     @property
     def key(self) -> str:
         """Key among :data:`FIGURE_KEYS`."""
-        return figure_key(self.manoeuvre, self.word)
+        return _KEYS[self.manoeuvre, self.name]
 
     @property
     def text(self) -> str:
-        """As an option has it."""
-        return f"{self.word}={self.value:g}"
+        """As written on the command line."""
+        return f"{self.name}={self.value:g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,19 +107,6 @@ class GuessMembers:
     posterior: Array
     before: Mapping[str, Array]
     after: Mapping[str, Array]
-
-
-def figure_key(manoeuvre: str, word: str) -> str:
-    """The key of a figure among :data:`FIGURE_KEYS`.
-
-    Parameters
-    ----------
-    manoeuvre : str
-        One of :data:`POSTER_MANOEUVRES`.
-    word : str
-        Its figure in the words of :data:`FIGURES`.
-    """
-    return f"{FIGURES[manoeuvre][word].rpartition('_')[0]}@{manoeuvre}"
 
 
 class PosterFigures:
@@ -144,9 +133,9 @@ class PosterFigures:
         found = {}
         for name, manoeuvre in POSTER_MANOEUVRES.items():
             runs = self._lanes.run(manoeuvre, p).figures
-            for word, figure in FIGURES[name].items():
+            for figure in FIGURES[name]:
                 shown = runs.get(figure, np.full(len(values), np.nan))
-                found[figure_key(name, word)] = np.where(bad, np.nan, shown)
+                found[_KEYS[name, figure]] = np.where(bad, np.nan, shown)
         return found
 
 
@@ -231,7 +220,7 @@ def _refuse_impossible(figure: GivenFigure, prior: Array) -> None:
         return
     low, high = np.quantile(prior, [0.01, 0.99])
     remedy = f"98 % of ships of these dimensions lie between {low:.3g} and {high:.3g}: check the figure and its unit"
-    raise InputError(f"--{figure.manoeuvre}", figure.text, "is not a figure of a ship of these dimensions", remedy)
+    raise ArgumentError(figure.manoeuvre, figure.text, "is not a figure of a ship of these dimensions", remedy)
 
 
 def _refuse_contradiction(
@@ -255,4 +244,4 @@ def _refuse_contradiction(
     figure = given[worst]
     others = " ".join(other.text for other in given if other is not figure)
     remedy = f"with these it lies about between {math.exp(centre - half):.3g} and {math.exp(centre + half):.3g}"
-    raise InputError(f"--{figure.manoeuvre}", figure.text, f"contradicts {others or 'the dimensions'}", remedy)
+    raise ArgumentError(figure.manoeuvre, figure.text, f"contradicts {others or 'the dimensions'}", remedy)

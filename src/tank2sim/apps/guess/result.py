@@ -15,14 +15,15 @@ from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, record
 from tank2sim.answer.result import Result
 from tank2sim.apps.guess.study import GuessedFigure, GuessStudy
 from tank2sim.cards import ManoeuvringCard
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_FIRST = ("tactical_diameter@turn35", "overshoot_1@zigzag10", "overshoot_1@zigzag20")
+_FIRST = ("tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_1_deg@20/20")
 """Figures at the top of the page."""
 
-_MANOEUVRES = {"turn35": "turn 35°", "zigzag10": "zigzag 10/10", "zigzag20": "zigzag 20/20"}
+_MANOEUVRES = {"35": "turn 35°", "10/10": "zigzag 10/10", "20/20": "zigzag 20/20"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,9 +165,9 @@ def _key_figure(key: str, figure: GuessedFigure) -> KeyFigure:
 
 
 def _named(key: str) -> str:
-    """A figure as a reader sees it: ``overshoot_1@zigzag10`` is ``zigzag 10/10: overshoot 1``."""
+    """A figure as a reader sees it: ``overshoot_1_deg@10/10`` is ``zigzag 10/10: overshoot 1``."""
     figure, _, manoeuvre = key.partition("@")
-    return f"{_MANOEUVRES.get(manoeuvre, manoeuvre)}: {figure.replace('_', ' ')}"
+    return f"{_MANOEUVRES.get(manoeuvre, manoeuvre)}: {in_words(figure)[0]}"
 
 
 def figures_chart(study: GuessStudy) -> alt.TopLevelMixin:

@@ -17,7 +17,7 @@ from tank2sim.apps.guess.prior import ShipDimensions, prior_card
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, close_name
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.bands import Band, band_of
 
@@ -99,37 +99,37 @@ class GuessStudy:
 
 def figure_unit(key: str) -> str:
     """Unit of a figure by its key."""
-    manoeuvre, word = FIGURE_KEYS[key]
-    return FIGURES[manoeuvre][word].rpartition("_")[2]
+    return FIGURE_KEYS[key][1].rpartition("_")[2]
 
 
-def default_error(word: str, value: float) -> float:
-    """Standard error of a figure that comes without, by the word of its option."""
-    return OVERSHOOT_ERROR_DEG if word in ("first", "second") else TRIAL_ERROR * value
+def default_error(name: str, value: float) -> float:
+    """Standard error of a figure (``advance_m``) that comes without."""
+    return OVERSHOOT_ERROR_DEG if name.startswith("overshoot") else TRIAL_ERROR * value
 
 
 def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
-    """Figures of an option: ``advance=970 tactical=980+-30``, the standard error after ``+-``.
+    """Figures of an option: ``advance_m=970 tactical_diameter_m=980+-30``, the standard error after ``+-``.
 
     Raises
     ------
     InputError
-        A word is not a figure of the manoeuvre or is given twice, or a number is not positive.
+        A name is not that of a figure of the manoeuvre or is given twice, or a number is not positive.
     """
-    option, words, found = f"--{manoeuvre}", FIGURES[manoeuvre], {}
+    names, found = FIGURES[manoeuvre], {}
     for part in text.split():
-        word, _, number = part.partition("=")
+        name, _, number = part.partition("=")
         matched = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)(?:(?:\+-|±)(\d+(?:\.\d*)?|\.\d+))?", number)
-        if word not in words or matched is None:
-            example = " ".join(f"{name}=..." for name in words)
-            raise InputError(option, part, "cannot be read", f"give {example}, in m or deg, with +-ERROR if known")
-        if word in found:
-            raise InputError(option, part, "is given twice", "give each figure once")
+        if name not in names:
+            raise ArgumentError(manoeuvre, part, "is not a figure of this manoeuvre", close_name(name, names))
+        if matched is None:
+            raise ArgumentError(manoeuvre, part, "cannot be read", f"give {name}=..., with +-ERROR if known")
+        if name in found:
+            raise ArgumentError(manoeuvre, part, "is given twice", "give each figure once")
         value = float(matched[1])
-        error = default_error(word, value) if matched[2] is None else float(matched[2])
+        error = default_error(name, value) if matched[2] is None else float(matched[2])
         if value <= 0 or error <= 0:
-            raise InputError(option, part, "is not positive", "figures and their standard errors are above zero")
-        found[word] = GivenFigure(manoeuvre, word, value, error)
+            raise ArgumentError(manoeuvre, part, "is not positive", "figures and their standard errors are above zero")
+        found[name] = GivenFigure(manoeuvre, name, value, error)
     return list(found.values())
 
 
@@ -254,7 +254,7 @@ def _notices(given: Sequence[GivenFigure], members: int, lost: int) -> Iterator[
     )
     if lost:
         yield Notice(f"{lost} of {members} ships of these dimensions do not come round and were left out")
-    if any(figure.standard_error == default_error(figure.word, figure.value) for figure in given):
+    if any(figure.standard_error == default_error(figure.name, figure.value) for figure in given):
         yield Notice(
             f"standard errors of figures given without: {100 * TRIAL_ERROR:g} % of distances, "
             f"{OVERSHOOT_ERROR_DEG:g} deg of overshoots"
