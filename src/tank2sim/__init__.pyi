@@ -7,7 +7,6 @@ from .api.captive_run import reduce_runs as reduce_runs
 from .api.comparison import compare as compare
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import find_gap as find_gap
-from .api.gap import find_gaps as find_gaps
 from .api.identification import identify as identify
 from .api.reduction import reduce as reduce
 from .api.reduction import reduce_to_mmg as reduce_to_mmg
@@ -28,6 +27,8 @@ from .apps.design.command import (
 )
 from .apps.design.result import CampaignDesignResult as CampaignDesignResult
 from .apps.design.result import TrialDesignResult as TrialDesignResult
+from .apps.fleet.command import find_gaps as find_gaps
+from .apps.fleet.result import FleetResult as FleetResult
 from .apps.guess.command import guess as guess
 from .apps.guess.result import GuessResult as GuessResult
 from .apps.logs.command import log as log
@@ -62,7 +63,6 @@ from .results.craft_identification import (
 from .results.fmu import CheckResult as CheckResult
 from .results.fmu import ExportResult as ExportResult
 from .results.gap import GapResult as GapResult
-from .results.gap_fleet import FleetResult as FleetResult
 from .results.identification import IdentificationResult as IdentificationResult
 from .results.influence import InfluenceResult as InfluenceResult
 from .results.influence import TuningResult as TuningResult

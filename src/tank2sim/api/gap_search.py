@@ -1,42 +1,32 @@
-"""Searches for missing effects: of one ship, and of the ships of a fleet, each written as soon as it is found."""
+"""The search for the missing effect of a ship, written into a folder."""
 
 from __future__ import annotations
 
 import importlib
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.trial import fitted_and_held, trial_files
 from tank2sim.arguments import PROCESSES
-from tank2sim.cards import Card, ManoeuvringCard, read_card
+from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.executors import check_executor, executing, processes_to_begin
-from tank2sim.files import folder_made, json_text, parsed_json, read_text, writable_folder, write_together
-from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
-from tank2sim.gap.fleet.search import Fault, ShipTask, fault_of_program, find_at_once, find_in_turn, nonlinear_card
-from tank2sim.gap.fleet.ships import GAP, Fleet, ShipFolder, fleet_in
-from tank2sim.gap.fleet.summary import FleetStudy, ShipSummary, fleet_study, ship_summary
+from tank2sim.files import folder_made
 from tank2sim.gap.inference.fit_all import StageReport
-from tank2sim.gap.outcome.files import put, refuse_early
-from tank2sim.gap.outcome.study import GapStudy
-from tank2sim.gap.result import Gap
-from tank2sim.gap.workflow import GapOptions, run_gap_workflow
+from tank2sim.gap.outcome.files import refuse_early
+from tank2sim.gap.workflow import GapOptions, nonlinear_card, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.notices import Notice
 from tank2sim.results.gap import GapResult, gap_result
-from tank2sim.results.gap_fleet import FleetResult
 
 if TYPE_CHECKING:
     from tank2sim.api.trial import TrialPaths
-
-_JSON, _PAGE = "fleet.json", "fleet.html"
 
 
 def gap_options(
@@ -129,185 +119,3 @@ def _workers(executor: str, workers: int | None) -> Iterator[Executor | None]:
         for _ in range(number if local else 0):
             pool.submit(importlib.import_module, "tank2sim.gap.workflow")
         yield pool
-
-
-@dataclass(frozen=True)
-class FleetRequest:
-    """A search over a fleet.
-
-    Parameters
-    ----------
-    folder, output : Path
-        Of the ships, and of the results.
-    options : GapOptions
-    executor : str
-    again : bool
-        Compute also the ships that have results.
-    """
-
-    folder: Path
-    output: Path
-    options: GapOptions
-    executor: str
-    again: bool
-
-
-@dataclass
-class _Course:
-    """Progress of a search over a fleet.
-
-    Parameters
-    ----------
-    wanted : dict
-        Ships to be computed, each with its record and the reason.
-    done : dict
-        Name of a ship to the origin of its results.
-    faults : dict
-        Name of a ship to the reason why it has no results.
-    notices : list of Notice
-    """
-
-    wanted: dict[ShipFolder, tuple[Mapping[str, object], str]] = field(default_factory=dict)
-    done: dict[str, str] = field(default_factory=dict)
-    faults: dict[str, str] = field(default_factory=dict)
-    notices: list[Notice] = field(default_factory=list)
-
-
-def search_fleet(request: FleetRequest, report: StageReport) -> FleetResult:
-    """Compute the missing results of a fleet, write each ship as soon as it is found, then the fleet.
-
-    Parameters
-    ----------
-    request : FleetRequest
-    report : callable
-        Called with the ship and the stage that begins.
-
-    Raises
-    ------
-    InputError
-        As :func:`.find_gaps`.
-    """
-    check_executor(request.executor)
-    output = request.output
-    fleet = fleet_in(request.folder, output)
-    inputs = tuple(path for ship in fleet.ships for path in ship.inputs)
-    with folder_made(output):
-        report("looking for earlier results")
-        course = _course(fleet, request)
-        _compute(course, request, report)
-        report("writing the fleet's page")
-        result = FleetResult(_study(fleet, course, output), linked=True)
-        files: dict[Path, str | bytes] = {output / _JSON: result.to_json(), output / _PAGE: result.page()}
-        write_together(files, inputs=inputs)
-    remarks = (*course.notices, *_without_ship(result.study, output))
-    origins = dict(sorted(course.done.items()))
-    return replace(result, origins=origins, remarks=remarks, inputs=inputs, written=tuple(files))
-
-
-def _course(fleet: Fleet, request: FleetRequest) -> _Course:
-    """Sort the ships into those that have results and those to be computed."""
-    course = _Course(faults=dict(fleet.faults))
-    for ship in fleet.ships:
-        output = request.output / ship.name
-        try:
-            refuse_early(output, ship.inputs)
-            if output.exists() and not output.is_dir():
-                raise InputError(output, "", "is not a folder, and its results belong there", "give another folder")
-            record = fleet_run_record(ship, request.options)
-        except InputError as error:
-            course.faults[ship.name] = str(error)
-            continue
-        why = "asked for again" if request.again else stale(record, output)
-        if why:
-            course.wanted[ship] = record, why
-        else:
-            course.done[ship.name] = "taken from the earlier run"
-    return course
-
-
-def _compute(course: _Course, request: FleetRequest, report: StageReport) -> None:
-    """Compute the ships; each is written as soon as it is found."""
-    if not course.wanted:
-        return
-    with _working(request, len(course.wanted)) as (find, executor):
-        for ship, found in find(_read(course), request.options, report, executor):
-            report(f"{ship.folder.name}: writing")
-            fault = found if isinstance(found, Fault) else _write(ship, found, course, request.output)
-            if fault:
-                course.faults[ship.folder.name] = fault.line
-
-
-Find = Callable[..., Iterator[tuple[ShipTask, Gap | Fault]]]
-
-
-@contextmanager
-def _working(request: FleetRequest, number: int) -> Iterator[tuple[Find, Executor | None]]:
-    """Search function and executor for a number of ships.
-
-    For one ship the explanations of its search are distributed over the executor. Each of several ships is one task:
-    the search of a ship has sequential parts, during which only one core would be busy.
-    """
-    local = request.executor == PROCESSES
-    workers = request.options.workers or os.cpu_count() or 1
-    if local and workers == 1:
-        yield find_in_turn, None
-        return
-    with executing(request.executor, min(workers, number) if number > 1 else workers) as executor:
-        yield (find_at_once if number > 1 else find_in_turn), executor
-
-
-def _read(course: _Course) -> Iterator[ShipTask]:
-    """Read the ships to be computed, one after the other."""
-    for ship in course.wanted:
-        try:
-            card = nonlinear_card(read_card(ship.card))
-            yield ShipTask(ship, card, *fitted_and_held(ship.trials, ship.holdout, card, report_unused=False))
-        except InputError as error:
-            course.faults[ship.name] = str(error)
-
-
-def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | None:
-    """Write a ship's results and their record, all or none; return the fault if there are none."""
-    folder = output / ship.folder.name
-    record, why = course.wanted[ship.folder]
-    try:
-        files, notices = gap_result(gap, ship.fitted, ship.held).files(folder)
-    except InputError as error:
-        return Fault(str(error))
-    except OSError:
-        raise
-    except Exception as error:
-        return fault_of_program(error)
-    # Written last, after the files that it lists.
-    files[folder / RUN] = json_text(with_results(record, files, folder))
-    writable_folder(folder)
-    tidied = put(files, folder, ship.folder.inputs)
-    course.done[folder.name] = "computed" if why == NEW else f"computed: {why}"
-    course.notices += [notice.of(folder.name) for notice in (*notices, *tidied)]
-    return None
-
-
-def _study(fleet: Fleet, course: _Course, output: Path) -> FleetStudy:
-    ships = [ship_summary(name, _written(output / name)) for name in course.done]
-    ships += [ShipSummary(folder=name, fault=fault) for name, fault in course.faults.items()]
-    notices = [Notice(f"{path}: holds neither card nor trial, and was passed over") for path in fleet.passed_over]
-    return fleet_study(fleet.folder.resolve().name, ships, notices)
-
-
-def _written(folder: Path) -> GapStudy:
-    """The study of the ship with results in a folder; raises InputError if another program changed them."""
-    remedy = "let one run at a time write there, and run it again"
-    try:
-        return GapResult.read(parsed_json(read_text(folder / GAP), folder / GAP, remedy), str(folder / GAP)).study
-    except (InputError, AttributeError):  # the second for JSON without keys
-        raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None
-
-
-def _without_ship(study: FleetStudy, output: Path) -> list[Notice]:
-    """Notices of results whose ships are no longer in the fleet."""
-    ships = {ship.folder for ship in study.ships}
-    return [
-        Notice(f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept")
-        for path in sorted(output.glob(f"*/{RUN}"))
-        if path.parent.name not in ships
-    ]

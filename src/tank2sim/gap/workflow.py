@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tank2sim.arguments import MOST_EFFECTS
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import Card, ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS
@@ -99,6 +99,22 @@ class GapOptions:
     max_effects: int = MOST_EFFECTS
     workers: int | None = None
     false_discovery: float = 1 - LIKELY
+
+
+def nonlinear_card(card: Card) -> ManoeuvringCard:
+    """Return the card, if a missing effect can be sought for it.
+
+    Raises
+    ------
+    InputError
+        It is not of a manoeuvring ship, or its equations are linear.
+    """
+    if not isinstance(card, ManoeuvringCard):
+        raise InputError(card.source, "model.kind", "is not a manoeuvring ship", "give an abkowitz or mmg card")
+    if card.model.kind == "linear":
+        remedy = 'set kind = "abkowitz"; its missing third-order terms are then zero'
+        raise InputError(card.source, "model.kind", "is linear, and most effects are not part of such a model", remedy)
+    return card
 
 
 def run_gap_workflow(

@@ -10,11 +10,11 @@ from pathlib import Path, PurePosixPath
 from tank2sim.cards.covariance import covariance_file
 from tank2sim.errors import InputError
 from tank2sim.files import folder_made, write_together
-from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE
 from tank2sim.notices import Notice
 
-REPORT = "report.html"
+GAP, IMPROVED, REPORT = "gap.json", "improved.toml", "report.html"
+"""Files of the results of a ship."""
 
 ALWAYS = (GAP, IMPROVED, REPORT, NEXT_TEST_FILE)
 """Files that are written into the folder, the last one if there is such a test."""

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 
-from tank2sim.cards.card import Card, ManoeuvringCard
+from tank2sim.apps.fleet.ships import ShipFolder
+from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.gap.fleet.ships import ShipFolder
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
@@ -22,22 +22,6 @@ from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 AHEAD = 256
 """Ships that are read and handed out before the first of them is done: a bound on memory (project choice)."""
-
-
-def nonlinear_card(card: Card) -> ManoeuvringCard:
-    """Return the card, if a missing effect can be sought for it.
-
-    Raises
-    ------
-    InputError
-        It is not of a manoeuvring ship, or its equations are linear.
-    """
-    if not isinstance(card, ManoeuvringCard):
-        raise InputError(card.source, "model.kind", "is not a manoeuvring ship", "give an abkowitz or mmg card")
-    if card.model.kind == "linear":
-        remedy = 'set kind = "abkowitz"; its missing third-order terms are then zero'
-        raise InputError(card.source, "model.kind", "is linear, and most effects are not part of such a model", remedy)
-    return card
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ import json
 from dataclasses import replace
 
 from tank2sim.answer.parts import Link
-from tank2sim.gap.fleet.summary import BeforeAfter, ShipSummary, TrialCounts, fleet_study
+from tank2sim.apps.fleet.result import FleetResult
+from tank2sim.apps.fleet.summary import BeforeAfter, ShipSummary, TrialCounts, fleet_study
 from tank2sim.gap.outcome.study import EffectFound, MisfitBySet
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
-from tank2sim.results.gap_fleet import FleetResult
 
 CURRENT = EffectFound(
     name="current",

@@ -12,7 +12,7 @@ import altair as alt
 from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
-from tank2sim.gap.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
+from tank2sim.apps.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.notices import Notice
 from tank2sim.results.gap_text import effect_in_words, parameter_cells

@@ -14,13 +14,11 @@ from pathlib import Path
 
 from tank2sim.errors import InputError
 from tank2sim.files import read_exact_text
+from tank2sim.gap.outcome.files import GAP, IMPROVED
 from tank2sim.records.reading import called_like_a_trial, looks_like_a_trial, reader_of
 
 HOLDOUT = "holdout"
 """Sub-folder of a ship with the trials that are held out."""
-
-GAP, IMPROVED = "gap.json", "improved.toml"
-"""Files of the results of a ship: a folder with them and without another card is not a ship."""
 
 _SHIP, _CAMPAIGN = "tank2sim-ship/", "tank2sim-campaign/"
 

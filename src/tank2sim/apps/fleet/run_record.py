@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from tank2sim.apps.fleet.ships import ShipFolder
 from tank2sim.errors import InputError
-from tank2sim.gap.fleet.ships import ShipFolder
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.version import __version__
 

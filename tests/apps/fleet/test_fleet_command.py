@@ -57,7 +57,7 @@ def ships(tmp_path: Path) -> Path:
 @pytest.fixture
 def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
     """Lets each ship lack a current; gives the ships that were sought. Pages are left out: they take seconds."""
-    for place in ("results.gap.GapResult.page", "results.gap_fleet.FleetResult.page"):
+    for place in ("results.gap.GapResult.page", "apps.fleet.result.FleetResult.page"):
         monkeypatch.setattr(f"tank2sim.{place}", lambda reported: f"<html>{type(reported).__name__}</html>")
 
     def set_up(fails: dict[str, BaseException] | None = None) -> list[str]:
@@ -79,7 +79,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             gap = replace(made_up.missing(), card=card, base=card, improved=improved, effects=(CURRENT,), passed=passed)
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 
-        monkeypatch.setattr("tank2sim.gap.fleet.search.run_gap_workflow", find_gap)
+        monkeypatch.setattr("tank2sim.apps.fleet.search.run_gap_workflow", find_gap)
         monkeypatch.setattr("tank2sim.api.gap_search.run_gap_workflow", find_gap)
         return calls
 
