@@ -252,7 +252,11 @@ def _item(name: str, place: int, value: Any, kind: Any) -> Any:
         raise ArgumentError(name, fault.place or f"[{place}]", fault.problem, fault.remedy) from None
 
 
-_WORDS = {"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"}
+_WORDS = {
+    **{"str": "a text", "Path": "a path", "Mapping": "a mapping", "Sequence": "a list", "NoneType": "nothing"},
+    **{"float": "a number", "int": "a whole number", "Array": "an array"},
+}
+"""Words for types in messages."""
 
 
 def _in_words(kind: Any) -> list[str]:
@@ -265,7 +269,7 @@ def _in_words(kind: Any) -> list[str]:
         bounds = bounds_of(kind)
         return _in_words(get_args(kind)[0]) if bounds is None else ["a whole number" if bounds.whole else "a number"]
     called = getattr(get_origin(kind) or kind, "__name__", str(kind))
-    return [{"float": "a number", "int": "a whole number"}.get(called) or _WORDS.get(called, f"a {called}")]
+    return [_WORDS.get(called, f"{'an' if called[0] in 'AEIOU' else 'a'} {called}")]
 
 
 def _is_a(value: Any, kind: Any) -> bool:

@@ -73,7 +73,7 @@ def test_the_fmu_of_the_controller_is_written(pilot: t2s.AutopilotResult, tmp_pa
         ({"wind_mps": -1.0}, "wind_mps", ""),
         ({"seed": -1}, "seed", ""),
         ({"track": [[0, 0]]}, "track", ""),
-        ({"track": [0, 1]}, "track", ""),
+        ({"track": [0, 1]}, "track", "[0]"),
         ({"track": [[0, 0], [0, 0]]}, "track", "waypoint 2"),
         ({"track": [[0, 0], [float("nan"), 0]]}, "track", "waypoint 2"),
     ],
