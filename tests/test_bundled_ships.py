@@ -77,7 +77,7 @@ def test_a_ship_and_its_model_move_alike_by_froudes_law(ship: str, model: str) -
 @pytest.mark.parametrize("rudder", [35, -35])
 def test_a_hard_turn_stays_in_the_range_of_the_card_and_has_no_kink(name: str, rudder: float) -> None:
     run = t2s.load(name).turn(rudder)
-    assert not run.run.reading.message
+    assert not run.run.reading.notices
     t, drift = run.df.t_s.to_numpy(), np.arctan2(-run.df.v_mps, run.df.u_mps).to_numpy()
     assert np.abs(np.degrees(drift)).max() < 30.0
     ship_time = t2s.load(name).card.ship.length_m / t2s.load(name).card.model.speed_mps

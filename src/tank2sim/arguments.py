@@ -217,11 +217,11 @@ def _as_kind(name: str, value: Any, kind: Any) -> Any:
                 return _as_kind(name, value, part)
             except ArgumentError as fault:
                 faults.append(fault)
-        told = sorted(faults, key=lambda each: (not each.place, not each.remedy.startswith("give a")))[0]
+        chosen = sorted(faults, key=lambda each: (not each.place, not each.remedy.startswith("give a")))[0]
         words = list(dict.fromkeys(_in_words(kind)))
-        several = told.remedy.startswith("give a") and len(words) > 1
-        remedy = f"give {', '.join(words[:-1])} or {words[-1]}" if several else told.remedy
-        raise ArgumentError(told.source, told.place, told.problem, remedy)
+        several = chosen.remedy.startswith("give a") and len(words) > 1
+        remedy = f"give {', '.join(words[:-1])} or {words[-1]}" if several else chosen.remedy
+        raise ArgumentError(chosen.source, chosen.place, chosen.problem, remedy)
     if get_origin(kind) is Annotated:
         bounds = bounds_of(kind)
         return _as_kind(name, value, get_args(kind)[0]) if bounds is None else bounds.checked(name, value)

@@ -26,7 +26,7 @@ def turned(changes, manoeuvre="turn:35"):
 
 def test_a_ship_inside_the_range_of_its_card_has_no_marks() -> None:
     run = turned({})
-    assert run.reading.exit_s is None and run.reading.outside_names == () and run.reading.message == ""
+    assert run.reading.exit_s is None and run.reading.outside_names == () and run.reading.notices == []
     assert np.all(run.trajectory["validity"] == 1.0)
 
 

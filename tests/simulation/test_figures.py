@@ -169,7 +169,7 @@ def test_revolutions_for_a_ship_without_propulsion_are_refused(mariner, tmp_path
     "text", ["turn", "turn:", "turn:x", "turn:0", "turn:95", "zigzag:20", "zigzag:20/-20", "loop:3", ""]
 )
 def test_what_is_no_manoeuvre_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="--manoeuvre"):
+    with pytest.raises(InputError, match=r"^manoeuvre: "):
         parse_manoeuvre(text)
 
 
@@ -214,7 +214,7 @@ parameters = {{ heel_ratio = {ratio}, Yphi = 3e-4, Nphi = -1e-4 }}
 
 def test_a_single_order_needs_to_be_reported_how_long(mariner, tmp_path) -> None:
     (tmp_path / "o.csv").write_text("t_s,delta_order_deg\n0,10\n")
-    with pytest.raises(InputError, match="--duration"):
+    with pytest.raises(InputError, match="or a duration"):
         simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/o.csv"))
     run = simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/o.csv"), duration_s=20.0).trajectory
     assert run.t[-1] == pytest.approx(20.0) and run["motion.psi"][-1] > 0

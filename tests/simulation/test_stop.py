@@ -174,7 +174,7 @@ def test_a_ship_without_propulsion_is_refused_with_the_reason(mariner) -> None:
 
 @pytest.mark.parametrize("text", ["stop:60", "stop:x", "stop:", "stop:-6/2"])
 def test_what_is_no_stop_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="--manoeuvre"):
+    with pytest.raises(InputError, match=r"^manoeuvre: "):
         parse_manoeuvre(text)
 
 

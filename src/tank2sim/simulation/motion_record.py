@@ -77,10 +77,18 @@ class MotionRecord:
         return given
 
     def means(self, column: int, edges: Array, *, given_before: bool = False) -> Array:
-        """Mean of an input from each of the times `edges` (k,), s, to the next, (k - 1,).
+        """Means of an input between times, (k - 1,).
 
-        With `given_before` an order begins at :attr:`given_s`, else at the row that shows it. Before the first row and
-        after the last one an input keeps its value.
+        Before the first row and after the last one an input keeps its value.
+
+        Parameters
+        ----------
+        column : int
+            Place of the input among the model's.
+        edges : array (k,)
+            Times, s, rising.
+        given_before : bool
+            Whether an order begins at :attr:`given_s`; otherwise it begins at the row that shows it.
         """
         time, values = self.time_s, self.inputs[:, column]
         if self.orders[column]:
@@ -140,11 +148,6 @@ def _means(time: Array, values: Array, areas: Array, edges: Array) -> Array:
     at += values[0] * np.minimum(edges - time[0], 0.0) + values[-1] * np.maximum(edges - time[-1], 0.0)
     means: Array = np.diff(at) / np.diff(edges)
     return means
-
-
-def usual_step(record: MotionRecord) -> float:
-    """Median of the time between rows, s."""
-    return float(np.median(np.diff(record.time_s)))
 
 
 def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:

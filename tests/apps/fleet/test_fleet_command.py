@@ -25,10 +25,9 @@ from tank2sim.gap.result import Gap, Named
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trial_file import trial_csv
+from tests.cli.command_line import refused, tank2sim
 from tests.dask_cluster import loopback_cluster
 from tests.gap import made_up
-
-from .command_line import refused, tank2sim
 
 CURRENT = Named("current", {"speed_mps": 0.45, "direction_rad": -1.0}, {"speed_mps": 0.02}, 0.97)
 

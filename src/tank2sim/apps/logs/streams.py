@@ -95,7 +95,15 @@ class VesselLog:
 
 
 def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
-    """A note that counts unused sentences or messages by kind, which it calls `words`; none if there are none."""
+    """A note that counts what was not used; none if there is nothing.
+
+    Parameters
+    ----------
+    words : str
+        What is counted, ``sentences`` or ``messages``.
+    kinds : mapping
+        Kind to its number.
+    """
     if not kinds:
         return []
     listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
