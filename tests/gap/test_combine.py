@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -117,7 +118,8 @@ def test_a_smaller_set_takes_the_place_only_where_it_follows_the_trials_as_close
 
     def search_again(card, trials, run):
         asked.append(run.options.effects)
-        return replace(passes[1], effects=(DRAG,), passed=tuple(map(away, both.passed))), trials
+        gap = replace(passes[1], effects=(DRAG,), passed=tuple(map(away, both.passed)))
+        return SimpleNamespace(gap=gap, trials=trials)
 
     monkeypatch.setattr(workflow, "_search_once", search_again)
     run = workflow._Run(workflow.GapOptions(), lambda text: None, None, np.inf)

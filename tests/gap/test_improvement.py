@@ -44,7 +44,9 @@ def prover(
 
     trials = (SimpleNamespace(trials=tuple(plain)), SimpleNamespace(trials=("held",) if held else ()))
     likelihood = SimpleNamespace(
-        by_formula=lambda best: best, none=SimpleNamespace(model=None), coefficients_with=lambda found: None
+        by_formula=lambda best: SimpleNamespace(width=1.0),
+        none=SimpleNamespace(model=None),
+        coefficients_with=lambda found: None,
     )
     return Prover(CARD, trials, likelihood, SimpleNamespace(by_cards=by_cards, noise={}))
 

@@ -158,12 +158,12 @@ def run_gap_workflow(
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
         run = _Run(options, progress, pool, lowest)
         try:
-            gap, trials = _search_once(card, (fitted, held), run)
+            first = _search_once(card, (fitted, held), run)
         except FloatingPointError as error:
             problem = f"gives no finite forces along the motion of the trials ({error})"
             remedy = "check the units of its numbers and of the trials' columns"
             raise InputError(card.source, "", problem, remedy) from None
-        without = gap.base
+        gap, trials, without = first.gap, first.trials, first.gap.base
         while _seeks_more(gap, options):
             named = tuple(effect.name for effect in gap.effects)
             known = dict.fromkeys([*named, *(name for names in gap.alternatives for name in names)])
@@ -175,14 +175,16 @@ def run_gap_workflow(
             excluded = (*options.without, *known, *simpler)
             more = replace(options, effects=wanted, without=excluded, max_effects=most)
             try:
-                further, found_trials = _search_once(gap.improved, trials, replace(run, options=more), without)
+                further = _search_once(gap.improved, trials, replace(run, options=more), without)
             except FloatingPointError:
                 break
-            if not _adds(gap, further, 1 - options.false_discovery):
+            if not _adds(gap, further.gap, 1 - options.false_discovery):
                 break
-            both = combine_passes(gap, further)
+            both = combine_passes(gap, further.gap)
             smaller = _smaller(card, (fitted, held), (gap, both), run)
-            gap, trials = smaller or (both, found_trials)
+            gap, trials = smaller or (both, further.trials)
+        if gap is first.gap:
+            gap = _with_refined_coefficients(first, progress)
         tried = of_tried_effects(_names(card, fitted, options), candidate_explanations(card, fitted.driven_by))
         return replace(gap, notices=(*doubts(given), *lowered_bound_notice(given, card), *tried, *gap.notices))
 
@@ -209,9 +211,20 @@ class _Run:
     lowest_mps: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Searched:
+    """One search: what was judged without trials held out, and the result with them."""
+
+    prover: Prover
+    found: Search
+    judged: Judged
+    gap: Gap
+    trials: tuple[Measured, Measured]
+
+
 def _search_once(
     card: ManoeuvringCard, trials: tuple[Measured, Measured], run: _Run, without: ManoeuvringCard | None = None
-) -> tuple[Gap, tuple[Measured, Measured]]:
+) -> _Searched:
     """One search, decision and proof, and the trials in the surroundings found; `without` lacks earlier effects."""
     options, progress = run.options, run.progress
     names = _names(card, trials[0], options)
@@ -225,9 +238,21 @@ def _search_once(
     judged = Judge(prover, options.false_discovery).judge(found, decision)
     judged = judge_surroundings(prover, found, judged, names)
     judged = replace(judged, decision=_with_verdict_of_coefficients(judged.decision, judged.proof))
-    judged = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
+    opened = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
     progress("where and how much")
-    return _assemble_gap(prover, found, judged), judged.proof.trials
+    return _Searched(prover, found, judged, _assemble_gap(prover, found, opened), opened.proof.trials)
+
+
+def _with_refined_coefficients(searched: _Searched, progress: StageReport) -> Gap:
+    """The result of a search with coefficients refined by simulations of the fitted trials, once all is named."""
+    prover, judged = searched.prover, searched.judged
+    if judged.decision.verdict not in (MISSING, AMBIGUOUS, COEFFICIENTS):
+        return searched.gap
+    progress("refining the coefficients")
+    proof = prover.refine(judged.proof)
+    if proof is judged.proof:
+        return searched.gap
+    return _assemble_gap(prover, searched.found, replace(judged, proof=prover.open_holdout(proof)))
 
 
 def _seeks_more(gap: Gap, options: GapOptions) -> bool:
@@ -276,10 +301,11 @@ def _smaller(
     for dropped in first.effects:
         others = tuple(effect.name for effect in both.effects if effect.name != dropped.name)
         alone = replace(run, options=replace(run.options, effects=others), progress=lambda text: None)
-        again, found_trials = _search_once(card, trials, alone)
+        searched = _search_once(card, trials, alone)
+        again = searched.gap
         same = again.verdict == MISSING and {effect.name for effect in again.effects} == set(others)
         if same and misfit_of(again.passed, "after", held_out=False) <= (1 + BETTER) * reached:
-            return without_effect(again, both, dropped.name), found_trials
+            return without_effect(again, both, dropped.name), searched.trials
     return None
 
 

@@ -319,7 +319,7 @@ class IdentificationResult(Result[IdentificationStudy]):
         for name, structure in self.study.structures.items():
             *single, largest = (100 * error for error in structure.errors)
             rows.append([name, float(np.mean(single)), largest])
-        heads = ("structure", "one at a time, mean (%)", "those of largest amplitude (%)")
+        heads = ("structure", "one at a time, mean (%)", "largest amplitudes (%)")
         caption = "Yaw-rate error of trials left out of the fit"
         return Section(heading="Structure, by cross-validation", tables=[table(caption, heads, rows)])
 

@@ -45,7 +45,7 @@ PAGE_FIGURES = 4
 _COEFFICIENTS = (
     "K is the change of a figure in per cent when one number on the card grows by 10 %. Bars are by exact slopes "
     "(10 c/F dF/dc), points by computing the ship again with 10 % more; where they differ, the figure is curved.\n\n"
-    "Slopes of steady turns and straight courses are by the implicit function theorem, those of manoeuvres by forward "
+    "Slopes of steady turns and straight courses are by the implicit function theorem, slopes of manoeuvres by forward "
     "sensitivities through the events, whose times move, too."
 )
 
@@ -277,7 +277,7 @@ class InfluenceResult(Result[InfluenceStudy]):
         return Section(
             heading="Agreed variation",
             text="All these numbers change together. To first order a figure changes by the sum of Kc K / 10; the "
-            "direct change is that of the changed ship.",
+            "direct change is read from the changed ship.",
             tables=[
                 table("Agreed changes", ("parameter", "Kc (%)"), changes, on_screen=False),
                 table("Change of the figures by the agreed variation", heads, figures),

@@ -142,7 +142,7 @@ def variance_chart(result: InfluenceData) -> alt.Chart:
         .properties(
             width=_WIDTH,
             height=28 * len(figures),
-            title="Which standard errors make those of the figures",
+            title="Standard errors behind those of the figures",
             description=f"Shares of {len(names)} parameters in the variances of {len(figures)} figures.",
         )
     )

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _CRITERION = (
     "C′ = Y′v (N′r − m′x′G) − N′v (Y′r − m′), from the slopes of the full forces on the straight course. Its sign is "
-    "that of the margin between two levers: the yaw damping lever (N′r − m′x′G)/(Y′r − m′) lies ahead of the sway "
+    "the sign of the margin between two levers: the yaw damping lever (N′r − m′x′G)/(Y′r − m′) lies ahead of the sway "
     "lever N′v/Y′v on a ship that is stable. The margin in per cent is C′ over |Y′v (N′r − m′x′G)|, its stabilising "
     "part."
 )
@@ -43,7 +43,7 @@ _TRIM = (
 _RESPONSE = (
     "Response of the yaw rate to the rudder, by the linear equations about the straight course. The gear acts with "
     "its lag; its rate limit is not linear and left out. The poles of an unstable ship lie in the tinted half; its "
-    "Bode diagram is that of the plant for a controller, not of a ship with a fixed rudder."
+    "Bode diagram shows the plant that a controller sees, not a ship with a fixed rudder."
 )
 _TURNING = (
     "All steady turns that are joined to the straight course, at constant revolutions in calm water, followed by "

@@ -12,7 +12,7 @@ from tank2sim.units import in_words
 
 COMPARISON_ERRORS = (
     "Points: error E of the simulation. Bars: plus and minus its uncertainty U_val; a point within its bar is "
-    "validated, if the bar is short enough. The number is that of the trial."
+    "validated, if the bar is short enough. The number names the trial."
 )
 """Caption of the chart of comparison errors."""
 

@@ -110,7 +110,7 @@ def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, 
         charts=[
             Illustration(
                 chart=tracks,
-                caption="North is up. The FMU's track lies on that of the model it was made from.",
+                caption="North is up. The FMU's track lies on the track of its model.",
                 half=True,
             ),
             Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard.", half=True),

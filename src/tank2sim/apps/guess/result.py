@@ -148,7 +148,7 @@ class GuessResult(Result[GuessStudy]):
         return Section(
             heading="Further figures that would help most",
             text="Mean share of the variance of all figures not given that one more figure would remove. The figure is "
-            "measured with the usual error; covariances are those of the ships found.",
+            "measured with the usual error; covariances come from the ships found.",
             tables=[table("One more figure", ("figure", "variance removed (%)"), rows, digits=2)],
         )
 

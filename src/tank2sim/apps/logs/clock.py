@@ -48,7 +48,7 @@ def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
         text = f"the receiver's date is {1024 * abs(turns)} weeks off the date of the recorder, which is taken"
         return turns * _ROLLOVER_S, [LogFinding("note", text, evidence={"weeks": 1024 * turns})]
     if abs(ahead_s) > _DAY_S:
-        text = f"the recorder's clock is {abs(ahead_s) / _DAY_S:.4g} days off that of the receiver, which is taken"
+        text = f"the recorder's clock is {abs(ahead_s) / _DAY_S:.4g} days off the receiver's clock, which is used"
         return 0.0, [LogFinding("note", text, evidence={"days": ahead_s / _DAY_S})]
     return 0.0, []
 
@@ -56,7 +56,7 @@ def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
 def board_start(lag_s: Array, receiver: str, findings: list[LogFinding]) -> float:
     """Time of a board at UTC 0, s, by its clock less UTC at each fix (n,); leaps of the receiver are a fault."""
     if (spread := float(np.ptp(lag_s))) > 1.0:
-        text = f"the receiver's clock leaps by {spread:.3g} s against that of the board, which is taken"
+        text = f"the receiver's clock leaps by {spread:.3g} s against the board's clock, which is used"
         findings.append(LogFinding("fault", text, receiver))
         return float(np.median(lag_s))
     # The message is written after the fix was measured: the least difference has the least delay.

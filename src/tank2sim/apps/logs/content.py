@@ -212,7 +212,7 @@ def component_evidence(time_s: Array, values: Array, reference: Array, motion: R
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
     found = _correlation(other[good], reference[good])
-    text = f"correlates with that of the positions by {found:.2f}"
+    text = f"correlates with the positions by {found:.2f}"
     return ContentEvidence(abs(found), 1 if found > 0 else -1, text=text)
 
 

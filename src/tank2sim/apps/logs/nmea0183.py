@@ -468,7 +468,7 @@ class _Reader:
         for name in sources:
             self.stated[name] = ("rpm", "rpm" if name == shaft else "", "format")
         side = "starboard" if int(*numbers) % 2 else "port"
-        text = f"{shaft} is the only shaft and is taken for that of a single propeller, not of a {side} one"
+        text = f"{shaft} is the only shaft: it counts as a single propeller, not as a {side} one"
         findings.append(LogFinding("note", text, shaft))
 
     @staticmethod

@@ -186,7 +186,7 @@ class _Topic:
         if abs(float(np.median(stamps - received))) < _OFF_BY_S:
             return stamps
         if (stamps != 0).any():
-            text = f"{self.name}: the times of its headers are not those of the recording, which are taken"
+            text = f"{self.name}: header times differ from recording times, which are used"
             findings.append(LogFinding("note", text, self.name))
         return received
 

@@ -83,7 +83,7 @@ def converted(
     if wanted.origin_m:
         notices = (
             Notice("U of the new origin scales the numbers now: a difference of second order in the distance and r'"),
-            Notice("figures, positions and speeds of the new card are those of its own origin"),
+            Notice("figures, positions and speeds of the new card refer to its own origin"),
         )
     if to == "abkowitz" and isinstance(given, MmgCard):
         return _fitted(given, wanted, SCATTER if scatter is None else scatter, notices)
@@ -143,7 +143,7 @@ def _fitted(
     changes = figure_changes(bare, build(polynomial))
     made = in_conventions(polynomial, wanted)
     if fit.covariance is not None:
-        carried = "standard errors are those of the MMG card's numbers, carried through the fit with their covariance"
+        carried = "standard errors come from the MMG card's numbers, carried through the fit with their covariance"
         notices = (*notices, Notice(f"{carried}; what the fit itself misses is in the table alone"))
     return ConvertedText(made.text, made, fit, changes), notices
 

@@ -350,7 +350,9 @@ def _weigh_rudder(found: _Evidence, table: CoefficientTable, ship: ReadShip) -> 
             found.add(_WRONG_SIDE, 0.0, "a rudder to starboard pushes the stern to starboard")
         z = math.log(abs(Yd) / side) / _RUDDER_ERROR
         found.add(
-            _log_density(z), _log_density(0), f"Yd = {Yd:.3g}, {abs(Yd) / side:.2g} times that of a rudder by the rules"
+            _log_density(z),
+            _log_density(0),
+            f"Yd = {Yd:.3g}, {abs(Yd) / side:.2g} of a rudder by the rules",
         )
     if Nd and not Yd:
         z = math.log(abs(Nd) / (side * _LEVER)) / _RUDDER_ERROR

@@ -95,7 +95,7 @@ def _speed(signals: Mapping[str, Array], way: float) -> tuple[float, list[str]]:
         if name in signals:
             speed = _first(signals[name])
             return speed, [f"no speed through the water: the ship starts at {what}, {speed / KNOT_MPS:.2f} knots"]
-    return way, [f"no speed: the ship starts at that of its first positions, {way / KNOT_MPS:.2f} knots"]
+    return way, [f"no speed: the ship starts at the speed of its first positions, {way / KNOT_MPS:.2f} knots"]
 
 
 def _wind(signals: Mapping[str, Array], model: Model) -> tuple[dict[str, float], list[str]]:

@@ -69,7 +69,12 @@ QUOTIENT = 1e-3
 """Step of the logarithms of the noise in a difference quotient of slopes (project choice: a thousandth of a level)."""
 
 WIDTHS = (0.1, 2.5)
-"""Factor on the standard errors of the card's coefficients: where a card states none, 0.2 % to 5 % (project choice)."""
+"""Factor on the standard errors of the card's coefficients where explanations are compared: where a card states none,
+0.2 % to 5 % (project choice)."""
+
+WIDEST = 20.0
+"""The same at most where the coefficients are fitted together with the explanation chosen: a card that is wrong by
+10 to 20 % often says 1 or 2 % (project choice)."""
 
 
 class Likelihood:
@@ -112,6 +117,7 @@ class Likelihood:
         self._lack = (motion.block_s * none.fine_rates(motion, nothing) - changes) * self._inside
         self._shown = motion.measured - none.readings(motion, nothing, self._unmeasured)
         self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
+        self._widest = WIDTHS[1]
         self._forms_of_found = np.zeros((*self._lack.shape, 0)) if without is None else self._found_earlier(without)
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
@@ -254,7 +260,7 @@ class Likelihood:
     def _strict(self) -> Likelihood:
         """The likelihood without form errors."""
         strict = copy(self)
-        strict._forms = None
+        strict._forms, strict._widest = None, WIDEST
         return strict
 
     def coefficients_with(self, found: ExplanationFit) -> CoefficientEstimates:
@@ -381,7 +387,7 @@ class Likelihood:
             return value, slope * scale
 
         low, high = self.belief.bounds
-        low[-1], high[-1] = np.log(WIDTHS[0]), np.log(WIDTHS[1])
+        low[-1], high[-1] = np.log(WIDTHS[0]), np.log(self._widest)
         found = minimize(
             scaled,
             fit.logs / scale,

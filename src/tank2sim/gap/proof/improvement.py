@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
 from tank2sim.gap.inference.fit import ExplanationFit
@@ -18,6 +19,7 @@ from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
 from tank2sim.gap.outcome.refit import FAR, refit_coefficients
 from tank2sim.gap.outcome.surrounded_trial import ByTrial
 from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surroundings
+from tank2sim.gap.proof.refinement import CoefficientPrior, refined_coefficients
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import Passed, Refitted, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -54,6 +56,8 @@ class Proof:
         Of the fitted trials; those held out follow once they are opened (:meth:`Prover.open_holdout`).
     coefficients : tuple of Refitted
         Coefficients of the base that differ from the given card's.
+    width : float
+        Factor on the standard errors of the given card with which the filter fitted the coefficients.
     effect_alone : mapping
         Misfit of the effects without refitted coefficients, noise units: ``fit``, and ``holdout`` once that is opened;
         empty where the coefficients are the given ones.
@@ -65,6 +69,7 @@ class Proof:
     improved: ManoeuvringCard
     results: list[Passed]
     coefficients: tuple[Refitted, ...] = ()
+    width: float = 1.0
     effect_alone: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -127,7 +132,31 @@ class Prover:
         if joint.misfit >= (1 - BETTER) * proof.misfit or not most_are_closer(proof.results, joint.results):
             return proof
         alone = {"fit": proof.misfit} if named.estimated else {}
-        return replace(joint, coefficients=refitted, effect_alone=alone)
+        return replace(joint, coefficients=refitted, width=found.width, effect_alone=alone)
+
+    def refine(self, proof: Proof) -> Proof:
+        """The proof with its coefficients refined by simulations of the fitted trials, if these are then closer.
+
+        Their standard errors and covariance remain those of the filter, and the named effects keep their values.
+        """
+        at_card = {entry.name: entry for entry in proof.coefficients}
+        names = tuple(name for name in at_card if proof.base.derivatives.get(name))
+        if not names or proof.misfit <= BETTER_FROM:
+            return proof
+        spread = np.array([at_card[name].standard_error_before for name in names]) * max(proof.width, 1.0)
+        prior = CoefficientPrior(names, np.array([at_card[name].before for name in names]), spread)
+        sensors = sensor_faults(proof.named.estimated)
+        faultless = corrected(proof.trials[0], sensors) or proof.trials[0]
+        replays = self.replays
+        found = refined_coefficients(proof.improved, prior, faultless, replays.noise, replays.executor)
+        values = dict(zip(names, map(float, found), strict=True))
+        errors = {name: (value, at_card[name].standard_error) for name, value in values.items()}
+        base = replace(revised(proof.base, errors, comment="refined by simulations"), covariance=proof.base.covariance)
+        refined = self._replayed(self.card, base, proof.named)
+        if refined.misfit >= proof.misfit:
+            return proof
+        coefficients = tuple(replace(entry, value=values.get(entry.name, entry.value)) for entry in proof.coefficients)
+        return replace(refined, coefficients=coefficients, width=proof.width, effect_alone=proof.effect_alone)
 
     def open_holdout(self, proof: Proof) -> Proof:
         """The proof with the trials held out, which the named effects have not seen.

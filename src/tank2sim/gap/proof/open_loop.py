@@ -163,7 +163,7 @@ class Replayer:
         ordered = driven_by == "order" and _ORDER in self.model.input_names
         self._order = self.model.input_names.index(_ORDER) if ordered else None
         self.passage_s = card.ship.length_m / card.model.speed_mps
-        self._nominal = np.array([state.nominal for state in self.model.states])
+        self.nominal = np.array([state.nominal for state in self.model.states])
 
     def states(self, record: InputRecord, start: Array, p: Array, begin: int = 0) -> Array:
         """States (n - begin, nx) at the rows of a record, from the state `start` at the row `begin`; nan once out of
@@ -174,7 +174,7 @@ class Replayer:
         with np.errstate(all="ignore"):
             steps = self._steps.run(start, inputs[first:], p, constants, lengths[first:, None])
             states: Array = steps[places[begin:] - first]
-            lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)
+            lost = ~(np.abs(states) < _FAR * self.nominal).all(axis=1)
         if lost.any():
             states[int(np.argmax(lost)) :] = np.nan
         return states
@@ -253,10 +253,10 @@ class Replayer:
         early step of an unstable ship is a large one later, where the motion is not nearly linear in it. None where a
         beginning is missed by more than `most`, or a motion exceeds all bounds.
         """
-        guess, spread = _first_state(self, record, sigma, p)
+        guess, spread = first_state(self, record, sigma, p)
         known, size = ~np.isnan(record.readings), len(guess)
         unknown = np.append(guess if near is None else near, np.full(len(rows), 0.5))
-        reach = np.append(1e-4 * self._nominal, np.full(len(rows), _REACH))
+        reach = np.append(1e-4 * self.nominal, np.full(len(rows), _REACH))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
             last = int(rows[count]) if count < len(rows) else len(record.time_s)
@@ -356,7 +356,7 @@ class Replayer:
 
     def guess_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
         """Initial state (nx,) from the first seconds, with the rudder that fits the record better."""
-        guess, _ = _first_state(self, record, sigma, p)
+        guess, _ = first_state(self, record, sigma, p)
         known = ~np.isnan(record.readings)
 
         def size(start: Array) -> float:
@@ -379,7 +379,7 @@ class Replayer:
         self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None, *, wrong: bool
     ) -> tuple[Array, float]:
         """Initial state by Gauss-Newton with differences, and its misfit: inf where the motion exceeds all bounds."""
-        guess, spread = self.guess_initial_state(record, sigma, p), _first_state(self, record, sigma, p)[1]
+        guess, spread = self.guess_initial_state(record, sigma, p), first_state(self, record, sigma, p)[1]
         known = ~np.isnan(record.readings)
         column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
         number = np.maximum(np.bincount(column, minlength=len(sigma)), 1)
@@ -394,7 +394,7 @@ class Replayer:
             beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
             weights = np.sqrt(sigma**2 + beyond)
             if turn % 2 == 0:  # the motion is nearly linear in its initial state
-                slopes = difference_slopes(residuals, start, residual, 1e-4 * self._nominal)
+                slopes = difference_slopes(residuals, start, residual, 1e-4 * self.nominal)
             if not (np.isfinite(weights).all() and np.isfinite(slopes).all()):
                 break
             if wrong and turn and np.allclose(weights, before, rtol=0.02):
@@ -517,8 +517,18 @@ def delays_of(card: ManoeuvringCard, model: Model, p: Array | None = None) -> di
     return delays
 
 
-def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array) -> tuple[Array, Array]:
-    """State read off the first :data:`FIRST` L/u0 of a record by straight lines, and how far to trust it (nx,) each."""
+def first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array) -> tuple[Array, Array]:
+    """State read off the first :data:`FIRST` L/u0 of a record by straight lines, and how far to trust it (nx,) each.
+
+    Parameters
+    ----------
+    replayer : Replayer
+    record : InputRecord
+    sigma : array (ny,)
+        Noise of the compared signals.
+    p : array (np,)
+        Parameters of the model.
+    """
     model, times = replayer.model, record.times - record.times[0]
     early = times < FIRST * replayer.passage_s
     early[:3] = True

@@ -133,7 +133,7 @@ _FOLLOWED: WeakKeyDictionary[Trial, dict[_Key, _Followed]] = WeakKeyDictionary()
 
 
 def _follow(card: ManoeuvringCard, driven_by: str, noise: Mapping[str, float], trial: Trial) -> _Followed:
-    replayer = _replayer(card, driven_by, tuple(noise))
+    replayer = replayer_of(card, driven_by, tuple(noise))
     p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in replayer.seen])
     record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
     return _Followed(record, replayer.seen, replayer.motion(record, start, p))
@@ -143,7 +143,17 @@ _REPLAYERS: dict[tuple[str, str, tuple[str, ...]], Replayer] = {}
 """The last replayer of this process, by the card's text, what drives the rudder and the variables with noise."""
 
 
-def _replayer(card: ManoeuvringCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
+def replayer_of(card: ManoeuvringCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
+    """The replayer of a card, kept for the next trial.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    driven_by : str
+        ``angle`` or ``order``.
+    known : tuple of str
+        Variables with known noise; those of them that the model has are compared.
+    """
     key = card.text, driven_by, known
     found = _REPLAYERS.get(key)
     if found is None:

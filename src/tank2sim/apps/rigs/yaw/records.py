@@ -96,7 +96,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
     notes = (
-        [f"the file does not state {' and '.join(missing)} of the programme; that of the published rig is taken."]
+        [f"the file does not state {' and '.join(missing)} of the programme; the values of the published rig are used."]
         if missing
         else []
     )

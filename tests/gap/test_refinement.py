@@ -1,0 +1,58 @@
+"""Coefficients refined by simulations: numpy and scipy make the trials of a ship written out there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards.reading import revised
+from tank2sim.gap.proof.refinement import CoefficientPrior, refined_coefficients
+from tank2sim.gap.proof.replay import replay_trials
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tests.gap.replay_noise import NOISE
+from tests.identification.trials import made_up_ship
+
+OFF = {"Yv": 1.1, "Yd": 0.9, "Nv": 0.9, "Nr": 1.1, "Nd": 0.92, "Xvr": 1.1}
+
+
+@pytest.fixture(scope="module")
+def wrong() -> ManoeuvringCard:
+    """Coefficients off by a tenth."""
+    card = parse_card(made_up_ship.CARD, "made_up.toml")
+    assert isinstance(card, ManoeuvringCard)
+    changed = {
+        name: (share * card.derivatives[name], abs(0.02 * card.derivatives[name])) for name, share in OFF.items()
+    }
+    return revised(card, changed)
+
+
+def refined(card: ManoeuvringCard, width: float) -> ManoeuvringCard:
+    fitted = Measured(
+        (
+            made_up_ship.trial(made_up_ship.zigzag(20.0), name="zigzag", duration=200.0, step=0.5),
+            made_up_ship.trial(made_up_ship.turn(-25.0), name="turn", duration=200.0, step=0.5, seed=2),
+        ),
+        "angle",
+        (),
+    )
+    values, errors = (np.array([read(name) for name in OFF]) for read in (card.derivatives.get, card.standard_error))
+    found = refined_coefficients(card, CoefficientPrior(tuple(OFF), values, width * errors), fitted, NOISE)
+    return revised(card, {name: (float(value), 0.0) for name, value in zip(OFF, found, strict=True)})
+
+
+def test_a_card_that_is_wrong_by_five_of_its_errors_is_followed_to_the_noise_in_another_trial(wrong) -> None:
+    other = made_up_ship.trial(made_up_ship.turn(15.0), name="other", duration=200.0, step=0.5, seed=3)
+    after = refined(wrong, width=5.0)
+    (replay,) = replay_trials(wrong, after, Measured((other,), "angle", ()), NOISE, held_out=True)
+    assert replay.misfit("before") > 10 and replay.misfit("after") == pytest.approx(1.0, abs=0.1)
+    for name in OFF:
+        assert after.derivatives[name] == pytest.approx(made_up_ship.TRUTH[name], rel=0.01)
+
+
+def test_a_card_that_is_surer_moves_less(wrong) -> None:
+    def moved(width: float) -> float:
+        after = refined(wrong, width)
+        return sum(abs(after.derivatives[name] / wrong.derivatives[name] - 1) for name in OFF)
+
+    assert moved(1e-4) < 0.1 * moved(1e-2) and moved(1e-2) < moved(5.0)
