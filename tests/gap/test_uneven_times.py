@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.errors import InputError
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.trials import Trial
@@ -91,3 +92,12 @@ def test_the_very_ship_leaves_noise_however_uneven_the_times(hertz: int, uneven:
     record = trial(times_of(hertz, uneven), seed=hertz)
     (replay,) = replay_trials(card, card, Measured((record,), "order", ()), NOISE, held_out=True)
     assert replay.misfit("before") == pytest.approx(1.0, abs=0.08)
+
+
+def test_one_bad_time_among_the_rows_is_refused_before_it_asks_for_gigabytes() -> None:
+    card = parse_card(TEXT, "made_up.toml")
+    assert isinstance(card, ManoeuvringCard)
+    record = trial(times_of(1, "even"), seed=1)
+    record.time_s[-1] = 1.7e9  # an epoch among seconds
+    with pytest.raises(InputError, match="correct the time, or cut the record"):
+        replay_trials(card, card, Measured((record,), "order", ()), NOISE, held_out=True)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial
+from tank2sim.errors import InputError
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
 
 STATES = {
     "u_mps": "motion.u",
@@ -39,6 +40,11 @@ FED = {
     "current_direction_rad": "current.direction",
 }
 """Signal of a trial to the input of a model, in addition to the rudder."""
+
+
+MOST_INSTANTS_A_ROW = 100
+"""Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
+seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +114,16 @@ def motion_record(model: Model, trial: Trial, seen: Sequence[str]) -> MotionReco
         With ``delta_rad``, or ``delta_order_rad``, if the model has a rudder.
     seen : sequence of str
         Variables of the model to be compared, those of :data:`OBSERVED_SIGNALS`.
+
+    Raises
+    ------
+    InputError
+        The trial lasts much longer than its rows can show, as with one bad time.
     """
+    lasts, sampling = float(trial.time_s[-1] - trial.time_s[0]), sampling_step(trial)
+    if lasts > MOST_INSTANTS_A_ROW * len(trial.time_s) * sampling:
+        problem = f"lasts {lasts:g} s, and has {len(trial.time_s)} rows, most of them {sampling:g} s apart"
+        raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
     inputs = np.tile(model.input_values(), (len(trial.time_s), 1))
     orders = np.zeros(inputs.shape[1], dtype=bool)
     for name, values in _input_signals(model, trial).items():

@@ -140,7 +140,11 @@ class Prover:
         Their standard errors and covariance remain those of the filter, and the named effects keep their values.
         """
         at_card = {entry.name: entry for entry in proof.coefficients}
-        names = tuple(name for name in at_card if proof.base.derivatives.get(name))
+        names = tuple(
+            name
+            for name, entry in at_card.items()
+            if proof.base.derivatives.get(name) and entry.standard_error_before > 0
+        )
         if not names or proof.misfit <= BETTER_FROM:
             return proof
         spread = np.array([at_card[name].standard_error_before for name in names]) * max(proof.width, 1.0)

@@ -81,7 +81,7 @@ class InputRecord:
 
     @property
     def given_s(self) -> Array:
-        """Time (n,), s, from which the order of each row holds; that of the first row holds from the beginning."""
+        """Time (n,), s, from which the order of each row holds; the first order holds from the beginning."""
         shares = 0.5 if self.instants is None else self.instants[1:]
         after = self.time_s[:-1] + shares * np.diff(self.time_s) + self.late_s
         return np.concatenate([[-np.inf], np.maximum.accumulate(after)])

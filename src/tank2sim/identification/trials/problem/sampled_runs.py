@@ -17,10 +17,6 @@ from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_lines, 
 from tank2sim.simulation.recorded import TURNS_AT_EXECUTE, straight_over_gaps
 from tank2sim.simulation.rudder_record import is_over
 
-MOST_INSTANTS_A_ROW = 100
-"""Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
-seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
-
 _SLOWER = 1.5
 """Step of a signal, as a multiple of that of the grid, from which it is slower than it (project choice: below, most
 instants have a sample of their own)."""
@@ -111,6 +107,7 @@ def prepare(
     InputError
         The trial has fewer than ten steps, or none of the signals in `seen`.
     """
+    record = motion_record(model, trial, seen)
     sampling = float(np.median(np.diff(trial.time_s)))
     stride = max(1, int((step_s or 1.5 * model.step_s) / sampling))
     step = stride * sampling if step_s is None else stride * sampling / max(1, int(sampling / step_s + 1e-6))
@@ -119,11 +116,7 @@ def prepare(
     grid: Array = begin + step * np.arange(count, dtype=float)
     if count < 10:
         raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
-    if count * stride > MOST_INSTANTS_A_ROW * len(trial.time_s):
-        lasts = trial.time_s[-1] - trial.time_s[0]
-        problem = f"lasts {lasts:g} s, and has {len(trial.time_s)} rows, most of them {sampling:g} s apart"
-        raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
-    record, edges = motion_record(model, trial, seen), np.append(grid, grid[-1] + step)
+    edges = np.append(grid, grid[-1] + step)
     columns = [record.means(column, edges, given_before=orders_before) for column in range(record.inputs.shape[1])]
     if rudder is not None:
         columns[model.input_names.index("rudder.command")] = means_of_lines(*rudder, edges)
