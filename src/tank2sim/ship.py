@@ -81,7 +81,7 @@ class Ship(Vessel):
         """The ship with ``[waves]`` on its card, its motions and mean drift in waves, which the effect `waves` needs.
 
         Computed from the mesh of its hull by potential flow, at rest in deep water (the extra ``tank2sim[waves]``). The
-        radius of gyration in pitch is that of the card's yaw inertia.
+        radius of gyration in pitch follows from the card's yaw inertia.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class Ship(Vessel):
             Hull in m, at the size of the ship: x forward of midships, y to port, z above the waterline, normals into
             the water (``gdf``, ``stl`` and others).
         metacentric_height_m : float, optional
-            By default that of the card.
+            By default as on the card.
         roll_gyradius_m : float, optional
             Radius of gyration in roll; by default 0.375 of the beam.
         roll_damping : float, optional
@@ -171,7 +171,7 @@ class Ship(Vessel):
         ----------
         orders : DataFrame, mapping or path
             Columns (n,) ``t_s`` (from 0), ``delta_order_deg`` and, with propulsion, ``n_rpm``; each order holds until
-            the next. A path is that of a CSV file.
+            the next. A path names a CSV file.
         options
             Those of :meth:`simulate`.
 

@@ -82,7 +82,7 @@ def _mmg(form: MmgForm, text: str, source: str, spelt: Mapping[str, str]) -> Mmg
     card = MmgCard(**vars(_ship(others, text, source, spelt)), **own)
     refuse_other_scaling(card)
     nominal = nominal_revolutions(card, form.propulsion.nominal_radps if form.propulsion else None)
-    # X_nn, the effect of revolutions on surge, is that of the propeller's own equations.
+    # X_nn, the effect of revolutions on surge, comes from the propeller's own equations.
     return replace(card, propulsion=Propulsion(nominal_radps=nominal, Xnn=0.0))
 
 

@@ -97,7 +97,7 @@ mass in prime for prime II is off by the ratio of length to draught, 10 to 25.""
 
 
 def _refuse_other_mass(form: ShipCard, body: RigidBody, source: str) -> None:
-    """Raise InputError if the mass is not that of the displacement, where the card states one."""
+    """Raise InputError if mass and displacement differ, where the card states both."""
     stated = form.ship.displacement_kg
     if stated is None:
         return

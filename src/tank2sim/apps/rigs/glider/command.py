@@ -51,7 +51,7 @@ def glide(
     roll_deg : float
         Roll of these glides, deg, + starboard side down.
     buoyancy_kg : float, optional
-        Size of the net buoyancy of these glides, kg; by default that of the card.
+        Size of the net buoyancy of these glides, kg; by default as on the card.
     reference_area_m2 : float, optional
         Reference area of the coefficients, m2, in place of the card's.
     programme : path or GlideProgramme, optional
