@@ -16,6 +16,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent / "static" / "pages"
 LIVE = Path(__file__).parent / "live" / "pages"
+EXAMPLES = Path(__file__).parent / "examples"
 PAGES = {
     "turn": "simulate mariner-nominal --manoeuvre turn:35",
     "zigzag": "simulate kvlcc2-l7 --manoeuvre zigzag:-10/10 --members 200",
@@ -26,6 +27,7 @@ PAGES = {
     "compare": "compare mariner mariner-nominal",
     "poster": "poster esso-osaka-ship",
     "pilotcard": "pilotcard esso-osaka-ship",
+    "trials": "trials trial --ship mariner --notes trial/notes.toml",
     "craft": "autopilot otter",
     "guess": "guess --length 320 --beam 58 --draught 20.8 --block 0.81 --speed 15.5 -o guessed.toml",
     "design": "design mariner --hours 40 --carriage-length 240",
@@ -48,6 +50,7 @@ def main() -> int:
     for folder in (FOLDER, LIVE):
         folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
+        subprocess.run([sys.executable, EXAMPLES / "make_sea_trial.py", Path(name) / "trial"], check=True)
         for stem, command in PAGES.items():
             page, picture = LIVE / f"{stem}.html", FOLDER / f"{stem}.png"
             program = Path(sys.executable).with_name("tank2sim")

@@ -82,6 +82,13 @@ def _identify(folder: Path) -> Result:
     return t2s.identify("mariner", _trials(folder), holdout=folder / "turn.csv", method="equation_error", members=3)
 
 
+def _sea_trial(folder: Path) -> Result:
+    for rudder in (35, -35):
+        t2s.load("mariner").turn(rudder, duration_s=700.0).to_csv(folder / f"turn{rudder}.csv")
+    records = sorted(folder.glob("turn*.csv"))
+    return t2s.trial_office(records, ship="mariner", members=2, draught_fore_m=5.0, draught_aft_m=6.0)
+
+
 def _gap(found: Callable[[], Gap]) -> Result:
     return gap_result(found(), NO_TRIALS, NO_TRIALS)
 
@@ -138,6 +145,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "stability of an ensemble": lambda _: t2s.load("kvlcc2-captive").stability(spirals=False, members=3),
     "stability with small probabilities": lambda _: t2s.load("mariner").stability(spirals=False, members=200),
     "steer": lambda _: _page_to_steer(),
+    "trials": _sea_trial,
     "tow": lambda _: _tow(),
     "tow of one term": lambda _: _tow(terms="B3", length_m=3.8, start_delay=True),
     "validate": lambda folder: t2s.validate("mariner", _trials(folder), members=3),

@@ -51,6 +51,8 @@ from .apps.steering_cards.command import (
 )
 from .apps.steering_cards.result import SteeringModelsResult as SteeringModelsResult
 from .apps.steering_cards.tuning_result import TurnTuningResult as TurnTuningResult
+from .apps.trial_office.command import trial_office as trial_office
+from .apps.trial_office.result import TrialOfficeResult as TrialOfficeResult
 from .errors import InputError as InputError
 from .results.audit import AuditResult as AuditResult
 from .results.autopilot import AutopilotResult as AutopilotResult

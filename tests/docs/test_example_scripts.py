@@ -17,6 +17,7 @@ WRITTEN = {
     "autopilot": ["stability.html", "ap.html", "ap.fmu", "tuned.toml"],
     "bridge": ["poster.html", "pilot.html", "zigzag.html", "report.html", "compare.html"],
     "glider_and_yaw_rig": ["glide.html", "glider.fmu", "ship.toml"],
+    "sea_trials": ["report/report.html", "report/report.pdf", "report/form.html", "report/full-load.toml"],
     "simulator": ["mariner.fmu", "ship.fmu", "mariner.ssp"],
     "towing_tank": ["vehicle.fmu", "model.toml", "model.covariance.json", "from_tank.toml"],
     "trials": ["found.toml", "identified.html", "gap/improved.toml"],

@@ -29,7 +29,7 @@ from tank2sim.plugins import PluginWarning
 
 GROUPS = {
     "Measure": ("design", "log", "run", "reduce", "tow", "yaw", "audit", "signals"),
-    "Identify": ("identify", "gap", "guess", "validate", "compare"),
+    "Identify": ("identify", "gap", "guess", "validate", "compare", "trials"),
     "Study": ("simulate", "stability", "autopilot", "influence", "glide"),
     "Export": ("convert", "convention", "export", "check"),
     "Show": ("ships", "poster", "pilotcard", "steer", "report", "open", "demo"),

@@ -22,7 +22,7 @@ from tank2sim.api.commands import variants_of
 from tank2sim.api.verbs import Output, Verb, Written
 from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
-from tank2sim.files import JSON, PAGE, PICTURE, STANDARD_OUTPUT, refuse_doubled, refuse_other_ending, writable_folder
+from tank2sim.files import JSON, PAGE, PICTURE, STANDARD_OUTPUT, folder_made, refuse_doubled, refuse_other_ending
 from tank2sim.units import in_words
 
 
@@ -209,8 +209,9 @@ def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str
     if _is_of("Vessel", kind):
         change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
                          "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
-        if one.default is not inspect.Parameter.empty:
-            return [_option([f"--{one.name}"], metavar="CARD", help=helps.get(one.name))]
+        required = one.default is inspect.Parameter.empty
+        if not required or one.kind is one.KEYWORD_ONLY:
+            return [_option([f"--{one.name}"], metavar="CARD", required=required, help=helps.get(one.name))]
         usual = verb.default_ship or None
         card = "[CARD]" if usual else "CARD"
         usually: dict[str, Any] = {"default": usual} if usual else {}
@@ -312,12 +313,15 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
 
     values, changes = dict(given), given.get("set", ())
     named = [_value_of(output, values) for output in verb.outputs]
-    outputs = [path for path in (*named, values["page"], values["json"]) if path is not None]
+    folders = [path for output, path in zip(verb.outputs, named, strict=True) if path and output.endings == ()]
+    outputs = [path for path in (*named, values["page"], values["json"]) if path is not None and path not in folders]
     refuse_doubled(outputs)
     _refuse_unplaced(outputs, [values["plot"], *named])
     _refuse_idle(output for output, path in zip(verb.outputs, named, strict=True) if path is None)
     inputs: list[Path] = []
     with ExitStack() as stack:
+        for folder in folders:
+            stack.enter_context(folder_made(folder))
         call = _values_for(verb.function, values, verb.texts, changes, inputs)
         if "report" in inspect.signature(verb.function).parameters:
             call["report"] = stack.enter_context(showing_stages(verb.words))
@@ -333,8 +337,6 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
             options = _values_for(output.write, {name: values[name] for name in own}, {}, (), inputs)
             if "report" in inspect.signature(output.write).parameters:
                 options["report"] = stack.enter_context(showing_stages("writing"))
-            if output.endings == ():
-                writable_folder(path)
             made = output.write(result, path, **options)
             if not isinstance(made, Mapping):
                 result, made = made, made.files

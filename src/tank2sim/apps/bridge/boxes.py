@@ -15,6 +15,7 @@ from tank2sim.analysis.validation.ship_track import ShipTrack, quarter
 from tank2sim.apps.bridge.drawings import clock, knots, metres
 from tank2sim.apps.bridge.study import ORDERS_AHEAD, Bridge, Telegraph
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
 from tank2sim.units import KNOT_MPS
@@ -78,14 +79,19 @@ def conditions(bridge: Bridge, ballast: Bridge | None) -> tuple[str, str]:
 
 def draughts(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Draughts at which the data were obtained, and what else is of those draughts: a card has the mean one alone."""
-    ships = tuple(condition.card.ship if condition else None for condition in (bridge, ballast))
+    cards = [condition.card if condition else None for condition in (bridge, ballast)]
+    means = [mean_draught(card) if card else None for card in cards]
+    # Displacement and block coefficient of a card are those of its own draught.
+    ships = [
+        card.ship if card and mean == card.ship.draught_m else None for card, mean in zip(cards, means, strict=True)
+    ]
     rows = (
         Row("Forward", (None, None)),
         Row("Aft", (None, None)),
-        Row("Mean", tuple(_number(ship.draught_m, "m") if ship else None for ship in ships)),
+        Row("Mean", tuple(_number(mean, "m") for mean in means)),
         Row("Displacement", tuple(_tonnes(ship.displacement_kg) if ship else None for ship in ships)),
         Row("Block coefficient", tuple(_number(ship.block_coefficient, "") if ship else None for ship in ships)),
-        Row("Trial / estimated", tuple("estimated" if ship else None for ship in ships)),
+        Row("Trial / estimated", tuple("estimated" if card else None for card in cards)),
     )
     return Box("Draught of the manoeuvring data", rows, conditions(bridge, ballast))
 

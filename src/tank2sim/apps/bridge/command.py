@@ -153,11 +153,12 @@ def _check_ballast(loaded: ManoeuvringCard, ballast: ManoeuvringCard) -> tuple[N
         It is of a ship of another length or breadth, or its draught is not smaller.
     """
     from tank2sim.analysis.validation.comparison import differences_of_size
+    from tank2sim.dynamics.effects.loading import mean_draught
 
     remedy = "give the card of the same ship in ballast, of the same size"
     if apart := differences_of_size(loaded, ballast):
         raise InputError(ballast.source, "ship", f"is not of the ship of {loaded.source}: {'; '.join(apart)}", remedy)
-    deep, light = loaded.ship.draught_m, ballast.ship.draught_m
+    deep, light = mean_draught(loaded), mean_draught(ballast)
     if deep is None or light is None:
         return (
             Notice("ballast: one of the cards states no draught: whether it is the lighter condition is not known"),

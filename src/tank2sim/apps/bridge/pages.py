@@ -14,6 +14,7 @@ from tank2sim.apps.bridge import boxes
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawing
 from tank2sim.apps.bridge.study import SHALLOW, Bridge
+from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.notices import Notice
 from tank2sim.version import __version__
 
@@ -154,7 +155,7 @@ def _turning_title(bridge: Bridge, where: str) -> str:
 
 def _draught(bridge: Bridge) -> str:
     """The card's draught: the present one is another."""
-    draught = bridge.card.ship.draught_m
+    draught = mean_draught(bridge.card)
     return "" if draught is None else f" mean draught {draught:.4g} m,"
 
 

@@ -21,6 +21,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
+from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
@@ -228,14 +229,15 @@ def squat_of(card: ManoeuvringCard) -> tuple[Squat, ...]:
     Speeds of a depth Froude number above 0.7, for which the formulas are not made, are left out.
     """
     ship, gravity = card.ship, card.environment.gravity_mps2
-    if ship.draught_m is None or ship.beam_m is None or ship.block_coefficient is None:
+    draught = mean_draught(card)
+    if draught is None or ship.beam_m is None or ship.block_coefficient is None:
         return ()
-    volume = ship.block_coefficient * ship.length_m * ship.beam_m * ship.draught_m
+    volume = ship.block_coefficient * ship.length_m * ship.beam_m * draught
     speed = SQUAT_SPEED * card.model.speed_mps
     found = []
     for under_keel in UNDER_KEEL:
-        clearance = under_keel * ship.draught_m
-        square = speed**2 / (gravity * (ship.draught_m + clearance))
+        clearance = under_keel * draught
+        square = speed**2 / (gravity * (draught + clearance))
         if square <= LARGEST_DEPTH_FROUDE**2:
             sizes = barrass_squat(ship.block_coefficient, speed), icorels_squat(volume, ship.length_m, square)
             found.append(Squat(clearance, speed, max(sizes)))
@@ -299,7 +301,7 @@ def _telegraph(ship: TrialShip, orders: Mapping[str, float] | None) -> tuple[Tel
 
 def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
     """Inputs in deep and in shallow water; shallow only where the card has the effect and a draught."""
-    draught = ship.card.ship.draught_m
+    draught = mean_draught(ship.manoeuvring)
     if "water.depth" not in ship.model.input_names or draught is None:
         return {"deep": {}}
     return {"deep": {"water.depth": DEEP * draught}, "shallow": {"water.depth": SHALLOW * draught}}

@@ -33,6 +33,17 @@ EMERGED = 0.3
 less: the blades come out of the water. Project choice."""
 
 
+def mean_draught(card: ManoeuvringCard) -> float | None:
+    """Return the mean draught of a card's ship, m: that of its effect ``loading``, else its own; None without either.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    """
+    loaded = (entry.parameters for entry in card.effects if entry.name == LOADING.name)
+    return next((one["mean_draught_m"] for one in loaded), card.ship.draught_m)
+
+
 def waterplane_inertia(block: float) -> float:
     """Return I_L/(B L^3) of the waterplane about its transverse axis: 0.350 C_WP^2 - 0.405 C_WP + 0.146.
 

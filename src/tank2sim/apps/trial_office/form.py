@@ -1,0 +1,150 @@
+"""The form for reporting trials to IMO (MSC/Circ.1053), as boxes of rows; a value that is not known is a blank."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import jinja2
+from markupsafe import Markup
+
+from tank2sim.analysis.stability.imo import (
+    ADVANCE,
+    FIRST_OF_TEN,
+    FIRST_OF_TWENTY,
+    INITIAL,
+    SECOND_OF_TEN,
+    TACTICAL,
+    TRACK_REACH,
+)
+from tank2sim.answer.numbers import format_number
+from tank2sim.answer.page import resource_text
+from tank2sim.apps.bridge.boxes import Box, Row
+from tank2sim.apps.trial_office.study import TrialOffice
+from tank2sim.version import __version__
+
+_BEAUFORT = (0.3, 1.6, 3.4, 5.5, 8.0, 10.8, 13.9, 17.2, 20.8, 24.5, 28.5, 32.7)
+"""Least mean wind of Beaufort 1, 2, ..., m/s (World Meteorological Organization)."""
+
+_ROWS = {
+    ADVANCE: "Turning circle: advance, ship lengths",
+    TACTICAL: "Turning circle: tactical diameter, ship lengths",
+    FIRST_OF_TEN: "10/10 zigzag: first overshoot, deg",
+    SECOND_OF_TEN: "10/10 zigzag: second overshoot, deg",
+    FIRST_OF_TWENTY: "20/20 zigzag: first overshoot, deg",
+    INITIAL: "Initial turning: distance to 10 deg with 10 deg of rudder, ship lengths",
+    TRACK_REACH: "Stopping, full astern: track reach, ship lengths",
+}
+
+
+def form_boxes(study: TrialOffice) -> tuple[Box, ...]:
+    """Return the blocks of the form; PORT and STBD of a zigzag are the side of the first execute.
+
+    Parameters
+    ----------
+    study : TrialOffice
+    """
+    words, sizes, state = study.form, study.particulars, study.state
+    head = {"Administration": words.administration, "Reference no.": words.reference}
+    ship: Mapping[str, str | float | None] = {
+        "Ship type": words.ship_type,
+        "L/V, s": sizes.length_over_speed_s,
+        "L/B": sizes.length_over_beam,
+        "B/T": sizes.beam_over_draught,
+        "Block coefficient": sizes.block_coefficient,
+        "Rudder type": words.rudder_type,
+        "Total rudder area over L T": sizes.rudder_area_share,
+        "Number of rudders": words.rudders,
+        "Propeller type": words.propeller_type,
+        "Number of propellers": words.propellers,
+        "Engine type": words.engine_type,
+        "Trim, m by the stern": state.trim_m,
+        "Ballast condition": words.ballast_condition,
+    }
+    depth = study.depth_m and study.depth_m / state.draught_m
+    wind = state.wind_speed_mps
+    weather: Mapping[str, str | float | None] = {
+        "Water depth over trial draught": depth,
+        "Wind: Beaufort number": None if wind is None else sum(wind >= least for least in _BEAUFORT),
+        "Wave: sea state": study.sea_state,
+    }
+    tested = study.tested_at_full_load
+    condition = Box(
+        "Manoeuvring data: loading condition",
+        (
+            Row("Tested at full load", ("[x]" if tested else "[ ]",)),
+            Row("Tested at partial load and corrected", ("[ ]" if tested else "[x]",)),
+        ),
+    )
+    data = Box("Manoeuvring data", tuple(_data_rows(study)), ("PORT", "STBD", "Criterion"))
+    return (
+        Box("Report", _rows(head)),
+        Box("Ship data (full load condition)", _rows(ship)),
+        Box("Trials data (environmental condition)", _rows(weather)),
+        condition,
+        data,
+        Box("Remarks", (Row(None if not words.remarks else words.remarks, ()), *_remarks(study))),
+    )
+
+
+def _rows(values: Mapping[str, str | float | None]) -> tuple[Row, ...]:
+    return tuple(Row(label, (_text(value),)) for label, value in values.items())
+
+
+def _text(value: str | float | None) -> str | None:
+    if value is None or value == "":
+        return None
+    return value if isinstance(value, str) else format_number(float(value), 4)
+
+
+def _data_rows(study: TrialOffice) -> list[Row]:
+    rows = []
+    for criterion in study.criteria:
+        sides: dict[str, float] = {}
+        for one in criterion.sides:
+            value = one.full_load if one.full_load is not None or not study.tested_at_full_load else one.as_run
+            if value is not None:
+                sides[one.side] = max(value, sides.get(one.side, -math.inf))
+        limit = format_number(criterion.allowed, 3)
+        if criterion.name == TRACK_REACH:
+            shown = _text(next(iter(sides.values()), None))
+            rows.append(Row(_ROWS[criterion.name], (shown, shown and "", f"{limit} to 20")))
+        else:
+            rows.append(Row(_ROWS[criterion.name], (_text(sides.get("port")), _text(sides.get("starboard")), limit)))
+    return rows
+
+
+def _remarks(study: TrialOffice) -> list[Row]:
+    """What the form has no row for: current, wind, correction, and uncertainty."""
+    rows = []
+    if study.current is not None:
+        text = f"{study.current.speed_mps:.2f} m/s towards {study.current.towards_deg:.0f} deg, taken off"
+        rows.append(Row("Current", (text,)))
+    if study.state.wind_speed_mps is not None:
+        rows.append(Row("Wind", (f"{study.state.wind_speed_mps:.1f} m/s, by the model",)))
+    if not study.tested_at_full_load:
+        rows.append(Row("Correction to full load", ("R = T F/B (MSC/Circ.1053), F and B simulated; annex",)))
+    if not study.applies:
+        rows.append(Row("Application", ("L < 100 m: MSC.137(76) does not bind",)))
+    return rows
+
+
+def form_page(study: TrialOffice) -> str:
+    """Return the form as an HTML page that prints on A4.
+
+    Parameters
+    ----------
+    study : TrialOffice
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    environment.trim_blocks = environment.lstrip_blocks = True
+    return environment.get_template("trial_office/form.html.j2").render(
+        version=__version__,
+        style=Markup(resource_text("apps/bridge/sheet.css")),
+        name=study.ship,
+        source=study.source,
+        place=", ".join(part for part in (study.place, study.date) if part),
+        boxes=form_boxes(study),
+    )

@@ -1,0 +1,189 @@
+"""The ship as tried and at full load: cards, members of the ensemble, and R = T F/B (MSC/Circ.1053, 3.4.1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.analysis.validation.standard_trials import SEED, members
+from tank2sim.apps.trial_office.conditions import TrialState
+from tank2sim.apps.trial_office.tried import Tried, calm_run, simulated
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.effects.loading import BY_REGRESSION
+from tank2sim.dynamics.effects.particulars import model_particular
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
+from tank2sim.notices import Notice
+from tank2sim.simulation.card_range import Numbers, single_figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.recorded import steerable
+
+FORMULA_ERROR = 0.15
+"""Standard error of the change of a derivative with draught and trim, over that change. Project choice: half the
+scatter of Clarke's regressions between ships (30 %), for a ship keeps most of its own deviation at another draught."""
+
+SMALLEST = 1e-3
+"""Figure or ratio below which it says nothing. Project choice."""
+
+_SIGMAS = (0.158655, 0.841345)
+
+
+def deviation(values: Array) -> float:
+    """Standard deviation (n,) by the quantiles of a normal one, robust to a few diverging members.
+
+    Parameters
+    ----------
+    values : array (n,)
+    """
+    return float(np.diff(np.quantile(values, _SIGMAS))[0] / 2) if len(values) > 1 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class TriedShips:
+    """The ship as tried and at full load, ready to run, with the parameters of the members of the ensemble."""
+
+    as_tried: ManoeuvringCard
+    full_load: ManoeuvringCard
+    tried: Integrator
+    full: Integrator
+    drawn: tuple[tuple[dict[str, float], dict[str, float]], ...]
+
+
+def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[TriedShips, list[Notice]]:
+    """The ship in both conditions, and members with the errors of the card and of the formulas for the loading."""
+    own = model_particular(card, "draught_m")
+    listed = {entry.name for entry in card.effects}
+    loadings = {"tried": (state.draught_m, state.trim_m), "full": (state.full_load_draught_m, 0.0)}
+    if state.at_full_load:
+        loadings["tried"] = loadings["full"]
+    cards = {}
+    for name, (draught, trim) in loadings.items():
+        entries: list[Found] = []
+        if not math.isclose(draught, own, rel_tol=1e-6) or abs(trim) > 1e-6:
+            if "loading" in listed:
+                raise card.fault("effects", "has the effect loading already", "give the card of one loading condition")
+            entries.append(("loading", {"mean_draught_m": draught, "trim_m": trim}, {}))
+        if name == "tried" and state.wind_speed_mps and state.wind_from_rad is not None and "wind" not in listed:
+            entries.append(("wind", {}, {}))
+        cards[name] = add_effects_to_card(card, entries) if entries else card
+    models = {name: build(steerable(one)) for name, one in cards.items()}
+    drawn, messages = members(cards["tried"], models["tried"], count)
+    changes = {name: math.hypot(draught / own - 1, trim / own) for name, (draught, trim) in loadings.items()}
+
+    def both(number: int, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+        errors = np.random.default_rng([SEED, number]).standard_normal(len(BY_REGRESSION))
+        first, second = (_with_formula_errors(values, models[name], errors, changes[name]) for name in loadings)
+        return first, second
+
+    ships = TriedShips(
+        cards["tried"],
+        cards["full"],
+        Integrator(models["tried"]),
+        Integrator(models["full"]),
+        tuple(both(*numbered) for numbered in enumerate(drawn)),
+    )
+    return ships, list(messages)
+
+
+def _with_formula_errors(values: Mapping[str, float], model: Model, errors: Array, change: float) -> dict[str, float]:
+    """Parameters of a member with other linear derivatives, by the error of the formulas for the loading."""
+    own = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    found = {name: value for name, value in values.items() if name in own}
+    for name, error in zip(BY_REGRESSION, errors, strict=True):
+        full_name = f"derivatives.{name}"
+        if change and full_name in own:
+            found[full_name] = found.get(full_name, own[full_name]) * (1 + FORMULA_ERROR * change * error)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Simulated figures of a manoeuvre: as tried with the wind (B), as tried in calm water, and at full load (F).
+
+    Parameters
+    ----------
+    tried, calm, full : mapping
+        By the card itself.
+    ratios : mapping
+        Logarithm of F/B of each member (n,), where it has both.
+    """
+
+    tried: Numbers
+    calm: Numbers
+    full: Numbers
+    ratios: Mapping[str, Array]
+
+    def at_full_load(self, one: Tried, name: str) -> tuple[float, float] | None:
+        """R = T F/B and the standard error of its logarithm; None where one is not known.
+
+        Parameters
+        ----------
+        one : Tried
+            The manoeuvre without the current.
+        name : str
+        """
+        measured, before, after = one.figures.get(name), self.tried.get(name), self.full.get(name)
+        if measured is None or before is None or after is None or min(before, after, measured) <= SMALLEST:
+            return None
+        ratios = self.ratios.get(name, np.zeros(0))
+        spread = deviation(ratios)
+        return measured * after / before, math.hypot(spread, one.errors.get(name, 0.0) / measured)
+
+
+def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_full_load: bool) -> Prediction:
+    """Simulate a manoeuvre in both conditions, also by the members.
+
+    Parameters
+    ----------
+    one : Tried
+        Without the current.
+    ships
+    wind : mapping
+        Inputs of the wind.
+    at_full_load : bool
+        Whether the trial itself counts as at full load: F then differs from B by the wind alone.
+    """
+    if at_full_load and not wind:
+        return Prediction(one.figures, one.figures, one.figures, {})
+    speed = one.speed_mps if at_full_load else ships.full_load.model.speed_mps
+
+    def both(values: tuple[Mapping[str, float], Mapping[str, float]]) -> tuple[Numbers, Numbers]:
+        before = _run(lambda: simulated(one, ships.tried, wind, values[0]))
+        return before, _run(lambda: single_figures(calm_run(one, ships.full, speed, values[1]).figures))
+
+    before, after = both(({}, {}))
+    calm = _run(lambda: simulated(one, ships.tried, {}, {})) if wind else before
+    ratios: dict[str, list[float]] = {}
+    for values in ships.drawn:
+        first, second = both(values)
+        for name in first.keys() & second.keys():
+            if min(first[name], second[name]) > SMALLEST:
+                ratios.setdefault(name, []).append(math.log(second[name] / first[name]))
+    return Prediction(before, calm, after, {name: np.array(values) for name, values in ratios.items()})
+
+
+def _run(simulation: Callable[[], Numbers]) -> Numbers:
+    """Figures of a simulation; none of one that leaves all bounds."""
+    try:
+        return simulation()
+    except InputError:
+        return {}
+
+
+def loading_validity(ships: TriedShips) -> float:
+    """The least of both conditions."""
+    found = [1.0]
+    for integrator in (ships.tried, ships.full):
+        model = integrator.model
+        name = "validity_by.loading"
+        if name in model.outputs:
+            p = model.parameter_values()
+            y = np.array(model.output(model.initial(p), model.input_values(), p)).ravel()
+            found.append(float(y[model.outputs.index(name)]))
+    return min(found)

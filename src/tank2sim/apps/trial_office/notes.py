@@ -1,0 +1,139 @@
+"""The notes of a trial master, next to the records: loading, depth, weather, engine, and rows of the form."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from tank2sim.cards.form import CardSection
+from tank2sim.cards.form_faults import form_fault
+from tank2sim.cards.reading import parsed_toml
+from tank2sim.errors import InputError, close_name
+from tank2sim.files import read_text
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
+
+_Draught = Annotated[float, Field(gt=0, le=50)]
+_Speed = Annotated[float, Field(gt=0, le=50)]
+_Words = Annotated[str, Field(max_length=200)]
+
+REPORTED = (
+    *("advance_m", "transfer_m", "tactical_diameter_m", "time_90_s", "time_180_s"),
+    *("overshoot_1_deg", "overshoot_2_deg", "initial_turning_distance_m"),
+    *("track_reach_m", "head_reach_m", "side_reach_m", "time_to_stop_s"),
+)
+"""Figures of the report."""
+
+
+class FormWords(CardSection):
+    """``[form]``: rows of the form that only words fill."""
+
+    administration: _Words = ""
+    reference: _Words = ""
+    ship_type: _Words = ""
+    rudder_type: _Words = ""
+    rudders: _Words = ""
+    propeller_type: _Words = ""
+    propellers: _Words = ""
+    engine_type: _Words = ""
+    ballast_condition: _Words = ""
+    remarks: _Words = ""
+
+
+class TrialNotes(CardSection):
+    """Notes of a trial; None for what was not recorded.
+
+    Parameters
+    ----------
+    draught_fore_m, draught_aft_m
+        Draughts of the trial; by default that of the card, on even keel.
+    full_load_draught_m
+        Draught at full load, even keel; by default that of the card.
+    depth_m
+        Depth of the water.
+    wind_speed_mps, wind_from_deg
+        True wind, where the records have none: its mean speed, and where it comes from, clockwise from north.
+    sea_state
+        By the code of the WMO.
+    speed_85_mcr_mps
+        Speed at 85 % of the largest continuous output of the engine.
+    engine_untouched
+        Whether the setting of the engine was left alone during turns and zigzags.
+    place, date
+        Where and when.
+    form
+        Words for the form.
+    figures
+        Manoeuvre (``turn:35``, ``zigzag:-10/10``, ``stop``) to figures by name with unit, of trials without a record.
+    """
+
+    format: Literal["tank2sim-trials/1"] = "tank2sim-trials/1"
+    draught_fore_m: _Draught | None = None
+    draught_aft_m: _Draught | None = None
+    full_load_draught_m: _Draught | None = None
+    depth_m: Annotated[float, Field(gt=0, le=20_000)] | None = None
+    wind_speed_mps: Annotated[float, Field(ge=0, le=60)] | None = None
+    wind_from_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
+    sea_state: Annotated[int, Field(ge=0, le=9)] | None = None
+    speed_85_mcr_mps: _Speed | None = None
+    engine_untouched: bool | None = None
+    place: _Words = ""
+    date: _Words = ""
+    form: FormWords = FormWords()
+    figures: dict[str, dict[str, float]] = Field(default_factory=dict)
+
+
+def read_notes(path: str | Path) -> TrialNotes:
+    """Read notes from a TOML file with the keys of :class:`TrialNotes`.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or a key is unknown or out of its bounds.
+    """
+    return _checked(parsed_toml(read_text(Path(path)), path), path)
+
+
+def notes_with(notes: TrialNotes, **options: object) -> TrialNotes:
+    """Return notes with the options that are given (not None) in place of theirs.
+
+    Parameters
+    ----------
+    notes : TrialNotes
+    **options
+        Values by the names of fields.
+
+    Raises
+    ------
+    InputError
+        One is out of its bounds, or contradicts the notes.
+    """
+    given = {name: value for name, value in options.items() if value is not None}
+    return _checked({**notes.model_dump(exclude_unset=True), **given}, "trials")
+
+
+def _checked(content: dict[str, Any], source: str | Path) -> TrialNotes:
+    try:
+        notes = TrialNotes.model_validate(content)
+    except ValidationError as fault:
+        raise form_fault(fault, source, {}, form=TrialNotes, what="notes of a trial") from None
+    for given, missing in _PAIRS:
+        for one, other in ((given, missing), (missing, given)):
+            if getattr(notes, one) is not None and getattr(notes, other) is None:
+                raise InputError(source, other, f"is missing next to {one}", "give both, or neither")
+    for words in notes.figures:
+        try:
+            known = isinstance(parse_manoeuvre(words), Turn | Zigzag | Stop)
+        except InputError:
+            known = False
+        if not known:
+            remedy = "give turn:35, zigzag:10/10 or stop, with - before the rudder for port"
+            raise InputError(source, f"figures.{words}", "is not a turn, a zigzag or a stop", remedy)
+        for name in notes.figures[words]:
+            if name not in REPORTED:
+                raise InputError(source, f"figures.{words}.{name}", "is not a figure", close_name(name, REPORTED))
+    return notes
+
+
+_PAIRS = ("draught_fore_m", "draught_aft_m"), ("wind_speed_mps", "wind_from_deg")

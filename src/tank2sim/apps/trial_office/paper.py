@@ -1,0 +1,109 @@
+"""The report on paper: the form for reporting to IMO on its first page, and the annex with methods and figures."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from tank2sim.answer.parts import cell_text
+from tank2sim.apps.trial_office.form import form_boxes
+from tank2sim.errors import InputError
+from tank2sim.version import __version__
+
+if TYPE_CHECKING:
+    from fpdf import FPDF
+
+    from tank2sim.answer.parts import Section
+    from tank2sim.answer.result import Result
+    from tank2sim.apps.trial_office.study import TrialOffice
+
+_WIDTH_MM = 180.0
+
+
+def report_pdf(result: Result[TrialOffice]) -> bytes:
+    """Return the report as PDF, A4: the form, and the sections of the page as its annex.
+
+    Parameters
+    ----------
+    result : Result of a TrialOffice
+
+    Raises
+    ------
+    InputError
+        The library that writes PDF is not installed.
+    """
+    try:
+        from fpdf import FPDF
+    except ImportError:
+        remedy = "install it with: pip install 'tank2sim[paper]'"
+        raise InputError("report.pdf", "", "needs the library fpdf2, which is not installed", remedy) from None
+    study = result.study
+    pdf = FPDF(format="A4")
+    pdf.set_title(result.title)
+    pdf.set_creator(f"tank2sim {__version__}")
+    pdf.set_creation_date(datetime(2000, 1, 1, tzinfo=UTC))  # the same content gives the same bytes
+    pdf.set_margins(15, 12)
+    pdf.set_auto_page_break(True, 12)
+    pdf.add_page()
+    _heading(pdf, "Form for reporting manoeuvring data to IMO", 14)
+    _text(pdf, ", ".join(part for part in (study.ship, study.place, study.date) if part))
+    for box in form_boxes(study):
+        _heading(pdf, box.title, 10)
+        width = max(1, *(len(row.values) for row in box.rows), len(box.heads))
+        rows = [[row.label or "", *(str(value or "") for value in row.values)] for row in box.rows]
+        _table(pdf, ["", *box.heads], rows, [0.55] + [0.45 / width] * width)
+    pdf.add_page()
+    _heading(pdf, "Annex: methods, corrections, and uncertainty", 14)
+    for line in (*(notice.line for notice in result.cautions), *result.headline):
+        _text(pdf, line)
+    for section in result.sections[:-1]:
+        _section(pdf, section)
+    if result.notices:
+        _heading(pdf, "Notices", 11)
+        for notice in result.notices:
+            _text(pdf, notice.line)
+    return bytes(pdf.output())
+
+
+def _section(pdf: FPDF, section: Section) -> None:
+    """A section of the page, with its charts as pictures."""
+    from tank2sim.answer.charts.picture import chart_picture
+
+    _heading(pdf, section.heading, 11)
+    _text(pdf, section.text)
+    for one in section.tables:
+        _text(pdf, one.caption)
+        rows = [
+            [cell_text(cell, column.digits) for cell, column in zip(row, one.columns, strict=True)] for row in one.rows
+        ]
+        _table(pdf, one.heads, rows)
+    for illustration in section.charts:
+        pdf.image(io.BytesIO(chart_picture(illustration.chart, ".png")), w=0.8 * _WIDTH_MM)
+
+
+def _heading(pdf: FPDF, text: str, size: float) -> None:
+    pdf.set_font("Helvetica", "B", size)
+    pdf.ln(1.5)
+    pdf.multi_cell(0, 0.5 * size, _latin(text), new_x="LMARGIN", new_y="NEXT")
+
+
+def _text(pdf: FPDF, text: str) -> None:
+    if text:
+        pdf.set_font("Helvetica", size=8.5)
+        pdf.multi_cell(0, 4, _latin(text), new_x="LMARGIN", new_y="NEXT")
+
+
+def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[str]], shares: Sequence[float] = ()) -> None:
+    pdf.set_font("Helvetica", size=7.5)
+    columns = max(len(heads), *(len(row) for row in rows)) if rows else len(heads)
+    widths = tuple(shares) or None
+    with pdf.table(width=_WIDTH_MM, col_widths=widths, line_height=4, first_row_as_headings=any(heads)) as drawn:
+        for cells in ([heads] if any(heads) else []) + list(rows):
+            drawn.row([_latin(cell) for cell in (*cells, *[""] * (columns - len(cells)))])
+
+
+def _latin(text: str) -> str:
+    """The text in the letters of the standard fonts of PDF."""
+    return text.encode("latin-1", "replace").decode("latin-1")

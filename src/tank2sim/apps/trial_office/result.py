@@ -1,0 +1,243 @@
+"""Result of ``trials``: the report of a sea trial, its forms, and the cards of the ship in both conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.result import Result
+from tank2sim.apps.trial_office.study import TrialOffice
+from tank2sim.apps.trial_office.verdict import CriterionVerdict
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    from tank2sim.cards.card import ManoeuvringCard
+
+_VERDICTS = {"pass": Verdict.PASSED, "fail": Verdict.FAILED}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TrialOfficeResult(Result[TrialOffice]):
+    """The report of a sea trial.
+
+    Parameters
+    ----------
+    study : TrialOffice
+    as_tried, full_load : ManoeuvringCard, optional
+        Cards of the ship in both conditions; None if the result was read from its JSON.
+    """
+
+    study: TrialOffice
+    as_tried: ManoeuvringCard | None = None
+    full_load: ManoeuvringCard | None = None
+    command: ClassVar[str] = "trials"
+
+    @property
+    def title(self) -> str:
+        """The ship."""
+        return f"{self.study.ship}: sea trials"
+
+    @property
+    def subtitle(self) -> str:
+        """Place, date, and loading condition."""
+        study, state = self.study, self.study.state
+        condition = f"tried at {state.draught_m:.3g} m, full load {state.full_load_draught_m:.3g} m"
+        return ", ".join(part for part in (study.place, study.date, condition) if part)
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Verdicts at full load, and the corrections."""
+        study = self.study
+        tried = [one for one in study.criteria if one.as_run is not None]
+        passed = sum(one.verdict == "pass" for one in tried)
+        failed = [one for one in tried if one.verdict.startswith("fail")]
+        open_ones = [one for one in tried if one.verdict.startswith("undecided")]
+        lines = [
+            f"At full load in calm water, {passed} of {len(tried)} criteria of MSC.137(76) that were tried are met."
+        ]
+        for words, ones in (("Not met", failed), ("Undecided", open_ones)):
+            if ones:
+                lines.append(f"{words}: {'; '.join(_named(one) for one in ones)}.")
+        if (current := study.current) is not None:
+            how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
+            lines.append(f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}.")
+        if not study.applies:
+            lines.append("The ship is shorter than 100 m: the standards do not bind it.")
+        return tuple(lines)
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The criteria that were tried, at full load."""
+        return [
+            KeyFigure(
+                label=one.name,
+                value=one.full_load if one.full_load is not None else "undecided",
+                unit=one.unit if one.full_load is not None else "",
+                limit=one.allowed,
+                verdict=_VERDICTS.get(one.verdict, Verdict.CAUTION),
+                note=_chance(one),
+            )
+            for one in self.study.criteria
+            if one.as_run is not None
+        ]
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """Verdict, conditions, current, figures, and the form."""
+        return [self._verdicts(), self._conditions(), self._current(), self._figures(), self._form()]
+
+    def _verdicts(self) -> Section:
+        rows: list[list[Cell]] = [
+            [
+                *(
+                    f"{one.name} ({one.unit})",
+                    one.allowed,
+                    one.as_run,
+                    one.verdict_as_run,
+                    _share(one.probability_as_run),
+                ),
+                *(one.full_load, one.verdict, _share(one.probability)),
+            ]
+            for one in self.study.criteria
+        ]
+        heads = ("criterion", "allowed", "as run", "trial as run", "P as run", "full load", "ship at full load", "P")
+        return Section(
+            heading="Verdict",
+            text="The trial as it was run, and the ship at full load, on even keel, in calm water. The worse side "
+            "counts. P is the probability of meeting the criterion; between 0.05 and 0.95 it is undecided.",
+            tables=[table("Criteria of IMO MSC.137(76)", heads, rows, digits=3)],
+        )
+
+    def _conditions(self) -> Section:
+        rows: list[list[Cell]] = [
+            [one.name, one.required, one.found or None, str(one.met), one.source] for one in self.study.conditions
+        ]
+        heads = ("condition", "required", "found", "met", "source")
+        return Section(
+            heading="Conditions of the trial",
+            text="A condition that is not met refuses nothing. It belongs in the report.",
+            tables=[table("Conditions", heads, rows)],
+        )
+
+    def _current(self) -> Section:
+        study = self.study
+        rows: list[list[Cell]] = []
+        for one in study.drifts:
+            spread, residual = one.measured.spread_mps, one.measured.residual_m
+            wind = one.by_wind_north_mps, one.by_wind_east_mps
+            rows.append([one.trial, one.measured.north_mps, one.measured.east_mps, spread, residual, *wind])
+        heads = [
+            *("turn", "north (m/s)", "east (m/s)", "spread (m/s)", "residual of the circle (m)"),
+            *("by wind, north (m/s)", "by wind, east (m/s)"),
+        ]
+        charts = []
+        if study.tracks:
+            tracks = [
+                data
+                for one in study.tracks
+                for data in (
+                    TrackData(label=f"{one.trial}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
+                    TrackData(
+                        label=f"{one.trial}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m
+                    ),
+                )
+            ]
+            charts.append(Illustration(chart=track_chart(tracks, title="Turning circles"), caption="From the execute."))
+        tables = [table("Drift of the turning circles", heads, rows, digits=3)] if rows else []
+        return Section(
+            heading="Current and wind",
+            text="Positions one full turn apart show the drift of a circle (MSC/Circ.1053, 3.4.2). A constant wind "
+            "drifts it, too, with almost no spread, and to opposite sides for turns to port and starboard: the mean "
+            "of both sides is the current. A large residual of the circle shows the wind.",
+            tables=tables,
+            charts=charts,
+        )
+
+    def _figures(self) -> Section:
+        heads = ("record", "figure", "as run", "full load", "2.5 %", "97.5 %")
+        steps = ("record", "manoeuvre", "side", "figure", "without current", "standard error", "in calm water")
+        rows: list[list[Cell]] = []
+        by_step: list[list[Cell]] = []
+        for one in self.study.figures:
+            words, unit = in_words(one.name)
+            name = f"{words} ({unit})"
+            rows.append([one.trial, name, one.as_run, one.full_load, one.low, one.high])
+            by_step.append(
+                [one.trial, one.manoeuvre, one.side, name, one.without_current, one.error, one.calm],
+            )
+        return Section(
+            heading="Figures",
+            text="The wind is taken off by the model: times its figure in calm water over that in the wind. At full "
+            "load R = T F/B (MSC/Circ.1053): measured T, and simulated F at full load and B as tried, of the same "
+            "member of the ensemble, so that errors of both cancel.",
+            tables=[
+                table("Figures as run and at full load", heads, rows),
+                table("Corrections, step by step", steps, by_step, on_screen=False),
+            ],
+        )
+
+    def _form(self) -> Section:
+        from tank2sim.apps.trial_office.form import form_boxes
+
+        tables: list[Table] = []
+        for box in form_boxes(self.study):
+            width = max(len(row.values) for row in box.rows)
+            heads = ("", *(box.heads or [""] * width))
+            rows: list[list[Cell]] = [
+                [
+                    row.label,
+                    *(None if value is None else str(value) for value in row.values),
+                    *[""] * (width - len(row.values)),
+                ]
+                for row in box.rows
+            ]
+            tables.append(table(box.title, heads, rows, on_screen=False))
+        return Section(heading="Form for reporting to IMO", tables=tables, folded=True)
+
+    def files(self, folder: Path) -> dict[Path, str | bytes]:
+        """Return the files of the report by path: page, PDF, form, poster, pilot card, JSON, and both cards.
+
+        Parameters
+        ----------
+        folder : Path
+        """
+        from tank2sim.apps.bridge.command import make_pilot_card, make_poster
+        from tank2sim.apps.trial_office.form import form_page
+        from tank2sim.apps.trial_office.paper import report_pdf
+        from tank2sim.dynamics.vessel import Vessel
+
+        found: dict[Path, str | bytes] = {
+            folder / "report.html": self.page(),
+            folder / "form.html": form_page(self.study),
+            folder / "report.pdf": report_pdf(self),
+            folder / "trials.json": self.to_json(),
+        }
+        if self.as_tried is None or self.full_load is None:
+            return found
+        light = self.as_tried if self.study.state.draught_m < self.study.state.full_load_draught_m else None
+        ballast = None if self.study.tested_at_full_load else light
+        loaded, other = Vessel(self.full_load), Vessel(ballast) if ballast else None
+        found[folder / "poster.html"] = make_poster(loaded, ballast=other).page()
+        found[folder / "pilotcard.html"] = make_pilot_card(loaded, ballast=other).page()
+        for name, card in (("as-tried.toml", self.as_tried), ("full-load.toml", self.full_load)):
+            found |= card.files(folder / name)
+        return found
+
+
+def _share(probability: float | None) -> float | None:
+    return None if probability is None else round(probability, 3)
+
+
+def _named(one: CriterionVerdict) -> str:
+    return f"{one.name} ({_chance(one)})"
+
+
+def _chance(one: CriterionVerdict) -> str:
+    if one.probability is None:
+        return one.verdict
+    shown = "< 0.01" if one.probability < 0.01 else "> 0.99" if one.probability > 0.99 else f"= {one.probability:.2f}"
+    return f"{one.verdict}, P {shown}"

@@ -1,0 +1,477 @@
+"""From records of a sea trial to corrected figures, the ship at full load, and a verdict with its probability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.analysis.stability.imo import (
+    SHORTEST_SHIP_M,
+    TRIAL_RUDDER,
+)
+from tank2sim.analysis.stability.straight_line import stability
+from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
+from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
+from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
+from tank2sim.apps.trial_office.full_load import SMALLEST, Prediction, loading_validity, prediction, tried_ships
+from tank2sim.apps.trial_office.notes import REPORTED, FormWords, TrialNotes
+from tank2sim.apps.trial_office.tried import Tried, current_removed, tried
+from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict, judge_criteria
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.effects.particulars import model_particular
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.notices import Notice, caution
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
+from tank2sim.simulation.recorded import repeat, steerable
+
+_TRACK_POINTS = 400
+"""Points of a track in the JSON."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TurnDrift:
+    """Drift of a turn over the ground, as measured and by the model in the measured wind alone; to north and east."""
+
+    trial: str
+    side: str
+    measured: CircleDrift
+    by_wind_north_mps: float | None
+    by_wind_east_mps: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SiteCurrent:
+    """The current of the site.
+
+    Parameters
+    ----------
+    speed_mps, towards_deg : float
+    error_mps : float
+        Standard error of each component.
+    spread_mps : float or None
+        Largest root mean square of the pairs of a turn: a current that changes.
+    wind_share_mps : float or None
+        Half the difference of the two sides, as measured: the drift by the wind; None with one side.
+    separated : str
+        How the wind was separated: ``by both sides and the model``, ``by both sides``, ``by the model``; empty where it
+        was not.
+    """
+
+    speed_mps: float
+    towards_deg: float
+    error_mps: float
+    spread_mps: float | None
+    wind_share_mps: float | None
+    separated: str
+
+    @property
+    def vector(self) -> Array:
+        """North and east (2,), m/s."""
+        towards = math.radians(self.towards_deg)
+        return self.speed_mps * np.array([math.cos(towards), math.sin(towards)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfficeFigure:
+    """A figure of a trial.
+
+    Parameters
+    ----------
+    trial, manoeuvre, side, name : str
+    as_run : float
+    without_current : float
+        Of the track in water that rests.
+    error : float
+        Standard error of the reading, with that of the current.
+    calm : float or None
+        Also without the wind, by the model: times its figure in calm water over that in the wind.
+    full_load : float or None
+        At full load, on even keel, in calm water: R = T F/B.
+    low, high : float or None
+        95 % interval of that.
+    """
+
+    trial: str
+    manoeuvre: str
+    side: str
+    name: str
+    as_run: float
+    without_current: float
+    error: float
+    calm: float | None = None
+    full_load: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormParticulars:
+    """Numbers of the form's first block, full load; None where the card does not state what they need."""
+
+    length_over_speed_s: float
+    length_over_beam: float | None
+    beam_over_draught: float | None
+    block_coefficient: float | None
+    rudder_area_share: float | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OfficeTrack:
+    """Track of a turn from its execute, m: as run, and in water that rests."""
+
+    trial: str
+    x_m: Array
+    y_m: Array
+    x_without_current_m: Array
+    y_without_current_m: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialOffice:
+    """The report of a sea trial.
+
+    Parameters
+    ----------
+    ship, source : str
+    conditions : tuple of TrialCondition
+    state : TrialState
+    drifts : tuple of TurnDrift
+    current : SiteCurrent or None
+    figures : tuple of OfficeFigure
+    criteria : tuple of CriterionVerdict
+    tested_at_full_load : bool
+    loading_validity : float
+        Of the formulas that take the ship from the trial to full load: 1 where they hold, 0 where they do not.
+    stable_as_tried, stable_at_full_load : bool or None
+        Whether a straight course is stable, by the card.
+    particulars : FormParticulars
+    form : FormWords
+    tracks : tuple of OfficeTrack
+    members : int
+    place, date : str
+    depth_m : float or None
+    sea_state : int or None
+    applies : bool
+        Whether MSC.137(76) is for a ship of this length.
+    notices : tuple of Notice
+    """
+
+    ship: str
+    source: str
+    conditions: tuple[TrialCondition, ...]
+    state: TrialState
+    drifts: tuple[TurnDrift, ...]
+    current: SiteCurrent | None
+    figures: tuple[OfficeFigure, ...]
+    criteria: tuple[CriterionVerdict, ...]
+    tested_at_full_load: bool
+    loading_validity: float
+    stable_as_tried: bool | None
+    stable_at_full_load: bool | None
+    particulars: FormParticulars
+    form: FormWords
+    tracks: tuple[OfficeTrack, ...]
+    members: int
+    place: str
+    date: str
+    depth_m: float | None
+    sea_state: int | None
+    applies: bool
+    notices: tuple[Notice, ...]
+
+
+def study_trials(
+    card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes, count: int
+) -> tuple[TrialOffice, ManoeuvringCard, ManoeuvringCard]:
+    """Study the records of a sea trial; return the report, and the cards of the ship as tried and at full load.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    trials : sequence of Trial
+    notes : TrialNotes
+    count : int
+        Members of the ensemble.
+
+    Raises
+    ------
+    InputError
+        There is nothing to report, or the card lacks something that a loading condition needs.
+    """
+    plain = build(steerable(card))
+    as_run, messages = _recognised(trials, notes, plain)
+    if not as_run:
+        remedy = "give records of turns, zigzags or stops with heading and positions, or their figures in the notes"
+        raise InputError(trials[0].path if trials else "trials", "", "holds no manoeuvre of a sea trial", remedy)
+    state = _state(card, trials, notes)
+    ships, more = tried_ships(card, state, count)
+    winds = [_wind(one, state, ships.tried) for one in as_run]
+    drifts = tuple(
+        drift for one, wind in zip(as_run, winds, strict=True) if (drift := _drift(one, ships.tried, wind)) is not None
+    )
+    current = site_current(drifts) if drifts else None
+    still = as_run
+    if current is not None:
+        still = [current_removed(one, current.vector, current.error_mps, plain) for one in as_run]
+    predicted = [
+        prediction(one, ships, wind, at_full_load=state.at_full_load) for one, wind in zip(still, winds, strict=True)
+    ]
+    conditions = trial_conditions(state, notes, as_run)
+    validity = 1.0 if state.at_full_load else loading_validity(ships)
+    study = TrialOffice(
+        ship=card.ship.name,
+        source=card.source,
+        conditions=conditions,
+        state=state,
+        drifts=drifts,
+        current=current,
+        figures=tuple(figure for group in zip(as_run, still, predicted, strict=True) for figure in _figures(*group)),
+        criteria=judge_criteria(card, as_run, still, predicted, validity),
+        tested_at_full_load=state.at_full_load,
+        loading_validity=validity,
+        stable_as_tried=_stable(ships.as_tried),
+        stable_at_full_load=_stable(ships.full_load),
+        particulars=_particulars(card, state),
+        form=notes.form,
+        tracks=tuple(_track(*pair) for pair in zip(as_run, still, strict=True) if pair[0].drawn),
+        members=count,
+        place=notes.place,
+        date=notes.date,
+        depth_m=notes.depth_m,
+        sea_state=notes.sea_state,
+        applies=card.ship.length_m >= SHORTEST_SHIP_M,
+        notices=tuple(dict.fromkeys([*messages, *more, *_cautions(state, current, conditions, validity)])),
+    )
+    return study, ships.as_tried, ships.full_load
+
+
+def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tuple[list[Tried], list[Notice]]:
+    """The manoeuvres of records and of notes, and notices on records without one."""
+    found, messages = [], []
+    for trial in trials:
+        one = tried(trial, model)
+        if isinstance(one, str):
+            messages.append(Notice(f"no turn, zigzag or stop, for {one}: it is left out").of(trial.name))
+        else:
+            found.append(one)
+    speed = float(model.parameter_values()[model.parameter_names.index("ship.speed")])
+    for words, figures in notes.figures.items():
+        manoeuvre = parse_manoeuvre(words)
+        assert isinstance(manoeuvre, Turn | Zigzag | Stop)
+        errors = {
+            name: OVERSHOOT_ERROR_DEG if name.endswith("_deg") else TRIAL_ERROR * abs(value)
+            for name, value in figures.items()
+        }
+        found.append(Tried(None, manoeuvre, None, 0.0, speed, dict(figures), errors))
+    return found, messages
+
+
+def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) -> TrialState:
+    own = model_particular(card, "draught_m")
+    fore, aft = notes.draught_fore_m, notes.draught_aft_m
+    draught, trim = (own, 0.0) if fore is None or aft is None else ((fore + aft) / 2, aft - fore)
+    gear = card.steering_gear
+    speed = notes.wind_speed_mps
+    direction = None if notes.wind_from_deg is None else math.radians(notes.wind_from_deg)
+    measured = [trial.signals for trial in trials if {"wind_speed_mps", "wind_direction_rad"} <= set(trial.signals)]
+    if measured:
+        speed, direction = mean_wind(measured)
+    return TrialState(
+        draught_m=draught,
+        trim_m=trim,
+        full_load_draught_m=own if notes.full_load_draught_m is None else notes.full_load_draught_m,
+        length_m=card.ship.length_m,
+        largest_rudder_rad=min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER),
+        wind_speed_mps=speed,
+        wind_from_rad=direction,
+    )
+
+
+def _wind(one: Tried, state: TrialState, integrator: Integrator) -> dict[str, float]:
+    """Inputs of the wind in a trial, by its record or else the mean of all; empty without one."""
+    if "wind.speed" not in integrator.model.input_names:
+        return {}
+    signals = one.trial.signals if one.trial is not None else {}
+    if {"wind_speed_mps", "wind_direction_rad"} <= set(signals):
+        speed, direction = mean_wind([signals])
+    elif state.wind_speed_mps is not None and state.wind_from_rad is not None:
+        speed, direction = state.wind_speed_mps, state.wind_from_rad
+    else:
+        return {}
+    return {"wind.speed": speed, "wind.direction": direction}
+
+
+def mean_wind(records: Sequence[Mapping[str, Array]]) -> tuple[float, float]:
+    """Mean speed (m/s) and direction (rad, from) of the wind in records; of the direction that of its unit vectors.
+
+    Parameters
+    ----------
+    records : sequence of mapping
+        Signals ``wind_speed_mps`` and ``wind_direction_rad``.
+    """
+    speeds, directions = (
+        np.concatenate([signals[name] for signals in records]) for name in ("wind_speed_mps", "wind_direction_rad")
+    )
+    return float(np.nanmean(speeds)), float(np.angle(np.nanmean(np.exp(1j * directions))))
+
+
+def _drift(one: Tried, integrator: Integrator, wind: Mapping[str, float]) -> TurnDrift | None:
+    """The drift of a turn, and that of the model in the wind alone."""
+    measured = one.drift
+    if measured is None or one.record is None or one.trial is None:
+        return None
+    by_wind = None
+    if wind:
+        record = one.record
+        longer = replace(record, figures={}, inputs={**record.inputs, **wind})
+        run = repeat(longer, integrator).trajectory
+        by_wind = circle_drift(run.t, run["motion.x"], run["motion.y"], run["motion.psi"])
+    return TurnDrift(
+        trial=one.name,
+        side=one.side,
+        measured=measured,
+        by_wind_north_mps=by_wind.north_mps if by_wind else None,
+        by_wind_east_mps=by_wind.east_mps if by_wind else None,
+    )
+
+
+def site_current(drifts: Sequence[TurnDrift]) -> SiteCurrent:
+    """The current from the drifts of turns: their mean over both sides, without the wind's part.
+
+    A constant wind drifts the circles of the two sides apart, to opposite sides across itself: half their difference
+    is its part. With a measured wind the model's drift is taken off first, which is small against the mean of both.
+
+    Parameters
+    ----------
+    drifts : sequence of TurnDrift
+    """
+    measured: dict[str, list[Array]] = {}
+    left: dict[str, list[Array]] = {}
+    modelled = all(drift.by_wind_north_mps is not None for drift in drifts)
+    for drift in drifts:
+        measured.setdefault(drift.side, []).append(drift.measured.vector)
+        part = np.array([drift.by_wind_north_mps, drift.by_wind_east_mps]) if modelled else np.zeros(2)
+        left.setdefault(drift.side, []).append(drift.measured.vector - part)
+    sides = [np.mean(vectors, axis=0) for vectors in left.values()]
+    found = np.mean(sides, axis=0)
+    raw = [np.mean(vectors, axis=0) for vectors in measured.values()]
+    apart = 0.5 * (raw[0] - raw[-1]) if len(raw) > 1 else None
+    spreads = [drift.measured.spread_mps for drift in drifts if drift.measured.spread_mps is not None]
+    # Of turns of one side, and of the two sides after the model's part: what is left is not understood.
+    scatter = [vector - found for vectors in left.values() for vector in vectors]
+    unexplained = float(np.sqrt(np.mean(np.square(scatter)) / max(1, len(scatter) - 1))) if len(scatter) > 1 else 0.0
+    if len(raw) > 1 and not modelled:
+        unexplained = 0.0  # the two sides differ by the wind, which the mean does not hold
+    ways = {(True, True): "by both sides and the model", (True, False): "by both sides", (False, True): "by the model"}
+    return SiteCurrent(
+        speed_mps=float(np.hypot(*found)),
+        towards_deg=math.degrees(math.atan2(found[1], found[0])) % 360.0,
+        error_mps=math.hypot(max(spreads, default=0.0) / math.sqrt(2), unexplained),
+        spread_mps=max(spreads, default=None),
+        wind_share_mps=None if apart is None else float(np.hypot(*apart)),
+        separated=ways.get((len(raw) > 1, modelled), ""),
+    )
+
+
+def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
+    rows = []
+    for name in REPORTED:
+        if name not in raw.figures or name not in still.figures:
+            continue
+        value = still.figures[name]
+        shown = {}
+        if name in found.tried and name in found.calm and abs(found.tried[name]) > SMALLEST:
+            shown["calm"] = value * found.calm[name] / found.tried[name]
+        if (at_load := found.at_full_load(still, name)) is not None:
+            centre, error = at_load
+            shown |= {
+                "full_load": centre,
+                "low": centre * math.exp(-1.96 * error),
+                "high": centre * math.exp(1.96 * error),
+            }
+        rows.append(
+            OfficeFigure(
+                trial=raw.name,
+                manoeuvre=_words(raw.manoeuvre),
+                side=raw.side,
+                name=name,
+                as_run=raw.figures[name],
+                without_current=value,
+                error=still.errors.get(name, 0.0),
+                **shown,
+            )
+        )
+    return rows
+
+
+def _words(manoeuvre: Turn | Zigzag | Stop) -> str:
+    if isinstance(manoeuvre, Turn):
+        return f"turn {abs(math.degrees(manoeuvre.rudder)):.3g} deg"
+    if isinstance(manoeuvre, Zigzag):
+        return f"zigzag {abs(math.degrees(manoeuvre.rudder)):.2g}/{math.degrees(manoeuvre.heading):.2g}"
+    return "stop"
+
+
+def _stable(card: ManoeuvringCard) -> bool | None:
+    """Whether a straight course is stable at the card's speed; None where there is none."""
+    try:
+        return stability(build(card)).stable
+    except InputError:
+        return None
+
+
+def _particulars(card: ManoeuvringCard, state: TrialState) -> FormParticulars:
+    ship, draught = card.ship, state.full_load_draught_m
+    return FormParticulars(
+        length_over_speed_s=ship.length_m / card.model.speed_mps,
+        length_over_beam=ship.length_m / ship.beam_m if ship.beam_m else None,
+        beam_over_draught=ship.beam_m / draught if ship.beam_m else None,
+        block_coefficient=ship.block_coefficient,
+        rudder_area_share=ship.rudder_area_m2 / (ship.length_m * draught) if ship.rudder_area_m2 else None,
+    )
+
+
+def _track(raw: Tried, still: Tried) -> OfficeTrack:
+    parts = []
+    for one in (raw, still):
+        assert one.trial is not None
+        rows = one.trial.time_s >= one.begin_s
+        rows[np.flatnonzero(rows)[:: max(1, int(rows.sum()) // _TRACK_POINTS)]] = True
+        parts += [one.trial.signals[name][rows] for name in ("x_m", "y_m")]
+    return OfficeTrack(
+        trial=raw.name, x_m=parts[0], y_m=parts[1], x_without_current_m=parts[2], y_without_current_m=parts[3]
+    )
+
+
+def _cautions(
+    state: TrialState, current: SiteCurrent | None, conditions: Sequence[TrialCondition], validity: float
+) -> list[Notice]:
+    found = []
+    broken = [one.name for one in conditions if one.met is Met.NOT_MET]
+    if broken:
+        found.append(Notice(f"conditions not met: {', '.join(broken)}"))
+    if current is not None and not current.separated:
+        found.append(
+            caution(
+                "CURRENT AND WIND ARE NOT SEPARATED: the turns go to one side and no wind is known; the drift that is "
+                "taken off holds both"
+            )
+        )
+    if current is None:
+        found.append(Notice("no turn is long enough to show a current: none is taken off"))
+    if validity < LOADING_HOLDS:
+        found.append(
+            caution(
+                f"EXTRAPOLATED to full load: the formulas for the loading do not hold from {state.draught_m:.3g} m to "
+                f"{state.full_load_draught_m:.3g} m ({validity:.2f} of 1), and no criterion is certified"
+            )
+        )
+    return found

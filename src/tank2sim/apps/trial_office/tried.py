@@ -1,0 +1,228 @@
+"""Manoeuvres as they were tried: recognised, corrected for the current, with the errors of their figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.records.audit.noise import record_noise
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.card_range import Numbers, single_figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
+from tank2sim.simulation.recorded import POINT_ERROR, Recorded, recognise, repeat, straight_over_gaps
+from tank2sim.simulation.run import Run, simulate
+from tank2sim.units import from_si
+
+REVERSED = 0.1
+"""Share of the revolutions of the approach below which the engine counts as stopped or reversed. Project choice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A manoeuvre of a trial.
+
+    Parameters
+    ----------
+    trial : Trial
+        The record; of a manoeuvre whose figures alone are known there is none.
+    manoeuvre : Turn, Zigzag or Stop
+    record : Recorded or None
+        The recognised turn or zigzag.
+    begin_s : float
+        Time of the execute.
+    speed_mps : float
+        Speed of the approach.
+    figures : mapping
+        Figures by name with unit.
+    errors : mapping
+        Their standard errors by the reading of the record.
+    """
+
+    trial: Trial | None
+    manoeuvre: Turn | Zigzag | Stop
+    record: Recorded | None
+    begin_s: float
+    speed_mps: float
+    figures: Numbers
+    errors: Numbers
+
+    @property
+    def name(self) -> str:
+        """File of the record, or the manoeuvre."""
+        return self.trial.name if self.trial is not None else self.manoeuvre.words
+
+    @property
+    def side(self) -> str:
+        """``starboard`` or ``port``: that of the first rudder; empty for a stop."""
+        rudder = 0.0 if isinstance(self.manoeuvre, Stop) else self.manoeuvre.rudder
+        return "starboard" if rudder > 0 else "port" if rudder < 0 else ""
+
+    @property
+    def drawn(self) -> bool:
+        """Whether there is a track of a turn to draw."""
+        return self.trial is not None and isinstance(self.manoeuvre, Turn)
+
+    @property
+    def drift(self) -> CircleDrift | None:
+        """The drift of a turn; None of a short one, and of other manoeuvres."""
+        if self.trial is None or not isinstance(self.manoeuvre, Turn) or self.record is None:
+            return None
+        time, signals = self.trial.time_s, self.trial.signals
+        rows = (time >= self.begin_s) & (time <= self.record.end_s)
+        values = (straight_over_gaps(time, signals[name])[rows] for name in ("x_m", "y_m", "psi_rad"))
+        return circle_drift(time[rows], *values)
+
+
+def tried(trial: Trial, model: Model) -> Tried | str:
+    """Recognise a turn, a zigzag or a stop in a record, or say why it is none.
+
+    Parameters
+    ----------
+    trial : Trial
+        At the size of the ship.
+    model : Model
+        Model of the ship.
+    """
+    stop = _stop(trial, model)
+    if stop is not None:
+        return stop
+    found = recognise(trial, model)
+    if isinstance(found, str):
+        return found
+    figures, noise = single_figures(found.figures), record_noise(trial)
+    errors = {}
+    for name in figures:
+        read = from_si(name, found.reading_errors.get(name, 0.0))
+        white = noise.get("x_m", 0.0) if name.endswith("_m") else 0.0
+        if name.endswith("_deg"):
+            white = math.degrees(noise.get("psi_rad", 0.0))
+        errors[name] = math.hypot(read, white)
+    return Tried(trial, found.manoeuvre, found, found.begin_s, found.start["initial.u"], figures, errors)
+
+
+def current_removed(one: Tried, current: Array, error_mps: float, model: Model) -> Tried:
+    """The manoeuvre in water that rests: ``x'(t) = x(t) - V_c t`` from the execute on (MSC/Circ.1053, 3.4.2).
+
+    Parameters
+    ----------
+    one : Tried
+    current : array (2,)
+        North and east, m/s.
+    error_mps : float
+        Standard error of each component; it widens the errors of distances by its time.
+    model : Model
+        Model of the ship.
+    """
+    if one.trial is None or not {"x_m", "y_m"} <= set(one.trial.signals):
+        return one
+    after = one.trial.time_s - one.begin_s
+    moved = {name: one.trial.signals[name] - part * after for name, part in zip(("x_m", "y_m"), current, strict=True)}
+    again = tried(replace(one.trial, signals={**one.trial.signals, **moved}), model)
+    if isinstance(again, str) or type(again.manoeuvre) is not type(one.manoeuvre):
+        return one
+    errors = {
+        name: math.hypot(again.errors.get(name, 0.0), error_mps * _known_after(name, again.figures))
+        for name in again.figures
+        if name.endswith("_m")
+    }
+    return replace(again, errors={**again.errors, **errors})
+
+
+def _known_after(name: str, figures: Mapping[str, float]) -> float:
+    """Time from the execute at which a distance is read, s."""
+    by = {"advance_m": "time_90_s", "transfer_m": "time_90_s", "tactical_diameter_m": "time_180_s"}
+    by["initial_turning_distance_m"] = "initial_turning_time_s"
+    return figures.get(by.get(name, "time_to_stop_s"), 0.0)
+
+
+def simulated(one: Tried, integrator: Integrator, weather: Mapping[str, float], values: Mapping[str, float]) -> Numbers:
+    """Figures of the manoeuvre by a model from the same approach: in closed loop where it was recorded.
+
+    Parameters
+    ----------
+    one : Tried
+    integrator : Integrator
+        Of a :func:`.steerable` ship.
+    weather : mapping
+        Inputs of the model; without any, a calm approach.
+    values : mapping
+        Parameters of the model in place of its own.
+    """
+    if one.record is not None and weather:
+        record = replace(one.record, inputs={**one.record.inputs, **weather})
+        return single_figures(repeat(record, integrator, dict(values)).figures)
+    return single_figures(calm_run(one, integrator, one.speed_mps, values).figures)
+
+
+def calm_run(one: Tried, integrator: Integrator, speed_mps: float, values: Mapping[str, float]) -> Run:
+    """The same manoeuvre in calm water, from a straight approach at a speed.
+
+    Parameters
+    ----------
+    one : Tried
+    integrator : Integrator
+    speed_mps : float
+    values : mapping
+    """
+    start = {"initial.u": speed_mps}
+    gear = {}
+    if one.record is not None and one.record.rudder_rate_radps is not None:
+        gear = {"steering.max_rate": one.record.rudder_rate_radps}
+    known = {name: value for name, value in {**gear, **values, **start}.items() if name in integrator.model}
+    manoeuvre = one.manoeuvre
+    if isinstance(manoeuvre, Zigzag):
+        manoeuvre = replace(manoeuvre, course=None)
+    return simulate(integrator.model, manoeuvre, parameters=known, integrator=integrator)
+
+
+def _stop(trial: Trial, model: Model) -> Tried | None:
+    """A stop in a record: from the change of the revolutions until the ship does not move ahead any more."""
+    signals = trial.signals
+    if not {"n_radps", "x_m", "y_m", "psi_rad"} <= set(signals):
+        return None
+    time = trial.time_s
+    revolutions, psi, *place = (
+        straight_over_gaps(time, signals[name]) for name in ("n_radps", "psi_rad", "x_m", "y_m")
+    )
+    approach = float(np.median(revolutions[: max(3, len(revolutions) // 50)]))
+    slow = np.flatnonzero(revolutions < REVERSED * approach)
+    if approach <= 0 or not len(slow) or slow[0] == 0:
+        return None
+    begin = int(slow[0])
+    velocity = [np.gradient(values, time) for values in place]
+    ahead = velocity[0] * np.cos(psi) + velocity[1] * np.sin(psi)
+    if "u_mps" in signals and not np.isnan(signals["u_mps"]).all():
+        ahead = straight_over_gaps(time, signals["u_mps"])
+    still = np.flatnonzero(ahead[begin:] <= 0)
+    if not len(still):
+        return None
+    end = begin + int(still[0])
+    t, north, east = (values[begin : end + 1] for values in (time, *place))
+    cos, sin = math.cos(psi[begin]), math.sin(psi[begin])
+    n, e = north[-1] - north[0], east[-1] - east[0]
+    length = float(model.parameter_values()[model.parameter_names.index("ship.length")])
+    # By cubic smoothing over a length of time, so that noise of the position does not lengthen the way.
+    steps = max(1, len(t) // 60)
+    way = float(np.hypot(np.diff(north[::steps]), np.diff(east[::steps])).sum())
+    figures = {
+        "track_reach_m": way,
+        "head_reach_m": float(n * cos + e * sin),
+        "side_reach_m": float(e * cos - n * sin),
+        "time_to_stop_s": float(t[-1] - t[0]),
+        "track_reach_lengths": way / length,
+        "heading_change_deg": math.degrees(float(psi[end] - psi[begin])),
+    }
+    noise = record_noise(trial)
+    point = POINT_ERROR * length
+    errors = dict.fromkeys(("track_reach_m", "head_reach_m", "side_reach_m"), math.hypot(point, noise.get("x_m", 0.0)))
+    errors["time_to_stop_s"] = float(np.median(np.diff(time))) / math.sqrt(12)
+    speed = float(np.median(ahead[max(0, begin - 5) : begin + 1]))
+    manoeuvre = Stop(float(np.median(revolutions[begin : end + 1])))
+    return Tried(trial, manoeuvre, None, float(time[begin]), speed, figures, errors)

@@ -1,0 +1,179 @@
+"""Verdicts on the criteria of MSC.137(76), with probabilities: the trial as run, and the ship at full load."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.analysis.stability.imo import TRACK_REACH, TRIAL_RUDDER, largest_allowed, manoeuvring_trials
+from tank2sim.analysis.validation.standard_trials import SEED
+from tank2sim.apps.trial_office.full_load import Prediction, deviation
+from tank2sim.apps.trial_office.tried import Tried
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
+
+DECIDED = 0.95
+"""Probability from which a criterion is passed, and one less which it is failed; undecided between. Project choice:
+that of the other intervals."""
+
+LOADING_HOLDS = 0.5
+"""``validity`` of the loading below which its formulas do not carry the verdict. Project choice: halfway between where
+they hold and where they do not, before the ballast of a tanker."""
+
+_NEARLY_OVER = math.radians(30.0)
+"""Least rudder of a turning circle of the criteria: 35 deg, or the largest of the gear. Project choice."""
+
+_LENGTHS = {
+    "advance_lengths": "advance_m",
+    "tactical_diameter_lengths": "tactical_diameter_m",
+    "initial_turning_lengths": "initial_turning_distance_m",
+    "track_reach_lengths": "track_reach_m",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CriterionSide:
+    """Values of a criterion by one record, in the criterion's unit: as run, and at full load."""
+
+    trial: str
+    side: str
+    as_run: float
+    full_load: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CriterionVerdict:
+    """A criterion of MSC.137(76), as run and at full load; values are those of the worse side.
+
+    Parameters
+    ----------
+    name, unit : str
+    sides : tuple of CriterionSide
+        Both sides.
+    allowed : float
+        Limit for the ship at full load.
+    as_run, full_load : float or None
+    probability_as_run, probability : float or None
+        Of meeting it.
+    verdict_as_run, verdict : str
+        ``pass``, ``fail`` or ``undecided``; ``not tried``; ``undecided, EXTRAPOLATED`` where the formulas for the
+        loading do not hold.
+    """
+
+    name: str
+    unit: str
+    allowed: float
+    sides: tuple[CriterionSide, ...] = ()
+    as_run: float | None = None
+    full_load: float | None = None
+    probability_as_run: float | None = None
+    probability: float | None = None
+    verdict_as_run: str = "not tried"
+    verdict: str = "not tried"
+
+
+def judge_criteria(
+    card: ManoeuvringCard, raw: Sequence[Tried], still: Sequence[Tried], found: Sequence[Prediction], validity: float
+) -> tuple[CriterionVerdict, ...]:
+    """Verdicts on all criteria of MSC.137(76)."""
+    length = card.ship.length_m
+    by_name: dict[str, str] = {TRACK_REACH: "track_reach_lengths"}
+    for trial in manoeuvring_trials(TRIAL_RUDDER):
+        by_name |= trial.criteria
+    verdicts = []
+    for name, allowed in largest_allowed(length / card.model.speed_mps).items():
+        figure = _LENGTHS.get(by_name[name], by_name[name])
+        unit, scale = ("L", length) if by_name[name] in _LENGTHS else ("deg", 1.0)
+        chosen = [
+            group
+            for group in zip(raw, still, found, strict=True)
+            if figure in group[0].figures and figure in group[1].figures and _is_trial_of(name, group[0])
+        ]
+        verdict = CriterionVerdict(name=name, unit=unit, allowed=allowed)
+        verdicts.append(_judged(verdict, figure, scale, chosen, validity) if chosen else verdict)
+    return tuple(verdicts)
+
+
+def _judged(
+    criterion: CriterionVerdict,
+    figure: str,
+    scale: float,
+    chosen: Sequence[tuple[Tried, Tried, Prediction]],
+    validity: float,
+) -> CriterionVerdict:
+    """The verdict by the trials of a criterion; the worse side counts, within each member."""
+    value, error = max((raw.figures[figure], raw.errors.get(figure, 0.0)) for raw, _, _ in chosen)
+    limit = criterion.allowed * scale
+    as_run = _probability(math.log(limit / value), error / value) if value > 0 else 1.0
+    loads = [prediction.at_full_load(still, figure) for _, still, prediction in chosen]
+    sides = tuple(
+        CriterionSide(
+            trial=raw.name,
+            side=raw.side,
+            as_run=raw.figures[figure] / scale,
+            full_load=None if load is None else load[0] / scale,
+        )
+        for (raw, _, _), load in zip(chosen, loads, strict=True)
+    )
+    judged = replace(
+        criterion,
+        sides=sides,
+        as_run=value / scale,
+        probability_as_run=as_run,
+        verdict_as_run=_verdict(as_run),
+        verdict="undecided",
+    )
+    known = [load for load in loads if load is not None]
+    if len(known) < len(loads):
+        return judged
+    draws = []
+    for place, ((_, still, prediction), (centre, _)) in enumerate(zip(chosen, known, strict=True)):
+        ratios = prediction.ratios.get(figure, np.zeros(0))
+        noise = np.random.default_rng([SEED, place]).standard_normal(len(ratios))
+        share = still.errors.get(figure, 0.0) / still.figures[figure]
+        draws.append(math.log(centre) + ratios - np.median(ratios) + share * noise if len(ratios) else np.zeros(0))
+    shortest = min(len(draw) for draw in draws)
+    middle, spread = max((math.log(centre), error) for centre, error in known)
+    if shortest > 1:  # errors that both sides share do not add up
+        worst = np.max([draw[:shortest] for draw in draws], axis=0)
+        middle, spread = float(np.median(worst)), deviation(worst)
+    probability = _probability(math.log(limit) - middle, spread)
+    words = _verdict(probability)
+    if validity < LOADING_HOLDS:
+        words = f"{'undecided' if words == 'pass' else words}, EXTRAPOLATED"
+    at_load = max(centre for centre, _ in known) / scale
+    return replace(judged, full_load=at_load, probability=probability, verdict=words)
+
+
+def _is_trial_of(criterion: str, one: Tried) -> bool:
+    """Whether a manoeuvre is one of the trials of a criterion, to a degree."""
+    manoeuvre = one.manoeuvre
+    if criterion == TRACK_REACH:
+        return isinstance(manoeuvre, Stop) and manoeuvre.revolutions != 0
+    for trial in manoeuvring_trials(TRIAL_RUDDER):
+        if criterion not in trial.criteria:
+            continue
+        asked = trial.manoeuvres[0]
+        if isinstance(asked, Turn):
+            return isinstance(manoeuvre, Turn) and abs(manoeuvre.rudder) >= _NEARLY_OVER
+        close = math.radians(1.5)
+        return isinstance(manoeuvre, Zigzag) and (
+            abs(abs(manoeuvre.rudder) - asked.rudder) < close and abs(manoeuvre.heading - asked.heading) < close
+        )
+    return False
+
+
+def _probability(distance: float, spread: float) -> float:
+    """Probability that a logarithm is below its limit, `distance` above its middle."""
+    if not spread:
+        return 1.0 if distance >= 0 else 0.0
+    return 0.5 * math.erfc(-distance / spread / math.sqrt(2))
+
+
+def _verdict(probability: float) -> str:
+    if probability >= DECIDED:
+        return "pass"
+    return "fail" if probability <= 1 - DECIDED else "undecided"
