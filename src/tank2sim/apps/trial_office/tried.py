@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
 from tank2sim.arrays import Array
@@ -19,6 +20,14 @@ from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
 from tank2sim.simulation.recorded import POINT_ERROR, Recorded, recognise, repeat, straight_over_gaps
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.units import from_si
+
+_SMOOTH = 60
+"""Parts of a stop over each of which speed and place are smoothed: noise lengthens a way of single rows. Project
+choice."""
+
+_AT_REST = 0.02
+"""Share of the approach speed at which a ship counts as dead in the water. Project choice: above the noise of a log, and
+its last metre is far below the errors of a reach."""
 
 REVERSED = 0.1
 """Share of the revolutions of the approach below which the engine counts as stopped or reversed. Project choice."""
@@ -200,7 +209,9 @@ def _stop(trial: Trial, model: Model) -> Tried | None:
     ahead = velocity[0] * np.cos(psi) + velocity[1] * np.sin(psi)
     if "u_mps" in signals and not np.isnan(signals["u_mps"]).all():
         ahead = straight_over_gaps(time, signals["u_mps"])
-    still = np.flatnonzero(ahead[begin:] <= 0)
+    steps = max(1, (len(time) - begin) // _SMOOTH)
+    speed = float(np.median(ahead[max(0, begin - 5) : begin + 1]))
+    still = np.flatnonzero(uniform_filter1d(ahead, steps)[begin:] <= _AT_REST * speed)
     if not len(still):
         return None
     end = begin + int(still[0])
@@ -208,8 +219,6 @@ def _stop(trial: Trial, model: Model) -> Tried | None:
     cos, sin = math.cos(psi[begin]), math.sin(psi[begin])
     n, e = north[-1] - north[0], east[-1] - east[0]
     length = float(model.parameter_values()[model.parameter_names.index("ship.length")])
-    # By cubic smoothing over a length of time, so that noise of the position does not lengthen the way.
-    steps = max(1, len(t) // 60)
     way = float(np.hypot(np.diff(north[::steps]), np.diff(east[::steps])).sum())
     figures = {
         "track_reach_m": way,
@@ -223,6 +232,5 @@ def _stop(trial: Trial, model: Model) -> Tried | None:
     point = POINT_ERROR * length
     errors = dict.fromkeys(("track_reach_m", "head_reach_m", "side_reach_m"), math.hypot(point, noise.get("x_m", 0.0)))
     errors["time_to_stop_s"] = float(np.median(np.diff(time))) / math.sqrt(12)
-    speed = float(np.median(ahead[max(0, begin - 5) : begin + 1]))
     manoeuvre = Stop(float(np.median(revolutions[begin : end + 1])))
     return Tried(trial, manoeuvre, None, float(time[begin]), speed, figures, errors)
