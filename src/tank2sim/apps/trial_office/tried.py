@@ -26,7 +26,7 @@ _SMOOTH = 60
 choice."""
 
 _AT_REST = 0.02
-"""Share of the approach speed at which a ship counts as dead in the water. Project choice: above the noise of a log, and
+"""Share of the approach speed at which a ship counts as dead in the water. Project choice: above the noise of a log;
 its last metre is far below the errors of a reach."""
 
 REVERSED = 0.1
