@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.apps.programs.robotics import growth_per_step
 from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
 from tests.dynamics.accelerations import accelerations
@@ -44,10 +45,66 @@ def plugin_forces(given: dict[str, float], nu: np.ndarray) -> np.ndarray:
     return found
 
 
-def test_gazebos_own_sum_gives_the_accelerations_of_the_card(craft: CraftCard) -> None:
+HEAVY = {"rigid_body.mass": 120.0, "rigid_body.yaw_inertia": 62.0}
+"""Of a craft so heavy that its added mass is stable in a plugin."""
+
+
+@pytest.fixture(scope="module")
+def heavy(craft: CraftCard) -> CraftCard:
+    card = t2s.Ship(craft).replace(HEAVY).card
+    assert isinstance(card, CraftCard)
+    return card
+
+
+def largest_root(m: np.ndarray, a: np.ndarray, d: np.ndarray, dt: float) -> float:
+    """Of one explicit step of a plugin, by iterating it on a small error."""
+    inverse = np.linalg.inv(m)
+    now, before = np.array([1e-6, 1e-6, 1e-6]), np.zeros(3)
+    sizes = []
+    for _ in range(400):
+        now, before = now + dt * inverse @ (-d @ now - a @ (now - before) / dt), now
+        sizes.append(np.linalg.norm(now))
+    return float((sizes[-1] / sizes[-101]) ** (1 / 100))
+
+
+def test_the_growth_of_an_error_is_that_of_the_plugins_step(craft: CraftCard, heavy: CraftCard) -> None:
+    otter = t2s.load("otter").card
+    assert isinstance(otter, CraftCard)
+    for card in (craft, heavy, otter):
+        body, d = card.rigid_body, card.derivatives
+        lever = body.mass * body.x_G
+        mass = np.array([[body.mass, 0, 0], [0, body.mass, lever], [0, lever, body.yaw_inertia]])
+        added = -np.array(
+            [
+                [d.get("Xudot", 0), 0, 0],
+                [0, d.get("Yvdot", 0), d.get("Yrdot", 0)],
+                [0, d.get("Nvdot", 0), d.get("Nrdot", 0)],
+            ]
+        )
+        damping = -np.diag([d.get("Xu", 0.0), d.get("Yv", 0.0), d.get("Nr", 0.0)])
+        assert growth_per_step(card) == pytest.approx(largest_root(mass, added, damping, 1e-3), rel=0.01)
+    assert growth_per_step(otter) == pytest.approx(1.985, abs=0.005)
+    assert growth_per_step(heavy) < 1 < growth_per_step(craft)
+
+
+@pytest.mark.parametrize("to", ["gazebo", "vrx"])
+def test_added_mass_that_diverges_goes_into_the_inertia_of_the_link(craft: CraftCard, to: str) -> None:
+    made = t2s.convert(t2s.Ship(craft), to)
+    given = elements(made.text)
+    expected = {"xx": 5.281521, "yy": 82.5, "yr": 9.0, "rr": 24.032424}
+    assert {key: given[key] for key in expected} == pytest.approx(expected)
+    assert not any(value for name, value in given.items() if "Dot" in name)
+    assert not {"xVR", "yUR", "nUV"} & set(given)  # the engine has C_A with the inertia
+    assert any("1." in notice and "step" in notice for notice in made.notices)
+    with pytest.raises(InputError, match="added_mass"):
+        t2s.convert(t2s.Ship(craft), to, added_mass="plugin")
+
+
+def test_gazebos_own_sum_gives_the_accelerations_of_the_card(heavy: CraftCard) -> None:
+    craft = heavy
     given = elements(t2s.convert(t2s.Ship(craft), "gazebo").text)
     model = t2s.Ship(craft).model
-    m, x_G, inertia = 80.0, 0.153125, 16.0125
+    m, x_G, inertia = 120.0, 0.153125, 62.0
     added = np.array([[given.get(f"{f}Dot{a}", 0.0) for a in "UVR"] for f in "xyn"])
     body = np.array([[m, 0, 0], [0, m, m * x_G], [0, m * x_G, inertia]])
     rng = np.random.default_rng(2)
@@ -61,8 +118,8 @@ def test_gazebos_own_sum_gives_the_accelerations_of_the_card(craft: CraftCard) -
         assert there * [1, -1, -1] == pytest.approx(here, rel=1e-8)
 
 
-def test_vrx_has_positive_damping_and_no_more_than_its_axes(craft: CraftCard) -> None:
-    made = t2s.convert(t2s.Ship(craft), "vrx")
+def test_vrx_has_positive_damping_and_no_more_than_its_axes(heavy: CraftCard) -> None:
+    made = t2s.convert(t2s.Ship(heavy), "vrx")
     given = elements(made.text)
     assert given == pytest.approx(
         {
@@ -73,8 +130,8 @@ def test_vrx_has_positive_damping_and_no_more_than_its_axes(craft: CraftCard) ->
     assert any("Nrabsu" in notice and "Munk" in notice for notice in made.notices)
 
 
-def test_what_the_simpler_form_loses_is_in_the_figures_and_gazebos_hull_loses_nothing(craft: CraftCard) -> None:
-    gazebo, vrx = (t2s.convert(t2s.Ship(craft), to).to_dict()["figures"] for to in ("gazebo", "vrx"))
+def test_what_the_simpler_form_loses_is_in_the_figures_and_gazebos_hull_loses_nothing(heavy: CraftCard) -> None:
+    gazebo, vrx = (t2s.convert(t2s.Ship(heavy), to).to_dict()["figures"] for to in ("gazebo", "vrx"))
     assert all(entry["after"] == pytest.approx(entry["before"], rel=1e-12) for entry in gazebo)
     straight = [entry for entry in vrx if entry["manoeuvre"].startswith("straight")]
     turn = next(entry for entry in vrx if entry["figure"] == "steady_diameter_m")

@@ -41,6 +41,7 @@ def convert(
     rudder_sign: Literal["port", "starboard"] | None = None,
     origin_m: NumberArgument = 0.0,
     scatter: Scatter | None = None,
+    added_mass: Literal["plugin", "inertial"] | None = None,
 ) -> ConversionResult:
     """Write a ship's card in another language.
 
@@ -61,6 +62,9 @@ def convert(
         New origin forward of the old one, m.
     scatter : float, optional
         Spread of the motions of a fit about standard manoeuvres, as a share of their usual spread; by default 0.3.
+    added_mass : str, optional
+        Where Gazebo and VRX have the added mass of a craft: in the ``plugin``, whose explicit step is stable only for
+        light ones, or in the ``inertial`` of the link (engine DART); by default in the plugin where that is stable.
 
     Raises
     ------
@@ -84,7 +88,7 @@ def convert(
     from tank2sim.apps.programs.languages import converted
     from tank2sim.cards.examination import doubts
 
-    made, notices = converted(ship.card, to, Conventions(scaling, rudder_sign, origin_m), scatter)
+    made, notices = converted(ship.card, to, Conventions(scaling, rudder_sign, origin_m), scatter, added_mass)
     fit = (
         None
         if made.fit is None

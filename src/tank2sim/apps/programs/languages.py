@@ -20,15 +20,19 @@ from tank2sim.apps.programs.program_code import mss_function, pvs_class
 from tank2sim.apps.programs.robotics import (
     VRX_MASSES,
     VRX_TERMS,
+    AddedMass,
     craft_changes,
     gazebo_model,
     gazebo_text,
+    growth_per_step,
+    place_of_added_mass,
     vrx_model,
     vrx_text,
 )
 from tank2sim.cards import Card, CraftCard, ManoeuvringCard
 from tank2sim.cards.card import MmgCard, manoeuvring_card
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
+from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
@@ -48,7 +52,7 @@ class ConvertedText:
 
 
 def converted(
-    card: Card, to: str, wanted: Conventions, scatter: float | None
+    card: Card, to: str, wanted: Conventions, scatter: float | None, added_mass: AddedMass | None = None
 ) -> tuple[ConvertedText, tuple[Notice, ...]]:
     """A card in another language, and notices.
 
@@ -61,6 +65,8 @@ def converted(
         Of the new card.
     scatter : float, optional
         Spread of the motions of a fit about standard manoeuvres.
+    added_mass : str, optional
+        Where Gazebo and VRX have it: :func:`.place_of_added_mass`.
 
     Raises
     ------
@@ -68,7 +74,9 @@ def converted(
         The card cannot be had in that language.
     """
     if isinstance(card, CraftCard):
-        return _of_craft(card, to, wanted)
+        return _of_craft(card, to, wanted, added_mass)
+    if added_mass is not None:
+        raise ArgumentError("added_mass", added_mass, "is of craft in gazebo and vrx alone", "leave it out")
     given = _of_ship(card, to)
     if abs(wanted.origin_m) > given.ship.length_m:
         raise ArgumentError("origin_m", f"{wanted.origin_m:g}", "is more than a length from midships", "give it in m")
@@ -103,13 +111,17 @@ def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     return manoeuvring_card(card)
 
 
-def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[Notice, ...]]:
+def _of_craft(
+    card: CraftCard, to: str, wanted: Conventions, added_mass: AddedMass | None
+) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
         raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")
     if wanted.rudder_sign is not None or wanted.origin_m:
         raise ArgumentError("to", to, "has neither a rudder nor another origin", "leave rudder sign and origin out")
     if to == "small_craft":
+        if added_mass is not None:
+            raise ArgumentError("added_mass", added_mass, "is of gazebo and vrx alone", "leave it out")
         if wanted.scaling not in (None, "dimensional", "prime"):
             raise ArgumentError("scaling", wanted.scaling or "", "is not of a small craft", "give dimensional or prime")
         made = craft_in_scaling(card, wanted.scaling or card.model.scaling)
@@ -117,6 +129,13 @@ def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedT
     if wanted.scaling is not None:
         raise ArgumentError("to", to, "has conventions of its own", "leave the scaling out")
     text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
+    changes = craft_changes(card, model(card, added_mass))
+    notices = _lost_by(card, to, place_of_added_mass(card, added_mass))
+    return ConvertedText(text(card, added_mass), changes=changes), tuple(map(Notice, notices))
+
+
+def _lost_by(card: CraftCard, to: str, place: AddedMass) -> list[str]:
+    """What the plugin of a simulator does not have of a craft, in sentences."""
     notices = []
     if card.effects:
         notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
@@ -126,11 +145,20 @@ def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedT
             "dead band, nor the lag of the card"
         )
     else:
-        lost = [name for name, value in card.derivatives.items() if value and name not in (*VRX_TERMS, *VRX_MASSES)]
-        also = f", and {', '.join(lost)}" if lost else ""
-        notices.append(f"SimpleHydrodynamics has no Coriolis terms of the added mass (no moment of Munk){also}")
-    changes = craft_changes(card, model(card))
-    return ConvertedText(text(card), changes=changes), tuple(map(Notice, notices))
+        kept = {*VRX_TERMS, *VRX_MASSES}
+        if place == "inertial":
+            kept |= set(CRAFT_ADDED_MASSES)
+        lost = [name for name, value in card.derivatives.items() if value and name not in kept]
+        if place == "plugin":
+            lost.insert(0, "the Coriolis terms of the added mass (the moment of Munk)")
+        if lost:
+            notices.append(f"SimpleHydrodynamics does not have {', '.join(lost)}")
+    if place == "inertial":
+        notices.append(
+            f"the added mass is in <fluid_added_mass> of the link, which the engine DART has: as a force of the plugin "
+            f"it would let an error of the velocity grow {growth_per_step(card):.4g} times in each step"
+        )
+    return notices
 
 
 def _fitted(

@@ -6,6 +6,11 @@ other signs), and those of C_A are given as products of velocities (``xVR``, ``y
 VRX has one linear and one quadratic term an axis, positive for damping, and no C_A: no moment of Munk. Both as the
 source of the plugins has it (gz-sim 7, VRX for Gazebo Classic); no simulator was run.
 
+Both feed the acceleration of the last step back as a force of added mass. That is stable only if every eigenvalue of
+M^-1 A is below 1, at any step (:func:`growth_per_step`): the usual numbers of surface craft diverge. The added mass
+then goes into ``<fluid_added_mass>`` of the link's ``<inertial>`` (SDF 1.10, engine DART). That engine solves M + A at
+once, and has C_A of the velocity over the ground.
+
 Both have x forward, y to port and z up. That turns the signs of v, r, Y and N together, and so none of a coefficient.
 The mass, the inertia and the centre of gravity belong into ``<inertial>``.
 """
@@ -15,6 +20,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations_with_replacement
+from typing import Literal
+
+import numpy as np
 
 from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.cards.card import CraftCard
@@ -22,7 +30,7 @@ from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS, cruis
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import added_mass_forces
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.escaping import xml_comment
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate
@@ -75,17 +83,107 @@ def coriolis_products(derivatives: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in products.items() if value}
 
 
-def gazebo_text(card: CraftCard) -> str:
-    """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each."""
-    hull = {gazebo_name(name): value for name, value in card.derivatives.items() if value}
+AddedMass = Literal["plugin", "inertial"]
+"""Where the added mass goes: into the plugin, or into the inertia of the link."""
+
+ENGINE_STEP_S = 0.001
+"""Step of Gazebo's engines where a world states none."""
+
+
+def growth_per_step(card: CraftCard) -> float:
+    """Factor by which an error of the velocity grows in a step of a plugin that takes added mass from the last step.
+
+    The largest root z of ``z^2 I - z (I - dt M^-1 D - M^-1 A) - M^-1 A = 0``, with the rigid mass M and the added mass
+    A about the origin of the link, and the slope D of the damping at the highest speed of the card. Without damping it
+    is the largest eigenvalue of M^-1 A, or 1; above 1 the velocity has no bound, at any step dt.
+
+    Parameters
+    ----------
+    card : CraftCard
+    """
+    body, known = card.rigid_body, card.derivatives
+    lever = body.mass * body.x_G
+    mass = np.array([[body.mass, 0, 0], [0, body.mass, lever], [0, lever, body.yaw_inertia]])
+    place = {"u": 0, "v": 1, "r": 2, "X": 0, "Y": 1, "N": 2}
+    added, damping = np.zeros((3, 3)), np.zeros((3, 3))
+    for name in CRAFT_ADDED_MASSES:
+        added[place[name[0]], place[name[1]]] = -known.get(name, 0.0)
+    fastest = card.model.speed_range_mps[1]
+    for term in VELOCITY_TERMS:  # of u alone at that speed
+        size = (fastest if term.size == "u" else 0.0) if term.size else 1.0
+        slope = -known.get(term.name, 0.0) * size * (2.0 if term.factor == term.size == "u" else 1.0)
+        damping[place[term.force], place[term.factor]] += slope
+    inverse, one = np.linalg.inv(mass), np.eye(3)
+    step = np.block(
+        [[one - ENGINE_STEP_S * inverse @ damping - inverse @ added, inverse @ added], [one, np.zeros((3, 3))]]
+    )
+    return float(np.abs(np.linalg.eigvals(step)).max())
+
+
+def place_of_added_mass(card: CraftCard, wanted: AddedMass | None) -> AddedMass:
+    """Where the added mass of a craft goes: as `wanted`, by default into the plugin where that is stable.
+
+    Parameters
+    ----------
+    card : CraftCard
+    wanted : str, optional
+
+    Raises
+    ------
+    InputError
+        It is wanted in the plugin, and an error would grow there.
+    """
+    growth = growth_per_step(card)
+    if wanted == "plugin" and growth >= 1:
+        problem = f"would let an error of the velocity grow {growth:.4g} times in each step, however short"
+        raise ArgumentError("added_mass", "plugin", problem, "leave it out, or give inertial")
+    return wanted or ("plugin" if growth < 1 else "inertial")
+
+
+def _inertial(card: CraftCard) -> list[str]:
+    """The added mass of a link about its origin, positive, kg, kg m and kg m^2; what a card does not have is zero."""
+    known = {name: -card.derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
+    coupled = (known["Yrdot"] + known["Nvdot"]) / 2 + 0.0  # the matrix of SDF is symmetric
+    given = {"xx": known["Xudot"], "yy": known["Yvdot"], "yr": coupled, "rr": known["Nrdot"]}
+    rows = ("xx xy xz xp xq xr", "yy yz yp yq yr", "zz zp zq zr", "pp pq pr", "qq qr", "rr")
+    return [
+        "<!-- put this into the <inertial> of base_link (SDF 1.10, engine DART); zz, pp and qq are not on the card -->",
+        "<fluid_added_mass>",
+        *(
+            "  " + " ".join(f"<{key}>{_NUMBER.format(given.get(key, 0.0))}</{key}>" for key in row.split())
+            for row in rows
+        ),
+        "</fluid_added_mass>",
+    ]
+
+
+def gazebo_text(card: CraftCard, added_mass: AddedMass | None = None) -> str:
+    """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each.
+
+    Parameters
+    ----------
+    card : CraftCard
+    added_mass : str, optional
+        As of :func:`place_of_added_mass`.
+    """
+    derivatives, in_plugin = card.derivatives, place_of_added_mass(card, added_mass) == "plugin"
+    hull = {
+        gazebo_name(name): value
+        for name, value in derivatives.items()
+        if value and (in_plugin or name not in CRAFT_ADDED_MASSES)
+    }
+    products = coriolis_products(derivatives) if in_plugin else {}
+    about = "C_A is in the products xVR to nUR" if in_plugin else "C_A comes with <fluid_added_mass>"
     lines = [
         *_head(card, "Gazebo (gz-sim 7 or later): put it into <model>"),
+        *([] if in_plugin else _inertial(card)),
         '<plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics">',
         "  <link_name>base_link</link_name>",
         f"  <water_density>{_NUMBER.format(card.environment.water_density_kgpm3)}</water_density>",
-        "  <disable_coriolis>true</disable_coriolis> <!-- C_A is in the products xVR to nUR -->",
+        *([] if in_plugin else ["  <disable_added_mass>true</disable_added_mass>"]),
+        f"  <disable_coriolis>true</disable_coriolis> <!-- {about} -->",
         *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in hull.items()),
-        *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in coriolis_products(card.derivatives).items()),
+        *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in products.items()),
         "</plugin>",
     ]
     for thruster in card.thrusters:
@@ -106,12 +204,21 @@ def gazebo_text(card: CraftCard) -> str:
     return "\n".join(lines) + "\n"
 
 
-def vrx_text(card: CraftCard) -> str:
-    """SDF of VRX's SimpleHydrodynamics for a craft."""
-    masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) for name in VRX_MASSES}
+def vrx_text(card: CraftCard, added_mass: AddedMass | None = None) -> str:
+    """SDF of VRX's SimpleHydrodynamics for a craft.
+
+    Parameters
+    ----------
+    card : CraftCard
+    added_mass : str, optional
+        As of :func:`place_of_added_mass`.
+    """
+    in_plugin = place_of_added_mass(card, added_mass) == "plugin"
+    masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) if in_plugin else 0.0 for name in VRX_MASSES}
     damping = {VRX_TERMS[name]: -card.derivatives.get(name, 0.0) for name in VRX_TERMS}
     lines = [
         *_head(card, "VRX: put it into <model>"),
+        *([] if in_plugin else _inertial(card)),
         '<plugin filename="libSimpleHydrodynamics.so" name="vrx::SimpleHydrodynamics">',
         "  <link_name>base_link</link_name>",
         *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in {**masses, **damping}.items()),
@@ -132,11 +239,21 @@ def _head(card: CraftCard, where: str) -> list[str]:
     ]
 
 
-def vrx_model(card: CraftCard) -> Model:
-    """The model of a craft with what VRX's plugin has of its hull: six terms of damping, no C_A, no effects."""
-    kept = {*VRX_TERMS, *VRX_MASSES}
+def vrx_model(card: CraftCard, added_mass: AddedMass | None = None) -> Model:
+    """The model of a craft with the terms of VRX's plugin: six of damping, no effects, and C_A with the inertia alone.
+
+    Parameters
+    ----------
+    card : CraftCard
+    added_mass : str, optional
+        As of :func:`place_of_added_mass`.
+    """
+    inertial = place_of_added_mass(card, added_mass) == "inertial"
+    kept = {*VRX_TERMS, *(CRAFT_ADDED_MASSES if inertial else VRX_MASSES)}
     derivatives = {name: value for name, value in card.derivatives.items() if name in kept}
     model = build(replace(card, derivatives=derivatives, effects=()))
+    if inertial:
+        return model
     added = {name: model.symbol(f"derivatives.{name}") for name in CRAFT_ADDED_MASSES}
     motion = (model.symbol(f"motion.{letter}") for letter in "uvr")
     for force, value in zip("XYN", added_mass_forces(added, *motion), strict=True):
@@ -144,7 +261,7 @@ def vrx_model(card: CraftCard) -> Model:
     return model
 
 
-def gazebo_model(card: CraftCard) -> Model:
+def gazebo_model(card: CraftCard, _: AddedMass | None = None) -> Model:
     """The model of a craft with what Gazebo's plugin has of it: the whole hull, without effects."""
     return build(replace(card, effects=()))
 
